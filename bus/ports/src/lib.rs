@@ -1,0 +1,1 @@
+//! Typed publishers, subscribers and waiting: the only crate that opens iceoryx2.

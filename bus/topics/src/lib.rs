@@ -1,0 +1,37 @@
+//! Every topic of the bus in one table, with the layout of its samples.
+//!
+//! Apart from `lager-ports`, so that a tool that only reads recordings knows the
+//! layouts without the transport. This crate never opens the bus, never reads a
+//! clock and has no behaviour beyond naming, converting and describing data.
+//!
+//! * [`table`] lists the topics: name, payload, quality of service, actors.
+//! * [`payloads`] holds the sample layouts, one file per family of topics.
+//! * [`schema`] turns a layout into a hash, so that a changed one is refused.
+//! * [`Stamp`] is the header in front of every sample.
+//!
+//! **Invariant:** every bit pattern of every payload is a valid value. Enums travel as
+//! [`Tag`], text as [`Text`], so a foreign or broken writer cannot cause undefined
+//! behaviour in a reader.
+
+mod hash;
+pub mod list;
+pub mod payloads;
+mod role;
+pub mod schema;
+mod stamp;
+pub mod table;
+mod tag;
+mod text;
+
+pub use payloads::*;
+pub use role::{Role, UnknownRole};
+pub use schema::{Field, FieldInfo, Payload, Schema};
+pub use stamp::Stamp;
+pub use table::{
+    BridgeRequest, LinkHealth, LogThought, MissionEvent, MissionOrder, NavMap, NavRoute, NavStatus,
+    OBSERVERS, OperatorInput, Qos, Request, SERVICE_SLOTS, SensorDistance, SensorLine,
+    SteeringCommand, SteeringState, TOPICS, Topic, TopicEntry, TopicVisitor, TruthPose,
+    UnknownTopic, visit,
+};
+pub use tag::{Coded, Tag};
+pub use text::Text;

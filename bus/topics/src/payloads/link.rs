@@ -1,0 +1,116 @@
+//! The state of the links and of the arbiter: `link/health`.
+
+use lager_wire::ResetCause;
+
+use super::steering::{Finish, Origin};
+use crate::schema::payload;
+use crate::tag::{Tag, coded, coded_as_is};
+
+coded_as_is!(ResetCause {
+    Unknown,
+    PowerOn,
+    External,
+    BrownOut,
+    Watchdog,
+    Panic,
+    Jtag,
+});
+
+coded! {
+    /// Who may drive.
+    pub enum Mode {
+        /// The operator.
+        Manual = 0,
+        /// The navigator.
+        Autonomous = 1,
+    }
+}
+
+payload! {
+    /// One board's link, as the bridge sees it. Counters wrap.
+    pub struct BoardHealth: 44 bytes {
+        /// Life of the link: grows with each handshake.
+        pub epoch: u32,
+        /// Good packets received in this epoch.
+        pub packets: u32,
+        /// Packets missing by their ids, a lower bound.
+        pub lost: u32,
+        /// Packets refused by their CRC.
+        pub bad_crc: u32,
+        /// Bytes passed over while looking for a packet.
+        pub skipped_bytes: u32,
+        /// Times the board has restarted.
+        pub reboots: u32,
+        /// Speed of the port in baud.
+        pub baud: u32,
+        /// 1 = the handshake is done and packets come.
+        pub up: u8,
+        /// Version of the wire protocol, `0xFF` = unknown.
+        pub version: u8 = Self::UNKNOWN,
+        /// Why the board last restarted.
+        pub reset_cause: Tag<ResetCause>,
+        /// Port it was found on: 0 = configured as sensor, 1 = as steering, `0xFF` = none.
+        pub port: u8 = Self::UNKNOWN,
+        /// The board's own count of packets it refused; saturates.
+        pub board_bad_packets: u8,
+        /// The board's own count of packets missing by id; saturates.
+        pub board_lost: u8,
+        /// The board's own count of commands it refused; saturates.
+        pub board_refused: u8,
+        /// The board's own count of ExDe errors; saturates.
+        pub board_exde_errors: u8,
+        /// The board's own count of unanswered servos; saturates.
+        pub board_servo_timeouts: u8,
+        /// Processor load of the board in percent.
+        pub board_load_percent: u8,
+        /// Longest main loop of the board in units of 100 us.
+        pub board_longest_loop_100us: u8,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 5],
+    }
+}
+
+impl BoardHealth {
+    /// `version` and `port` before they are known.
+    pub const UNKNOWN: u8 = 0xFF;
+}
+
+payload! {
+    /// Both links and the arbiter: all that a restarted bridge needs to go on.
+    pub struct Health: 128 bytes {
+        /// The sensor board's link.
+        pub sensor: BoardHealth,
+        /// The steering board's link.
+        pub steering: BoardHealth,
+        /// Samples of the bus the bridge itself has missed.
+        pub bus_lost: u64,
+        /// The order in force.
+        pub current_id: u32,
+        /// The order that ended last.
+        pub finished_id: u32,
+        /// Orders refused by the arbiter.
+        pub orders_refused: u32,
+        /// Orders that ended because nobody renewed them.
+        pub leases_expired: u32,
+        /// Until the lease of the order in force ends, in ms; 0 = none runs.
+        pub next_lease_ms: u16,
+        /// Who may drive.
+        pub mode: Tag<Mode>,
+        /// 1 = a stop is latched.
+        pub stopped: u8,
+        /// Who gave the order in force.
+        pub current_origin: Tag<Origin>,
+        /// Who gave the order that ended last.
+        pub finished_origin: Tag<Origin>,
+        /// Command code in force.
+        pub current_code: u8,
+        /// Sequence byte of the last command on the wire.
+        pub wire_seq: u8,
+        /// How the last order ended.
+        pub finish: Tag<Finish>,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 7],
+    }
+}

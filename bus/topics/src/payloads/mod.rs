@@ -1,0 +1,24 @@
+//! The sample layouts, one file per family of topics.
+
+mod link;
+mod log;
+mod mission;
+mod nav;
+mod request;
+mod sensor;
+mod steering;
+mod truth;
+
+pub use link::{BoardHealth, Health, Mode};
+pub use log::Thought;
+pub use mission::{Event, EventKind, Input, InputKind, Order};
+pub use nav::{
+    Goal, Heading, MapProduct, NavigatorStatus, Phase, Route, RouteNode, Side, WarehouseMap,
+};
+pub use request::{Answer, Ask, AskKind, Outcome};
+pub use sensor::{DistanceFrame, LineFrame};
+pub use steering::{Finish, OrderKind, Origin, SteeringOrder, SteeringReport};
+pub use truth::{GoodState, Truth, TruthGood};
+
+/// Index of a servo that has not been heard yet has this position (AX-12 positions are 0..=1023).
+pub const SERVO_UNKNOWN: u16 = 0xFFFF;

@@ -1,0 +1,194 @@
+//! Where the robot is, where it goes and in what world: `nav/status`, `nav/map`, `nav/route`.
+
+use super::link::Mode;
+use crate::schema::payload;
+use crate::tag::{Tag, coded};
+
+coded! {
+    /// A direction in the warehouse, clockwise from the left as in the goods string (M3).
+    pub enum Heading {
+        /// Towards smaller x.
+        Left = 0,
+        /// Towards greater y.
+        Up = 1,
+        /// Towards greater x.
+        Right = 2,
+        /// Towards smaller y.
+        Down = 3,
+    }
+}
+
+coded! {
+    /// The side of a square a product stands at (M3).
+    pub enum Side {
+        /// The edge from (x, y) to (x, y + 1).
+        Left = 0,
+        /// The edge from (x, y + 1) to (x + 1, y + 1).
+        Up = 1,
+        /// The edge from (x + 1, y) to (x + 1, y + 1).
+        Right = 2,
+        /// The edge from (x, y) to (x + 1, y).
+        Down = 3,
+    }
+}
+
+coded! {
+    /// What the navigator is doing.
+    pub enum Phase {
+        /// It has no map yet (L2, L3).
+        WaitingForMap = 0,
+        /// It stands and waits for an order.
+        WaitingForOrder = 1,
+        /// It follows the line between two nodes.
+        Driving = 2,
+        /// It turns at a node.
+        Turning = 3,
+        /// It drives towards the mark of a pick station.
+        Approaching = 4,
+        /// It turns in at a pick station.
+        Positioning = 5,
+        /// It stands at the goods; the operator moves the arm (L10).
+        Picking = 6,
+        /// It backs out of the pick station.
+        Leaving = 7,
+        /// It follows the way out to the place of delivery (L8).
+        Exiting = 8,
+        /// It lets go of the goods.
+        Dropping = 9,
+        /// It comes back into the warehouse.
+        Returning = 10,
+        /// It cannot go on without help.
+        Stuck = 11,
+    }
+}
+
+coded! {
+    /// What the navigator is heading for.
+    pub enum Goal {
+        /// Nothing.
+        None = 0,
+        /// The product of the order.
+        Product = 1,
+        /// The place of delivery.
+        Delivery = 2,
+    }
+}
+
+payload! {
+    /// The navigator's state: what observers want to see and a restarted navigator needs.
+    pub struct NavigatorStatus: 56 bytes {
+        /// Samples of `sensor/line` the navigator has missed.
+        pub frames_lost: u64,
+        /// Samples of `sensor/line` the navigator has read.
+        pub frames: u64,
+        /// The order it is on.
+        pub order_id: u32,
+        /// The steering order it gave last.
+        pub command_id: u32,
+        /// Way driven since the node last passed, in mm.
+        pub travelled_mm: u32,
+        /// The product it is to fetch.
+        pub product: i32,
+        /// Products delivered.
+        pub delivered: u32,
+        /// Node last passed.
+        pub x: i16,
+        /// Node last passed.
+        pub y: i16,
+        /// What it does.
+        pub phase: Tag<Phase>,
+        /// Where it looks.
+        pub heading: Tag<Heading>,
+        /// What it heads for.
+        pub goal: Tag<Goal>,
+        /// The mark it is on.
+        pub mark: u8,
+        /// Command code it wants.
+        pub code: u8,
+        /// Step within the phase.
+        pub step: u8,
+        /// Who may drive.
+        pub mode: Tag<Mode>,
+        /// 1 = a stop is latched.
+        pub stopped: u8,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 8],
+    }
+}
+
+payload! {
+    /// One place where a product is picked.
+    pub struct MapProduct: 8 bytes {
+        /// The product's number.
+        pub id: i32,
+        /// Column of its square, from 0.
+        pub x: u8,
+        /// Row of its square, from 0 at the bottom.
+        pub y: u8,
+        /// The side of the square it stands at.
+        pub side: Tag<Side>,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: u8,
+    }
+}
+
+payload! {
+    /// The warehouse as the external computer describes it (M1-M3).
+    pub struct WarehouseMap: 520 bytes {
+        /// Squares from left to right.
+        pub width: u8,
+        /// Squares from bottom to top.
+        pub height: u8,
+        /// Node of the delivery corner.
+        pub delivery_x: u8,
+        /// Node of the delivery corner.
+        pub delivery_y: u8,
+        /// Side of a square in cm; 0 = not known yet.
+        pub side_length_cm: u16,
+        /// How many of `products` are used.
+        pub product_count: u16,
+        /// The pick stations.
+        #[serde(with = "crate::list")]
+        pub products: [MapProduct; 64],
+    }
+}
+
+impl WarehouseMap {
+    /// The products in use.
+    pub fn products(&self) -> &[MapProduct] {
+        &self.products[..usize::from(self.product_count).min(self.products.len())]
+    }
+}
+
+payload! {
+    /// One node of a route.
+    pub struct RouteNode: 2 bytes {
+        /// Column of the crossing, from 0.
+        pub x: u8,
+        /// Row of the crossing, from 0 at the bottom.
+        pub y: u8,
+    }
+}
+
+payload! {
+    /// The way the navigator has planned, next node first.
+    pub struct Route: 516 bytes {
+        /// How many of `nodes` are used.
+        pub length: u16,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: u16,
+        /// The nodes.
+        #[serde(with = "crate::list")]
+        pub nodes: [RouteNode; 256],
+    }
+}
+
+impl Route {
+    /// The nodes in use.
+    pub fn nodes(&self) -> &[RouteNode] {
+        &self.nodes[..usize::from(self.length).min(self.nodes.len())]
+    }
+}

@@ -1,0 +1,294 @@
+//! The table of topics and requests, and the way to reach a topic's static type by its name.
+//!
+//! Names are relative: on the bus each stands behind `lager/<robot>/`.
+
+use core::fmt;
+
+use crate::payloads::{
+    Answer, Ask, DistanceFrame, Event, Health, Input, LineFrame, NavigatorStatus, Order, Route,
+    SteeringOrder, SteeringReport, Thought, Truth, WarehouseMap,
+};
+use crate::role::Role;
+use crate::schema::{FieldInfo, Payload, Schema};
+
+/// Observers that can be attached to one topic at the same time.
+pub const OBSERVERS: usize = 64;
+
+/// Places on each topic for services that read it without being woken by it: a supervisor that
+/// keeps its last value, a restarted writer that reads it back, the station's display.
+pub const SERVICE_SLOTS: usize = 8;
+
+/// Quality of service of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Qos {
+    /// Samples a subscriber can fall behind before it loses the oldest.
+    pub buffer: usize,
+    /// Samples a late joiner still gets: 0 for a stream, 1 for a state.
+    pub history: usize,
+    /// Writers at the same time.
+    pub publishers: usize,
+    /// Roles that act on the topic and are woken by each sample.
+    pub actors: &'static [Role],
+    /// Whether the writer must call `tick` regularly, so that late joiners get the history.
+    pub republish: bool,
+}
+
+impl Qos {
+    /// Subscriber places: 64 observers, each actor twice (a killed one and its successor), and
+    /// [`SERVICE_SLOTS`].
+    pub const fn max_subscribers(&self) -> usize {
+        OBSERVERS + 2 * self.actors.len() + SERVICE_SLOTS
+    }
+
+    /// Publisher places: each writer twice (a killed one and its successor), and two for keepers
+    /// that hand over a last value.
+    pub const fn max_publishers(&self) -> usize {
+        2 * self.publishers + 2
+    }
+
+    /// Processes that can have the topic open at the same time.
+    pub const fn max_nodes(&self) -> usize {
+        self.max_subscribers() + self.max_publishers() + 16
+    }
+}
+
+/// A topic as a type: `bus.publisher::<SensorLine>()`.
+pub trait Topic: 'static {
+    /// The name behind `lager/<robot>/`.
+    const NAME: &'static str;
+    /// What is published.
+    type Payload: Payload;
+    /// How it is published.
+    const QOS: Qos;
+    /// One line for people.
+    const SUMMARY: &'static str;
+}
+
+/// A request as a type: `bus.client::<BridgeRequest>()`.
+pub trait Request: 'static {
+    /// The name behind `lager/<robot>/`.
+    const NAME: &'static str;
+    /// What is asked.
+    type Request: Payload;
+    /// What is answered.
+    type Reply: Payload;
+    /// The role that answers.
+    const ACTOR: Role;
+    /// One line for people.
+    const SUMMARY: &'static str;
+}
+
+/// One line of [`TOPICS`].
+#[derive(Clone, Copy, Debug)]
+pub struct TopicEntry {
+    /// The name behind `lager/<robot>/`.
+    pub name: &'static str,
+    /// The payload's name across processes and languages.
+    pub type_name: &'static str,
+    /// Hash of the payload's layout.
+    pub hash: u64,
+    /// Bytes of one payload.
+    pub size: usize,
+    /// The payload's fields.
+    pub fields: &'static [FieldInfo],
+    /// How it is published.
+    pub qos: Qos,
+    /// One line for people.
+    pub summary: &'static str,
+}
+
+/// Work to be done with a topic's static type; see [`visit`].
+pub trait TopicVisitor {
+    /// What the work yields.
+    type Output;
+
+    /// Does it for `T`.
+    fn visit<T: Topic>(self) -> Self::Output;
+}
+
+/// A name that is in no table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownTopic(pub String);
+
+impl fmt::Display for UnknownTopic {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "there is no topic `{}`; the topics are", self.0)?;
+        for entry in TOPICS {
+            write!(formatter, " {}", entry.name)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for UnknownTopic {}
+
+macro_rules! topics {
+    ($(
+        $topic:ident = $name:literal, $payload:ty, $summary:literal,
+        { $($qos:tt)* };
+    )*) => {
+        $(
+            #[doc = concat!("`", $name, "`: ", $summary)]
+            #[derive(Clone, Copy, Debug)]
+            pub struct $topic;
+
+            impl Topic for $topic {
+                const NAME: &'static str = $name;
+                type Payload = $payload;
+                const QOS: Qos = Qos { $($qos)* };
+                const SUMMARY: &'static str = $summary;
+            }
+        )*
+
+        /// Every topic, in the order of the data's way.
+        pub const TOPICS: &[TopicEntry] = &[
+            $( TopicEntry {
+                name: $name,
+                type_name: <$payload as Schema>::TYPE_NAME,
+                hash: <$payload as Schema>::HASH,
+                size: size_of::<$payload>(),
+                fields: <$payload as Schema>::FIELDS,
+                qos: <$topic as Topic>::QOS,
+                summary: $summary,
+            }, )*
+        ];
+
+        /// Runs `visitor` with the type of the topic called `name`.
+        ///
+        /// # Errors
+        /// No topic has that name.
+        pub fn visit<V: TopicVisitor>(name: &str, visitor: V) -> Result<V::Output, UnknownTopic> {
+            match name {
+                $( $name => Ok(visitor.visit::<$topic>()), )*
+                _ => Err(UnknownTopic(name.to_owned())),
+            }
+        }
+    };
+}
+
+topics! {
+    SensorLine = "sensor/line", LineFrame,
+    "The line under the robot, as the sensor board classifies it.",
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+
+    SensorDistance = "sensor/distance", DistanceFrame,
+    "The distance to what is in front of the robot.",
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+
+    SteeringCommand = "steering/command", SteeringOrder,
+    "Orders to the arbiter in the bridge.",
+    { buffer: 16, history: 0, publishers: 8, actors: &[Role::Bridge], republish: false };
+
+    SteeringState = "steering/state", SteeringReport,
+    "What the steering board does, with the arm's servos.",
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+
+    LinkHealth = "link/health", Health,
+    "Both serial links and who may steer.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[Role::Logic], republish: true };
+
+    NavStatus = "nav/status", NavigatorStatus,
+    "Where the robot is and what it is doing.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+
+    NavMap = "nav/map", WarehouseMap,
+    "The warehouse and where its products stand.",
+    { buffer: 1, history: 1, publishers: 4, actors: &[Role::Logic], republish: true };
+
+    NavRoute = "nav/route", Route,
+    "The nodes the robot means to pass.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+
+    MissionOrder = "mission/order", Order,
+    "Products to fetch.",
+    { buffer: 16, history: 0, publishers: 4, actors: &[Role::Logic], republish: false };
+
+    MissionEvent = "mission/event", Event,
+    "What happened on a mission.",
+    { buffer: 64, history: 0, publishers: 1, actors: &[], republish: false };
+
+    OperatorInput = "operator/input", Input,
+    "Buttons and acknowledgements of a person.",
+    { buffer: 16, history: 0, publishers: 8, actors: &[Role::Logic, Role::Bridge], republish: false };
+
+    LogThought = "log/thought", Thought,
+    "What the services say in words.",
+    { buffer: 64, history: 0, publishers: 8, actors: &[], republish: false };
+
+    TruthPose = "truth/pose", Truth,
+    "The simulated world as it really is.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+}
+
+/// `bridge/request`: changes of the mode and of settings, answered by the bridge.
+#[derive(Clone, Copy, Debug)]
+pub struct BridgeRequest;
+
+impl Request for BridgeRequest {
+    const NAME: &'static str = "bridge/request";
+    type Request = Ask;
+    type Reply = Answer;
+    const ACTOR: Role = Role::Bridge;
+    const SUMMARY: &'static str = "Changes of the mode and of settings.";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct TypeName;
+
+    impl TopicVisitor for TypeName {
+        type Output = &'static str;
+
+        fn visit<T: Topic>(self) -> &'static str {
+            T::Payload::TYPE_NAME
+        }
+    }
+
+    #[test]
+    fn every_topic_of_the_table_is_found_by_its_name() {
+        for entry in TOPICS {
+            assert_eq!(visit(entry.name, TypeName), Ok(entry.type_name));
+        }
+    }
+
+    #[test]
+    fn a_wrong_name_is_refused_with_the_right_ones() {
+        let error = visit("sensor/lime", TypeName).unwrap_err().to_string();
+        assert!(error.contains("`sensor/lime`") && error.contains("sensor/line"));
+    }
+
+    #[test]
+    fn names_types_and_hashes_are_each_used_once() {
+        for (index, entry) in TOPICS.iter().enumerate() {
+            for other in &TOPICS[..index] {
+                assert_ne!(entry.name, other.name);
+                assert_ne!(entry.type_name, other.type_name);
+                assert_ne!(entry.hash, other.hash);
+            }
+        }
+    }
+
+    #[test]
+    fn a_state_is_kept_for_late_joiners_and_a_stream_is_not() {
+        for entry in TOPICS {
+            assert_eq!(entry.qos.republish, entry.qos.history == 1, "{}", entry.name);
+            assert!(entry.qos.history <= entry.qos.buffer, "{}", entry.name);
+            if entry.qos.republish {
+                assert_eq!(entry.qos.buffer, 1, "{}", entry.name);
+            }
+        }
+    }
+
+    #[test]
+    fn observers_and_actors_have_places_beside_each_other() {
+        for entry in TOPICS {
+            let qos = entry.qos;
+            assert!(qos.max_subscribers() >= OBSERVERS + 2 * qos.actors.len());
+            assert!(qos.max_publishers() > qos.publishers);
+            assert!(qos.max_nodes() >= qos.max_subscribers() + qos.max_publishers());
+            assert!(qos.actors.iter().all(|actor| !actor.is_observer()));
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! The UART packets between the boards and the Pi.

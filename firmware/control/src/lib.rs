@@ -1,0 +1,1 @@
+//! Every decision the two boards take, on integers, behind a board trait.

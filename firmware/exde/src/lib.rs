@@ -1,0 +1,1 @@
+//! ExDe, the synchronous one-way bit bus between the boards.

@@ -1,0 +1,1 @@
+//! What the boards are wired to: warehouse, tape, sensors, motors, servos.

@@ -1,0 +1,223 @@
+//! The command line: every subcommand, flag and example. No behaviour lives here.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::config::Body;
+
+/// The software of a small warehouse robot around a zero-copy shared-memory bus.
+#[derive(Debug, Parser)]
+#[command(
+    name = "lager",
+    version,
+    after_help = "Examples:
+  lager up                                     the simulated robot and all its services
+  lager up --headless --mission 1 --exit-when-done --json
+  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1
+  lager simulate --seeds 1..20 --warehouse large --mission 1,2
+  lager topic hz sensor/line
+  lager drive follow-forward
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 the mission was not delivered,
+4 a robot of this name is already up."
+)]
+pub struct Cli {
+    /// What every subcommand takes.
+    #[command(flatten)]
+    pub global: GlobalArgs,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Flags of every subcommand.
+#[derive(Debug, Args)]
+pub struct GlobalArgs {
+    /// Configuration file [default: ./lager.toml if there is one]
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The robot's name [default: r1]
+    #[arg(long, global = true, value_name = "ROBOT")]
+    pub name: Option<String>,
+    /// Prefix of the bus's shared-memory files, to keep a bus apart
+    #[arg(long, global = true, value_name = "PREFIX")]
+    pub bus_prefix: Option<String>,
+    /// Folder of the bus's bookkeeping files, to keep a bus apart
+    #[arg(long, global = true, value_name = "FOLDER")]
+    pub bus_root: Option<PathBuf>,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run everything on this machine: the robot's body and all services, until Ctrl-C
+    Up(UpArgs),
+    /// Run the whole robot in one process in virtual time: deterministic, no bus
+    Simulate(SimulateArgs),
+    /// Look at any topic of the bus
+    Topic(TopicArgs),
+    /// Steer by hand in manual mode, renewed until it is done or Ctrl-C
+    #[command(
+        after_help = "COMMAND is a name (stop, forward, follow-forward, backward, follow-backward, left, right, left-45, right-45) or a code 1..9 as 8 binary digits, decimal or 0x-hex."
+    )]
+    Drive {
+        /// Name or code of the command
+        command: String,
+        /// Let go after this many seconds instead of at Ctrl-C
+        #[arg(long, value_name = "SECONDS")]
+        seconds: Option<f64>,
+    },
+    /// Move the arm one step
+    #[command(
+        after_help = "COMMAND is a name (clockwise, counter-clockwise, in, out, up, down, left, right, squeeze, release) or a code 0xF1..0xFA as 8 binary digits, decimal or 0x-hex."
+    )]
+    Arm {
+        /// Name or code of the command
+        command: String,
+    },
+    /// Stop the robot, in any mode; it stays stopped until `lager resume`
+    Stop,
+    /// Release a latched stop
+    Resume,
+    /// Choose who steers
+    Mode {
+        /// The mode
+        mode: ModeName,
+    },
+    /// Order a product to be fetched and delivered
+    Fetch {
+        /// The product's number
+        product: i32,
+    },
+    /// Tell the robot that the product has been picked up
+    Picked,
+    /// Find out what is wrong with this machine and how to mend it
+    Doctor {
+        /// Remove what dead processes left on the bus
+        #[arg(long)]
+        fix: bool,
+    },
+    /// Print the configuration in force, with every key
+    Config,
+    /// The service that owns the serial ports and decides who steers
+    Bridge(ServiceArgs),
+    /// The service that navigates
+    Logic(ServiceArgs),
+    /// The simulated robot behind two pseudo terminals
+    Simulator(ServiceArgs),
+}
+
+/// `lager mode`.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum ModeName {
+    /// The operator steers
+    Manual,
+    /// Logic steers
+    Autonomous,
+}
+
+/// `lager up`.
+#[derive(Debug, Default, Args)]
+pub struct UpArgs {
+    /// What to drive [default: sim]
+    #[arg(long)]
+    pub body: Option<Body>,
+    /// Serial port of the sensor board (implies --body serial)
+    #[arg(long, value_name = "PORT")]
+    pub sensor: Option<PathBuf>,
+    /// Serial port of the steering board (implies --body serial)
+    #[arg(long, value_name = "PORT")]
+    pub steering: Option<PathBuf>,
+    /// Built-in warehouse or warehouse file [default: small]
+    #[arg(long, value_name = "FILE")]
+    pub warehouse: Option<String>,
+    /// Seed of the simulated robot's noise [default: 1]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Run the clock of a simulated robot this many times as fast [default: 1]
+    #[arg(long, value_name = "X")]
+    pub speed: Option<f64>,
+    /// Do without a person: a script orders, picks and signals
+    #[arg(long)]
+    pub headless: bool,
+    /// The products to fetch, in this order [default: the first of the warehouse]
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    pub mission: Vec<i32>,
+    /// End when the mission is delivered (0) or has failed (3)
+    #[arg(long)]
+    pub exit_when_done: bool,
+    /// Print one line of JSON at the end; progress goes to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `lager simulate`.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// Seeds to run, one run each: `7` or `1..20` (both ends run)
+    #[arg(long, value_name = "A..B", default_value = "1")]
+    pub seeds: String,
+    /// Built-in warehouse or warehouse file; may be given several times
+    #[arg(long, value_name = "FILE")]
+    pub warehouse: Vec<String>,
+    /// The products to fetch, in this order [default: the first of the warehouse]
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    pub mission: Vec<i32>,
+    /// Give up after this much virtual time
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600)]
+    pub limit: u64,
+    /// One line of JSON a run
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `lager topic`.
+#[derive(Debug, Args)]
+pub struct TopicArgs {
+    /// What to show
+    #[command(subcommand)]
+    pub command: TopicCommand,
+    /// Print JSON, one value a line
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// The topic tools.
+#[derive(Debug, Subcommand)]
+pub enum TopicCommand {
+    /// Every topic on the bus, of every robot
+    List,
+    /// One topic: what it carries, its limits, who writes and reads it
+    Info {
+        /// The topic's name, such as sensor/line
+        topic: String,
+    },
+    /// Print each sample with its stamp
+    Echo {
+        /// The topic's name, such as sensor/line
+        topic: String,
+        /// End after this many samples
+        #[arg(long, value_name = "N")]
+        count: Option<u64>,
+    },
+    /// Measure rate, age and loss, once a second
+    Hz {
+        /// The topic's name, such as sensor/line
+        topic: String,
+        /// End after this many seconds
+        #[arg(long, value_name = "N")]
+        count: Option<u64>,
+    },
+}
+
+/// What a service is told beyond the configuration.
+#[derive(Debug, Args)]
+pub struct ServiceArgs {
+    /// Take up the state that the supervisor kept of the process before this one
+    #[arg(long)]
+    pub resume: bool,
+    /// End when this process, the supervisor, ends
+    #[arg(long, value_name = "PID")]
+    pub parent: Option<u32>,
+}

@@ -1,0 +1,207 @@
+//! The configuration: one TOML file, every key with a default, command-line flags on top.
+//!
+//! It is apart from the command line because the services read it too: the supervisor writes the
+//! effective configuration beside its lock and every child process starts from that one file, so
+//! a flag reaches all of them or none. An unknown key is an error, never ignored.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use lager_plant::Warehouse;
+use lager_ports::{BusConfig, RobotName};
+use serde::{Deserialize, Serialize};
+
+/// Everything a process of the robot needs to know at start.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// The robot's name: the middle part of every topic's name.
+    pub name: String,
+    /// How many times as fast as real time the robot's clock runs; only a simulated body may
+    /// differ from 1.
+    pub speed: f64,
+    /// What the services drive.
+    pub body: Body,
+    /// A built-in warehouse (`small`, `curved`, `large`) or the path of a warehouse file.
+    pub warehouse: String,
+    /// Where the bus lives.
+    pub bus: BusSection,
+    /// The two serial ports.
+    pub serial: SerialSection,
+    /// What logic knows of the robot's measures.
+    pub logic: LogicSection,
+    /// The simulated robot.
+    pub simulator: SimulatorSection,
+}
+
+/// What stands at the other end of the two UARTs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Body {
+    /// The simulated robot of this program.
+    Sim,
+    /// The real boards, at the ports of `[serial]`.
+    Serial,
+}
+
+/// `[bus]`: empty on a robot; tests give every bus its own prefix and root.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BusSection {
+    /// Prefix of the shared-memory files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prefix: Option<String>,
+    /// Folder of the bus's bookkeeping files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub root: Option<PathBuf>,
+}
+
+/// `[serial]`: the cables to the boards.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SerialSection {
+    /// Port of the sensor board. Given the wrong way round the robot works all the same: the
+    /// boards tell who they are.
+    pub sensor: PathBuf,
+    /// Port of the steering board.
+    pub steering: PathBuf,
+    /// Baud rate of both: 500000, or 9600 for boards built with the original's UBRR 103.
+    pub baud: u32,
+}
+
+/// `[logic]`: the measures dead reckoning needs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogicSection {
+    /// Speed in mm/s when both motors run at the standard duty of 100.
+    pub cruise_mm_per_s: f32,
+    /// How far the line sensors are ahead of the wheels' axle, in mm.
+    pub sensor_ahead_mm: f32,
+}
+
+/// `[simulator]`: the simulated robot.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SimulatorSection {
+    /// Seed of all noise: the same seed is the same robot.
+    pub seed: u64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            name: "r1".into(),
+            speed: 1.0,
+            body: Body::Sim,
+            warehouse: "small".into(),
+            bus: BusSection::default(),
+            serial: SerialSection::default(),
+            logic: LogicSection::default(),
+            simulator: SimulatorSection::default(),
+        }
+    }
+}
+
+impl Default for SerialSection {
+    fn default() -> Self {
+        Self {
+            sensor: "/dev/lager-sensor".into(),
+            steering: "/dev/lager-steering".into(),
+            baud: 500_000,
+        }
+    }
+}
+
+impl Default for LogicSection {
+    fn default() -> Self {
+        let config = lager_logic::LogicConfig::default();
+        Self {
+            cruise_mm_per_s: config.cruise_mm_per_s,
+            sensor_ahead_mm: config.sensor_ahead_mm,
+        }
+    }
+}
+
+impl Default for SimulatorSection {
+    fn default() -> Self {
+        Self { seed: 1 }
+    }
+}
+
+impl Config {
+    /// Reads `path`, or `lager.toml` in the current folder where there is one, or the defaults.
+    pub fn load(path: Option<&Path>) -> Result<Self> {
+        let path = match path {
+            Some(path) => path,
+            None if Path::new("lager.toml").is_file() => Path::new("lager.toml"),
+            None => return Ok(Self::default()),
+        };
+        let text = fs::read_to_string(path)
+            .with_context(|| format!("cannot read the configuration {}", path.display()))?;
+        toml::from_str(&text).with_context(|| {
+            format!(
+                "the configuration {} is not valid; `lager config` prints one with every key",
+                path.display()
+            )
+        })
+    }
+
+    /// Refuses values no process could work with, each with a sentence.
+    pub fn validate(&self) -> Result<()> {
+        self.name.parse::<RobotName>()?;
+        if !(0.01..=100.0).contains(&self.speed) {
+            bail!("speed is {}; it must be from 0.01 to 100", self.speed);
+        }
+        if self.body == Body::Serial && self.speed != 1.0 {
+            bail!(
+                "speed {} needs a simulated body; real boards run at 1",
+                self.speed
+            );
+        }
+        Ok(())
+    }
+
+    /// The bus this configuration names.
+    pub fn bus(&self) -> Result<BusConfig> {
+        Ok(BusConfig {
+            robot: self.name.parse()?,
+            speed: self.speed,
+            prefix: self.bus.prefix.clone(),
+            root: self.bus.root.clone(),
+        })
+    }
+
+    /// The warehouse, built in or from its file, checked.
+    pub fn warehouse(&self) -> Result<Warehouse> {
+        warehouse(&self.warehouse)
+    }
+
+    /// What the navigator is told.
+    pub fn navigator(&self) -> lager_logic::LogicConfig {
+        lager_logic::LogicConfig {
+            cruise_mm_per_s: self.logic.cruise_mm_per_s,
+            sensor_ahead_mm: self.logic.sensor_ahead_mm,
+            ..lager_logic::LogicConfig::default()
+        }
+    }
+}
+
+/// A warehouse by the name of a built-in one or by its file.
+pub fn warehouse(name: &str) -> Result<Warehouse> {
+    if let Some(warehouse) = Warehouse::builtin(name) {
+        return Ok(warehouse);
+    }
+    let text = fs::read_to_string(name).with_context(|| {
+        format!(
+            "there is no warehouse `{name}`: the built-in ones are {}, anything else is read as a file",
+            Warehouse::BUILTIN.join(", ")
+        )
+    })?;
+    let warehouse: Warehouse = toml::from_str(&text)
+        .with_context(|| format!("the warehouse file {name} is not valid"))?;
+    warehouse
+        .validate()
+        .with_context(|| format!("the warehouse file {name} cannot be built"))?;
+    Ok(warehouse)
+}

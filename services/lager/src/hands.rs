@@ -1,0 +1,110 @@
+//! The operator's hands on the bus: everything a person, or the script, can do to the robot.
+//!
+//! One set of ports for `up` and for the one-shot commands, so that both act the same way. It
+//! decides nothing.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use lager_ports::{Bus, Client, Publisher};
+use lager_topics::{
+    Answer, Ask, BridgeRequest, Input, MissionOrder, NavMap, OperatorInput, Order,
+    SteeringCommand, SteeringOrder, WarehouseMap,
+};
+
+use crate::operator::Act;
+
+/// How long the bridge may take to answer, in real time.
+const ANSWER: Duration = Duration::from_millis(500);
+
+/// Publishers and the client of one operator.
+pub struct Hands {
+    bus: Bus,
+    map: Publisher<NavMap>,
+    order: Publisher<MissionOrder>,
+    press: Publisher<OperatorInput>,
+    steer: Publisher<SteeringCommand>,
+    ask: Client<BridgeRequest>,
+}
+
+impl Hands {
+    /// Opens every port an operator writes to.
+    pub fn new(bus: &Bus) -> Result<Self> {
+        Ok(Self {
+            bus: bus.clone(),
+            map: bus.publisher()?,
+            order: bus.publisher()?,
+            press: bus.publisher()?,
+            steer: bus.publisher()?,
+            ask: bus.client()?,
+        })
+    }
+
+    /// An id that no order of this or an earlier process has had for the last hour: the
+    /// milliseconds of the machine's clock.
+    pub fn fresh_id(&self) -> u32 {
+        let milliseconds = self.bus.clock().monotonic_ns() / 1_000_000;
+        u32::try_from(milliseconds & u64::from(u32::MAX)).unwrap_or(1)
+    }
+
+    /// Tells the robot its warehouse; late joiners get it too.
+    pub fn publish_map(&mut self, map: &WarehouseMap) -> Result<()> {
+        let now = self.now();
+        self.map.send(now, *map)?;
+        Ok(())
+    }
+
+    /// Lets late joiners have the map.
+    pub fn tick(&mut self) -> Result<()> {
+        self.map.tick()?;
+        Ok(())
+    }
+
+    /// Does one thing of the script. A bridge that does not answer is no error: the script asks
+    /// again.
+    pub fn carry_out(&mut self, act: Act) -> Result<()> {
+        match act {
+            Act::Ask(ask) => {
+                if let Err(silence) = self.ask.call(ask, Duration::from_millis(50)) {
+                    tracing::debug!(%silence, "the bridge does not answer yet");
+                }
+            }
+            Act::Order(order) => self.fetch(order)?,
+            Act::Steer(order) => self.steer(order)?,
+            Act::Press(input) => self.press(input)?,
+        }
+        Ok(())
+    }
+
+    /// Asks the bridge and waits for its answer.
+    pub fn ask(&mut self, ask: Ask) -> Result<Answer> {
+        self.ask
+            .call(ask, ANSWER)
+            .context("the bridge does not answer; is the robot up? (`lager up`)")
+    }
+
+    /// Orders a product.
+    pub fn fetch(&mut self, order: Order) -> Result<()> {
+        let now = self.now();
+        self.order.send(now, order)?;
+        Ok(())
+    }
+
+    /// Gives or renews a steering order.
+    pub fn steer(&mut self, order: SteeringOrder) -> Result<()> {
+        let now = self.now();
+        self.steer.send(now, order)?;
+        Ok(())
+    }
+
+    /// Presses a button.
+    pub fn press(&mut self, input: Input) -> Result<()> {
+        let now = self.now();
+        self.press.send(now, input)?;
+        Ok(())
+    }
+
+    fn now(&self) -> u64 {
+        self.bus.clock().monotonic_ns()
+    }
+}

@@ -1,0 +1,36 @@
+//! A warehouse as the bus carries it.
+//!
+//! The plant knows no topics and logic knows no plant; this is the one place where a warehouse
+//! file becomes the map that the operator's side sends the robot.
+
+use lager_plant::Warehouse;
+use lager_topics::{MapProduct, Side, WarehouseMap};
+
+/// The map of `warehouse`, which has been validated.
+pub fn bus_map(warehouse: &Warehouse) -> WarehouseMap {
+    let mut map = WarehouseMap {
+        width: warehouse.size[0],
+        height: warehouse.size[1],
+        delivery_x: warehouse.delivery[0],
+        delivery_y: warehouse.delivery[1],
+        side_length_cm: warehouse.side_length_cm,
+        ..WarehouseMap::default()
+    };
+    for (slot, product) in map.products.iter_mut().zip(&warehouse.product) {
+        *slot = MapProduct {
+            id: product.id,
+            x: product.square[0],
+            y: product.square[1],
+            side: match product.side {
+                lager_plant::Side::Left => Side::Left,
+                lager_plant::Side::Up => Side::Up,
+                lager_plant::Side::Right => Side::Right,
+                lager_plant::Side::Down => Side::Down,
+            }
+            .into(),
+            ..MapProduct::default()
+        };
+        map.product_count += 1;
+    }
+    map
+}

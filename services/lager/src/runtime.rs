@@ -1,0 +1,133 @@
+//! Where a running robot keeps its few files: the lock of its `up`, the effective configuration
+//! and the links to the simulated ports.
+//!
+//! The folder is the user's own, one for each bus and robot. The lock is an flock, so that a
+//! killed supervisor leaves nothing to clean up.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{Read, Seek, Write};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use rustix::fs::{FlockOperation, flock};
+
+use crate::config::Config;
+
+/// The folder of one robot on one bus.
+#[derive(Clone, Debug)]
+pub struct RuntimeFolder(PathBuf);
+
+impl RuntimeFolder {
+    /// Makes the folder, readable by this user alone.
+    ///
+    /// It is below `$XDG_RUNTIME_DIR`, or below `/tmp/lager-<uid>` where that is not set.
+    pub fn create(config: &Config) -> Result<Self> {
+        let uid = rustix::process::getuid().as_raw();
+        let base = match std::env::var_os("XDG_RUNTIME_DIR") {
+            Some(folder) if Path::new(&folder).is_dir() => PathBuf::from(folder).join("lager"),
+            _ => PathBuf::from(format!("/tmp/lager-{uid}")),
+        };
+        let folder = base
+            .join(config.bus.prefix.as_deref().unwrap_or("bus"))
+            .join(&config.name);
+        fs::DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(&folder)
+            .with_context(|| format!("cannot make the runtime folder {}", folder.display()))?;
+        if fs::metadata(&base)?.uid() != uid {
+            bail!(
+                "{} belongs to another user; remove it or set XDG_RUNTIME_DIR",
+                base.display()
+            );
+        }
+        Ok(Self(folder))
+    }
+
+    /// Where the simulated port of the sensor board is linked.
+    pub fn sensor_port(&self) -> PathBuf {
+        self.0.join("sensor.tty")
+    }
+
+    /// Where the simulated port of the steering board is linked.
+    pub fn steering_port(&self) -> PathBuf {
+        self.0.join("steering.tty")
+    }
+
+    /// Writes the effective configuration for the children and returns its path.
+    pub fn write_config(&self, config: &Config) -> Result<PathBuf> {
+        let path = self.0.join("lager.toml");
+        fs::write(&path, toml::to_string(config)?)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+
+    /// Takes the robot's name for this process until the guard is dropped.
+    pub fn lock(&self, name: &str) -> Result<NameLock> {
+        let path = self.0.join("up.lock");
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .with_context(|| format!("cannot open {}", path.display()))?;
+        if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+            let mut owner = String::new();
+            file.read_to_string(&mut owner)?;
+            return Err(NameTaken {
+                name: name.to_owned(),
+                pid: owner.trim().to_owned(),
+            }
+            .into());
+        }
+        file.set_len(0)?;
+        file.rewind()?;
+        write!(file, "{}", std::process::id())?;
+        Ok(NameLock {
+            _file: file,
+            folder: self.clone(),
+        })
+    }
+}
+
+/// Held by the one supervisor of a robot.
+#[derive(Debug)]
+pub struct NameLock {
+    _file: File,
+    folder: RuntimeFolder,
+}
+
+impl Drop for NameLock {
+    /// Leaves no file behind after a clean stop.
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.folder.0);
+        // The two folders above stay while another robot or bus lives in them.
+        if let Some(bus) = self.folder.0.parent() {
+            let _ = fs::remove_dir(bus);
+            if let Some(base) = bus.parent() {
+                let _ = fs::remove_dir(base);
+            }
+        }
+    }
+}
+
+/// A second `up` of the same name.
+#[derive(Debug)]
+pub struct NameTaken {
+    name: String,
+    pid: String,
+}
+
+impl std::fmt::Display for NameTaken {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "a robot named `{}` is already up (process {}); give this one another name with --name, or stop that one with Ctrl-C",
+            self.name, self.pid
+        )
+    }
+}
+
+impl std::error::Error for NameTaken {}

@@ -1,0 +1,262 @@
+//! The one-shot commands: `drive`, `arm`, `stop`, `resume`, `mode`, `fetch`, `picked`.
+//!
+//! Each opens the bus as an operator, does one thing through the same [`Hands`] as `up`, waits
+//! until the robot shows the effect, and says what came of it.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, anyhow, bail};
+use lager_ports::{Bus, Shutdown, Subscriber};
+use lager_topics::{
+    Answer, Ask, AskKind, Finish, Health, Input, InputKind, LinkHealth, Mode, NavStatus, Order,
+    OrderKind, Origin, Outcome, Role, SteeringOrder, SteeringState,
+};
+use lager_wire::{Command, OperatorCommand, WheelCommand, parse_code};
+
+use crate::config::Config;
+use crate::hands::Hands;
+
+/// How often an order is renewed, in robot time; its lease is 120 ms.
+const RENEW: Duration = Duration::from_millis(40);
+/// How long the robot may take to show an effect, in real time.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// An operator at work on a robot that is up.
+pub struct Operator {
+    bus: Bus,
+    hands: Hands,
+    health: Subscriber<LinkHealth>,
+}
+
+impl Operator {
+    /// Opens the bus and waits for the bridge.
+    ///
+    /// # Errors
+    /// When no bridge of this robot answers.
+    pub fn new(config: &Config) -> Result<Self> {
+        let bus = Bus::open(&config.bus()?, Role::Operator)?;
+        let operator = Self {
+            hands: Hands::new(&bus)?,
+            health: bus.subscriber()?,
+            bus,
+        };
+        Ok(operator)
+    }
+
+    /// `lager drive`: gives the order and renews it until it is done, `seconds` have passed or
+    /// Ctrl-C; then the robot stands, because nobody renews it any more.
+    pub fn drive(
+        &mut self,
+        command: &str,
+        seconds: Option<f64>,
+        shutdown: &Shutdown,
+    ) -> Result<String> {
+        let command = parse(command)?;
+        if command == OperatorCommand::Stop {
+            return self.stop();
+        }
+        if matches!(command, OperatorCommand::Arm(_)) {
+            bail!("`{}` moves the arm; use `lager arm`", command.name());
+        }
+        let health = self.health()?;
+        if health.mode.get() != Some(Mode::Manual) {
+            bail!("the robot is autonomous; `lager mode manual` lets you drive");
+        }
+        self.carry_out(command.firmware(), seconds, shutdown)
+    }
+
+    /// `lager arm`: one step of the arm.
+    pub fn arm(&mut self, command: &str, shutdown: &Shutdown) -> Result<String> {
+        let command = parse(command)?;
+        let OperatorCommand::Arm(_) = command else {
+            bail!("`{}` drives the wheels; use `lager drive`", command.name());
+        };
+        self.carry_out(command.firmware(), None, shutdown)
+    }
+
+    /// `lager stop`: latched by the bridge before this returns.
+    pub fn stop(&mut self) -> Result<String> {
+        let order = SteeringOrder {
+            id: self.hands.fresh_id(),
+            origin: Origin::Operator.into(),
+            kind: OrderKind::Stop.into(),
+            code: Command::Wheel(WheelCommand::Standby).code(),
+            arm_granted: 0,
+        };
+        let give_up = Instant::now() + PATIENCE;
+        loop {
+            self.hands.steer(order)?;
+            std::thread::sleep(Duration::from_millis(10));
+            if self
+                .health
+                .latest()?
+                .is_some_and(|health| health.stopped != 0)
+            {
+                return Ok("stopped; `lager resume` lets it go on".into());
+            }
+            if Instant::now() >= give_up {
+                bail!("no bridge confirms the stop; is the robot up? (`lager up`)");
+            }
+        }
+    }
+
+    /// `lager resume`.
+    pub fn resume(&mut self) -> Result<String> {
+        self.ask(Ask {
+            kind: AskKind::Resume.into(),
+            ..Ask::default()
+        })?;
+        Ok("the stop is released".into())
+    }
+
+    /// `lager mode`.
+    pub fn mode(&mut self, mode: Mode) -> Result<String> {
+        self.ask(Ask {
+            kind: AskKind::SetMode.into(),
+            mode: mode.into(),
+            ..Ask::default()
+        })?;
+        Ok(match mode {
+            Mode::Manual => "the operator steers".into(),
+            Mode::Autonomous => "logic steers".into(),
+        })
+    }
+
+    /// `lager fetch`: ordered until logic shows that it took the order.
+    pub fn fetch(&mut self, product: i32) -> Result<String> {
+        let mut status = self.bus.subscriber::<NavStatus>()?;
+        let order = Order {
+            id: self.hands.fresh_id(),
+            product,
+        };
+        let give_up = Instant::now() + PATIENCE;
+        loop {
+            self.hands.fetch(order)?;
+            std::thread::sleep(Duration::from_millis(50));
+            if status
+                .latest()?
+                .is_some_and(|status| status.order_id == order.id)
+            {
+                return Ok(format!("logic fetches product {product}"));
+            }
+            if Instant::now() >= give_up {
+                bail!(
+                    "logic does not take the order: it is not up, busy with another one, or knows no product {product}; `lager topic echo log/thought` shows its reasons"
+                );
+            }
+        }
+    }
+
+    /// `lager picked`.
+    pub fn picked(&mut self) -> Result<String> {
+        self.hands.press(Input {
+            kind: InputKind::PickupDone.into(),
+            ..Input::default()
+        })?;
+        Ok("told the robot that the product has been picked up".into())
+    }
+
+    fn ask(&mut self, ask: Ask) -> Result<Answer> {
+        let answer = self.hands.ask(ask)?;
+        match answer.outcome.get() {
+            Some(Outcome::Done) => Ok(answer),
+            Some(Outcome::NoBoard) => Err(anyhow!(
+                "the board that would have to do it is not connected; `lager topic echo link/health` shows the links"
+            )),
+            _ => Err(anyhow!("the bridge refuses it")),
+        }
+    }
+
+    fn health(&mut self) -> Result<Health> {
+        let give_up = Instant::now() + PATIENCE;
+        loop {
+            if let Some(health) = self.health.latest()? {
+                return Ok(*health);
+            }
+            if Instant::now() >= give_up {
+                bail!(
+                    "no bridge of the robot `{}` is on the bus; is it up? (`lager up`)",
+                    self.bus.robot()
+                );
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Gives an order and renews it until it has finished or its time is over.
+    fn carry_out(
+        &mut self,
+        command: Command,
+        seconds: Option<f64>,
+        shutdown: &Shutdown,
+    ) -> Result<String> {
+        let health = self.health()?;
+        if health.stopped != 0 {
+            bail!("the robot is stopped; `lager resume` releases the stop");
+        }
+        let refused_before = health.orders_refused;
+        let mut state = self.bus.subscriber::<SteeringState>()?;
+        let order = SteeringOrder {
+            id: self.hands.fresh_id(),
+            origin: Origin::Operator.into(),
+            kind: OrderKind::Drive.into(),
+            code: command.code(),
+            arm_granted: 0,
+        };
+        let clock = self.bus.clock().clone();
+        let end = match seconds {
+            Some(seconds) => Some(clock.now() + Duration::try_from_secs_f64(seconds)?),
+            None => None,
+        };
+        let mut accepted = false;
+        let give_up = Instant::now() + PATIENCE;
+        while !shutdown.is_requested() && end.is_none_or(|end| clock.now() < end) {
+            self.hands.steer(order)?;
+            std::thread::sleep(clock.real(RENEW));
+            if let Some(report) = state.latest()? {
+                let own = |origin: Option<Origin>, id| {
+                    origin == Some(Origin::Operator) && id == order.id
+                };
+                accepted |= own(report.current_origin.get(), report.current_id);
+                if own(report.finished_origin.get(), report.finished_id) {
+                    return match report.finish.get() {
+                        Some(Finish::Done) => Ok(format!("{command} is done")),
+                        Some(Finish::Aborted) => Err(anyhow!("{command} was cut short")),
+                        _ => Err(anyhow!(
+                            "the steering board refuses {command}: the arm moves only while the robot stands"
+                        )),
+                    };
+                }
+            }
+            let health = self.health.latest()?.map(|health| *health);
+            if let Some(health) = health {
+                if health.stopped != 0 {
+                    bail!("the robot has been stopped");
+                }
+                if !accepted && health.orders_refused > refused_before {
+                    bail!(
+                        "the bridge refuses {command} now: somebody else steers, or the mode does not allow it"
+                    );
+                }
+            }
+            if !accepted && Instant::now() >= give_up {
+                bail!("the robot does not carry out {command}; `lager doctor` looks for the cause");
+            }
+        }
+        Ok(format!("let go of {command}"))
+    }
+}
+
+/// A command by its name or in one of the three forms of its code.
+fn parse(text: &str) -> Result<OperatorCommand> {
+    if let Some(command) = OperatorCommand::all().find(|command| command.name() == text) {
+        return Ok(command);
+    }
+    let code = parse_code(text).with_context(|| {
+        let names: Vec<_> = OperatorCommand::all().map(OperatorCommand::name).collect();
+        format!("`{text}` is no command; the names are {}", names.join(", "))
+    })?;
+    OperatorCommand::from_code(code).with_context(|| {
+        format!("no command has the code 0x{code:02X}; wheels are 0x01..0x09, the arm 0xF1..0xFA")
+    })
+}

@@ -1,0 +1,194 @@
+//! The supervisor of the service processes: starts them, restarts them with back-off, ends them
+//! in order.
+//!
+//! It knows processes, not services: what to hand over before a restart is its caller's business.
+//! Children die with it. Each asks the kernel for SIGTERM at its parent's death ([`adopt`]), so
+//! even `kill -9` of the supervisor leaves no child.
+
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// A child that lived this long was healthy: its restart does not wait.
+const HEALTHY: Duration = Duration::from_secs(1);
+/// The first wait of a child that ends at once, doubled at each further one.
+const FIRST_WAIT: Duration = Duration::from_millis(50);
+/// The longest wait between two starts.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+/// How long a child may take to stop before it is killed.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// All children of one robot, in the order in which they start.
+pub struct Supervisor {
+    program: PathBuf,
+    config: PathBuf,
+    services: Vec<Service>,
+}
+
+/// One service as a child process.
+///
+/// ```text
+///            start                    ended
+/// waiting ----------> running ------------------> waiting (0, 50, 100 .. 5000 ms)
+///    ^                                               |
+///    +-----------------------------------------------+
+/// ```
+struct Service {
+    name: &'static str,
+    args: Vec<OsString>,
+    child: Option<Child>,
+    started: Instant,
+    start_at: Instant,
+    wait: Duration,
+    restarts: u32,
+}
+
+/// A child ended without being asked to.
+#[derive(Debug)]
+pub struct Ended {
+    /// The service's name.
+    pub service: &'static str,
+    /// How it ended, in words.
+    pub how: String,
+}
+
+impl Supervisor {
+    /// A supervisor whose children run this very program with `config`.
+    pub fn new(config: PathBuf) -> Result<Self> {
+        Ok(Self {
+            program: std::env::current_exe().context("cannot find this program's own file")?,
+            config,
+            services: Vec::new(),
+        })
+    }
+
+    /// Starts `name`, the subcommand of the service, with further arguments.
+    pub fn start(&mut self, name: &'static str, args: Vec<OsString>) -> Result<()> {
+        let now = Instant::now();
+        let mut service = Service {
+            name,
+            args,
+            child: None,
+            started: now,
+            start_at: now,
+            wait: Duration::ZERO,
+            restarts: 0,
+        };
+        self.spawn(&mut service)?;
+        self.services.push(service);
+        Ok(())
+    }
+
+    /// Restarts what has ended and is due again; `hand_over` runs before each restart.
+    ///
+    /// Returns the children found ended by this call.
+    pub fn poll(&mut self, mut hand_over: impl FnMut(&'static str)) -> Result<Vec<Ended>> {
+        let now = Instant::now();
+        let mut ended = Vec::new();
+        let mut services = std::mem::take(&mut self.services);
+        for service in &mut services {
+            if let Some(child) = &mut service.child
+                && let Some(status) = child.try_wait()?
+            {
+                service.child = None;
+                service.wait = if now - service.started >= HEALTHY {
+                    Duration::ZERO
+                } else {
+                    (service.wait * 2).clamp(FIRST_WAIT, LONGEST_WAIT)
+                };
+                service.start_at = now + service.wait;
+                ended.push(Ended {
+                    service: service.name,
+                    how: status.to_string(),
+                });
+            }
+            if service.child.is_none() && now >= service.start_at {
+                hand_over(service.name);
+                service.restarts += 1;
+                self.spawn(service)?;
+            }
+        }
+        self.services = services;
+        Ok(ended)
+    }
+
+    /// How many restarts there were in all.
+    pub fn restarts(&self) -> u32 {
+        self.services.iter().map(|service| service.restarts).sum()
+    }
+
+    /// Ends every child with SIGTERM, the last started first, each before the next.
+    pub fn stop(&mut self) {
+        while let Some(mut service) = self.services.pop() {
+            let Some(mut child) = service.child.take() else {
+                continue;
+            };
+            let _ = kill_process(pid_of(&child), Signal::TERM);
+            let give_up = Instant::now() + PATIENCE;
+            while matches!(child.try_wait(), Ok(None)) {
+                if Instant::now() >= give_up {
+                    tracing::warn!(service = service.name, "does not stop, killing it");
+                    let _ = child.kill();
+                    let _ = child.wait();
+                    break;
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        }
+    }
+
+    fn spawn(&self, service: &mut Service) -> Result<()> {
+        let mut command = Command::new(&self.program);
+        command
+            .arg("--config")
+            .arg(&self.config)
+            .arg(service.name)
+            .args(&service.args)
+            .arg("--parent")
+            .arg(std::process::id().to_string())
+            .stdin(Stdio::null())
+            // Standard output is the supervisor's: its JSON line must stay alone there.
+            .stdout(Stdio::null())
+            // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
+            // children in order.
+            .process_group(0);
+        if service.restarts > 0 {
+            command.arg("--resume");
+        }
+        let child = command
+            .spawn()
+            .with_context(|| format!("cannot start the service `{}`", service.name))?;
+        tracing::info!(service = service.name, pid = child.id(), "started");
+        service.child = Some(child);
+        service.started = Instant::now();
+        Ok(())
+    }
+}
+
+impl Drop for Supervisor {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+fn pid_of(child: &Child) -> Pid {
+    Pid::from_child(child)
+}
+
+/// Binds this process's life to its supervisor's: SIGTERM when that one dies.
+///
+/// # Errors
+/// When the supervisor was gone before the kernel could be asked.
+pub fn adopt(parent: u32) -> Result<()> {
+    rustix::process::set_parent_process_death_signal(Some(Signal::TERM))?;
+    let actual = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get());
+    if actual != i32::try_from(parent)? {
+        bail!("the supervisor (process {parent}) is gone");
+    }
+    Ok(())
+}

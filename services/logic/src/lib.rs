@@ -1,0 +1,1 @@
+//! The logic unit: a pure navigator in a thin shell.

@@ -1,0 +1,299 @@
+//! What the tests with real processes share: an isolated bus for each test, the `lager` binary
+//! on it, and a look at what it leaves behind.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_ports::{Bus, BusConfig};
+use lager_topics::Role;
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+
+/// How long a test waits for anything before it calls it stuck. It bounds a hang; it measures
+/// nothing.
+pub const WATCHDOG: Duration = Duration::from_secs(240);
+
+/// The release binary of this workspace.
+///
+/// # Panics
+/// When it has not been built: `tests/run` builds it first.
+#[must_use]
+pub fn lager() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
+        || {
+            Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("..")
+                .join("target")
+        },
+        PathBuf::from,
+    );
+    let binary = target.join("release").join("lager");
+    assert!(
+        binary.is_file(),
+        "{} is missing; run tests/run, or `cargo build --release` first",
+        binary.display()
+    );
+    binary
+}
+
+/// A bus of a test's own: prefix, root and runtime folder. Dropping it ends nothing and checks
+/// nothing; call [`Domain::assert_clean`] at the end.
+#[derive(Debug)]
+pub struct Domain {
+    prefix: String,
+    root: PathBuf,
+}
+
+impl Domain {
+    /// A domain no other test has.
+    ///
+    /// # Panics
+    /// When its folder cannot be made.
+    #[must_use]
+    pub fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let prefix = format!("lt{}_{number}_", std::process::id());
+        let root = std::env::temp_dir().join(format!("lager-test-{prefix}"));
+        fs::create_dir_all(&root).expect("a temporary folder");
+        Self { prefix, root }
+    }
+
+    /// `lager` with `args` on this bus.
+    pub fn lager(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(lager());
+        command
+            .args(["--bus-prefix", &self.prefix, "--bus-root"])
+            .arg(self.root.join("bus"))
+            .args(args)
+            .env("XDG_RUNTIME_DIR", &self.root)
+            .current_dir(&self.root)
+            .stdin(Stdio::null());
+        command
+    }
+
+    /// Starts `lager` with `args`; standard output and error go to files of the domain.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    pub fn start(&self, args: &[&str]) -> Running {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let log = self.root.join(format!("{number}.log"));
+        let out = self.root.join(format!("{number}.out"));
+        let child = self
+            .lager(args)
+            .stdout(fs::File::create(&out).expect("a log file"))
+            .stderr(fs::File::create(&log).expect("a log file"))
+            .spawn()
+            .expect("lager starts");
+        Running { child, log, out }
+    }
+
+    /// Runs `lager` with `args` to its end.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn run(&self, args: &[&str]) -> Output {
+        self.lager(args).output().expect("lager starts")
+    }
+
+    /// This test's own way onto the bus, as an observer of `robot`.
+    ///
+    /// # Panics
+    /// When the bus cannot be opened.
+    #[must_use]
+    pub fn observe(&self, robot: &str, speed: f64) -> Bus {
+        let config = BusConfig {
+            robot: robot.parse().expect("a robot's name"),
+            speed,
+            prefix: Some(self.prefix.clone()),
+            root: Some(self.root.join("bus")),
+        };
+        Bus::open(&config, Role::Observer).expect("the bus opens")
+    }
+
+    /// The shared memory and bookkeeping files that are left.
+    ///
+    /// # Panics
+    /// When `/dev/shm` cannot be read.
+    #[must_use]
+    pub fn leftovers(&self) -> Vec<String> {
+        let mut left: Vec<String> = fs::read_dir("/dev/shm")
+            .expect("/dev/shm is readable")
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .filter(|name| name.contains(&self.prefix))
+            .collect();
+        let mut folders = vec![self.root.join("bus"), self.root.join("lager")];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+                if entry.path().is_dir() {
+                    folders.push(entry.path());
+                } else {
+                    left.push(entry.path().display().to_string());
+                }
+            }
+        }
+        left
+    }
+
+    /// Removes the test's folder, once nothing of the bus is left in it.
+    ///
+    /// # Panics
+    /// When shared memory or files of the bus are left.
+    pub fn assert_clean(self) {
+        let left = self.leftovers();
+        assert!(left.is_empty(), "left behind: {left:#?}");
+        fs::remove_dir_all(&self.root).expect("the folder goes");
+    }
+}
+
+impl Default for Domain {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A running `lager`, killed when dropped.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+    log: PathBuf,
+    out: PathBuf,
+}
+
+impl Running {
+    /// Its process id.
+    #[must_use]
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// What it has written to standard error.
+    ///
+    /// # Panics
+    /// When the log cannot be read.
+    #[must_use]
+    pub fn log(&self) -> String {
+        fs::read_to_string(&self.log).expect("a readable log")
+    }
+
+    /// What it has written to standard output.
+    ///
+    /// # Panics
+    /// When the file cannot be read.
+    #[must_use]
+    pub fn output(&self) -> String {
+        fs::read_to_string(&self.out).expect("a readable file")
+    }
+
+    /// The one JSON line on its standard output.
+    ///
+    /// # Panics
+    /// When there is none, or more than that line.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let output = self.output();
+        assert_eq!(output.lines().count(), 1, "one line: {output}\n{}", self.log());
+        serde_json::from_str(&output).expect("a JSON line")
+    }
+
+    /// Whether it still runs.
+    ///
+    /// # Panics
+    /// When it cannot be asked.
+    pub fn is_running(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_none()
+    }
+
+    /// Waits for its end and returns the exit code.
+    ///
+    /// # Panics
+    /// When it runs past the watchdog, with its log.
+    pub fn wait(&mut self) -> Option<i32> {
+        let give_up = Instant::now() + WATCHDOG;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("a child") {
+                return status.code();
+            }
+            assert!(Instant::now() < give_up, "stuck:\n{}", self.log());
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Sends a signal.
+    ///
+    /// # Panics
+    /// When the process is gone.
+    pub fn signal(&self, signal: Signal) {
+        kill_process(pid(self.pid()), signal).expect("a living process");
+    }
+
+    /// The process ids of its services, by subcommand.
+    #[must_use]
+    pub fn service(&self, name: &str) -> Option<u32> {
+        children(self.pid())
+            .into_iter()
+            .find(|child| arguments(*child).iter().any(|argument| argument == name))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if self.is_running() {
+            self.signal(Signal::TERM);
+            let give_up = Instant::now() + Duration::from_secs(15);
+            while self.is_running() && Instant::now() < give_up {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+}
+
+/// A process id as the kernel's calls want it.
+///
+/// # Panics
+/// When it is 0.
+#[must_use]
+pub fn pid(raw: u32) -> Pid {
+    Pid::from_raw(i32::try_from(raw).expect("a process id")).expect("not 0")
+}
+
+/// The children of a process.
+#[must_use]
+pub fn children(parent: u32) -> Vec<u32> {
+    let mut found = Vec::new();
+    for task in fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten().flatten() {
+        let list = fs::read_to_string(task.path().join("children")).unwrap_or_default();
+        found.extend(list.split_whitespace().filter_map(|pid| pid.parse::<u32>().ok()));
+    }
+    found
+}
+
+fn arguments(process: u32) -> Vec<String> {
+    let line = fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default();
+    line.split(|byte| *byte == 0)
+        .map(|argument| String::from_utf8_lossy(argument).into_owned())
+        .collect()
+}
+
+/// Waits until `done` gives something.
+///
+/// # Panics
+/// When it takes longer than the watchdog.
+pub fn wait_for<T>(what: &str, mut done: impl FnMut() -> Option<T>) -> T {
+    let give_up = Instant::now() + WATCHDOG;
+    loop {
+        if let Some(value) = done() {
+            return value;
+        }
+        assert!(Instant::now() < give_up, "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
