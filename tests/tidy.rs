@@ -46,6 +46,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "lager-plant",
         ],
     ),
+    // floor 4
+    ("lager-benches", &["lager-wire"]),
     // floor 5
     (
         "lager",
@@ -228,7 +230,7 @@ fn versions_and_lints_live_in_the_workspace() {
 
 #[test]
 fn every_file_opens_with_what_it_is() {
-    for folder in ["bus", "services", "firmware", "tests"] {
+    for folder in ["bus", "services", "firmware", "benches", "tests"] {
         for file in rust_files(Path::new(folder)) {
             let text = std::fs::read_to_string(&file).expect("a readable file");
             assert!(

@@ -1,1 +1,70 @@
 //! Typed publishers, subscribers and waiting: the only crate that opens iceoryx2.
+//!
+//! A process opens one [`Bus`] and makes its ports from it, each in the thread that uses it:
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use lager_ports::{Bus, BusConfig, Policy};
+//! use lager_topics::{Role, SensorLine, SteeringCommand, SteeringOrder};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let bus = Bus::open(&BusConfig::default(), Role::Logic)?;
+//! let mut line = bus.subscriber::<SensorLine>()?;
+//! let orders = bus.publisher::<SteeringCommand>()?;
+//! let waiter = bus.waiter(Policy::Block)?;
+//! loop {
+//!     // A wake is a hint: after every return, drain every subscriber until it is empty.
+//!     waiter.wait(Duration::from_millis(20));
+//!     while let Some(frame) = line.receive()? {
+//!         let mut order = orders.loan()?;
+//!         order.code = 2;
+//!         order.source_time_ns(frame.stamp().source_time_ns);
+//!         order.send()?;
+//!     }
+//! }
+//! # }
+//! ```
+//!
+//! * Streams overwrite: a reader that falls behind loses the oldest samples, never blocks the
+//!   writer, and [`Subscriber::lost`] says exactly how many it missed.
+//! * Services that act on a topic are woken through their [`Waiter`]; observers poll.
+//! * A killed process is swept at the next [`Bus::open`] and by [`Bus::sweep`].
+//!
+//! **Invariant:** no type of iceoryx2 is in the public interface; nothing here decides anything
+//! about the robot; sending and receiving do not allocate after start-up.
+
+/// The transport below, whose versions do not mix on one machine.
+pub const TRANSPORT: &str = "iceoryx2 0.10.0";
+
+mod bus;
+mod clock;
+mod config;
+mod doorbell;
+mod error;
+mod introspect;
+mod keeper;
+mod name;
+mod patience;
+mod publisher;
+mod request;
+mod service;
+mod shutdown;
+mod streams;
+mod subscriber;
+mod waiter;
+
+pub use bus::Bus;
+pub use clock::Clock;
+pub use config::BusConfig;
+pub use error::{CallError, IntrospectError, OpenError, PortError, ReceiveError, SendError};
+pub use introspect::{Layout, NodeInfo, NodeState, Peer, TopicInfo, nodes, remove_stale_nodes};
+pub use keeper::{HandOverError, Keeper};
+pub use name::{RobotName, RobotNameError};
+pub use publisher::{Loan, Publisher};
+pub use request::{Client, Server};
+pub use shutdown::Shutdown;
+pub use subscriber::{Sample, Subscriber};
+pub use waiter::{Policy, PolicyError, Ringer, Waiter, Wake};
+
+/// What carries the bus. All processes on one bus must agree in it.
+pub const BUS_VERSION: &str = "iceoryx2 0.10.0";

@@ -1,1 +1,42 @@
-//! The UART packets between the boards and the Pi.
+//! The UART packets between the two boards and the Raspberry Pi.
+//!
+//! The same code runs on the boards, in the simulator and in the bridge, so the two ends of a
+//! line cannot disagree about a byte. Layout and codes are the original robot's (technical
+//! documentation, appendix B.1); version 1 adds a check value, a reset cause and four kinds.
+//!
+//! - [`Packet`]: eleven bytes and back.
+//! - [`Decoder`]: bytes as they come, packets out, resynchronised by structure alone.
+//! - [`link`]: both ends of the handshake, as state machines.
+//! - [`OperatorCommand::firmware`]: the one table from an operator's codes to the board's.
+//!
+//! It never allocates, never panics on input, never reads a clock and does no input or output.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+mod board;
+mod coded;
+mod command;
+mod crc;
+mod decoder;
+mod handshake;
+mod line;
+pub mod link;
+mod operator;
+mod packet;
+mod payload;
+mod setting;
+mod steer;
+mod text;
+
+pub use board::{ArmData, BoardStatus};
+pub use command::{ArmCommand, Command, WheelCommand};
+pub use decoder::{Decoder, DecoderCounters};
+pub use handshake::{Callsign, Handshake, ResetCause, SynAck, Version};
+pub use line::{Centimetres, LineBits, LineState};
+pub use operator::{OperatorArm, OperatorCommand};
+pub use packet::{DecodeError, END, MIN_LENGTH, PACKET_LENGTH, Packet, PacketId};
+pub use payload::{Kind, PAYLOAD_LENGTH, Payload};
+pub use setting::{Setting, SettingKey, SettingReply, SettingStatus};
+pub use steer::{SteerCommand, SteerData, SteerFlags};
+pub use text::{Binary, CodeTextError, parse_code};

@@ -1,1 +1,53 @@
-//! Every decision the two boards take, on integers, behind a board trait.
+//! Every decision the robot's two boards take, on integers, behind a board trait.
+//!
+//! ```text
+//!  Pi <== UART ==> SensorUnit --- ExDe ---> SteeringUnit <== UART ==> Pi
+//!                    ^    ^                   |      |
+//!             11 line     IR                motors   AX-12 servos
+//!             sensors     ranger
+//! ```
+//!
+//! The same code runs on the two ATmega1284P and, in the simulator, on the host: a chip's crate implements
+//! [`SensorBoard`] or [`SteeringBoard`] by moving bits, a simulated body implements them by arithmetic.
+//! Each unit has one entry, `step`, which takes in everything that has arrived, decides, and tells when it
+//! wants to be stepped next. Stepping more often changes nothing, stepping somewhat later delays and never
+//! confuses.
+//!
+//! Nothing here reads a clock, sleeps, allocates, uses a float or touches a register. Times are wrapping
+//! microseconds in `u32` and are only ever compared over spans far below the clock's round of 71 minutes.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+pub mod arm;
+mod board;
+mod calibration;
+mod failsafe;
+pub mod ir;
+pub mod line;
+mod load;
+mod outbox;
+pub mod pd;
+pub mod register;
+mod report;
+mod sensor;
+mod servo_bus;
+mod steering;
+mod time;
+pub mod turn;
+mod wheels;
+
+pub use board::{Board, Motor, SensorBoard, SteeringBoard};
+pub use sensor::{SensorConfig, SensorUnit};
+pub use steering::{SteeringConfig, SteeringUnit};
+
+/// Duty of a driving motor unless it follows the line (W1, `PWM_STANDARD`), of 255 (AMB-23).
+pub const PWM_STANDARD: u8 = 100;
+
+/// Silence inside a packet after which a board gives it up, in microseconds: two bytes at 9600 Bd (AMB-9)
+/// and the pause a USB adapter makes between two of its frames.
+pub const PACKET_GAP_US: u32 = 3_000;
+
+/// How often a step looks again whether the UART has finished, in microseconds.
+const UART_POLL_US: u32 = 250;

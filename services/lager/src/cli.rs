@@ -59,7 +59,7 @@ pub enum Command {
     Topic(TopicArgs),
     /// Steer by hand in manual mode, renewed until it is done or Ctrl-C
     #[command(
-        after_help = "COMMAND is a name (stop, forward, follow-forward, backward, follow-backward, left, right, left-45, right-45) or a code 1..9 as 8 binary digits, decimal or 0x-hex."
+        after_help = "COMMAND is a name (stop, forward, follow-forward, backward, follow-backward, left, right, left-diag, right-diag) or a code 1..9 as 8 binary digits, decimal or 0x-hex."
     )]
     Drive {
         /// Name or code of the command

@@ -9,8 +9,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use lager_ports::Bus;
-use lager_topics::Role;
+use lager_ports::NodeState;
 use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
@@ -66,9 +65,9 @@ pub fn run(config: &Config, fix: bool) -> Result<ExitCode> {
 fn versions() -> Finding {
     let kernel = rustix::system::uname();
     Good(format!(
-        "lager {}, bus {}, Linux {}",
+        "lager {}, {}, Linux {}",
         env!("CARGO_PKG_VERSION"),
-        lager_ports::BUS_VERSION,
+        lager_ports::TRANSPORT,
         kernel.release().to_string_lossy()
     ))
 }
@@ -179,25 +178,35 @@ fn serial(config: &Config) -> Finding {
 }
 
 fn bus(config: &Config, fix: bool) -> Finding {
-    let bus = match config.bus().and_then(|bus| Ok(Bus::open(&bus, Role::Observer)?)) {
-        Ok(bus) => bus,
-        Err(error) => return Bad(format!("{error:#}")),
+    match bus_state(config, fix) {
+        Ok(finding) => finding,
+        Err(error) => Bad(format!("{error:#}")),
+    }
+}
+
+fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
+    let bus = config.bus()?;
+    let swept = if fix {
+        lager_ports::remove_stale_nodes(&bus)?
+    } else {
+        0
     };
-    let stale = bus.stale_nodes();
-    if stale == 0 {
-        return Good("no dead process has left anything".into());
-    }
-    if !fix {
-        return Hint(format!(
+    let nodes = lager_ports::nodes(&bus)?;
+    let count = |state| nodes.iter().filter(|node| node.state == state).count();
+    let alive = count(NodeState::Alive);
+    let unknown = count(NodeState::Unknown);
+    Ok(match count(NodeState::Stale) {
+        0 if unknown > 0 => Hint(format!(
+            "{alive} processes are on the bus, and {unknown} that belong to another user; one user should run all of a robot's services"
+        )),
+        0 => Good(format!(
+            "{alive} processes are on it, {swept} dead ones were removed"
+        )),
+        stale if fix => Bad(format!(
+            "{stale} dead processes cannot be removed; run this as the user they belonged to"
+        )),
+        stale => Hint(format!(
             "{stale} dead processes left something; `lager doctor --fix` removes it (a starting robot does so too)"
-        ));
-    }
-    let swept = bus.sweep();
-    if swept < stale {
-        return Bad(format!(
-            "{} of {stale} dead processes cannot be swept; they belonged to another user, so run this as that user",
-            stale - swept
-        ));
-    }
-    Good(format!("removed what {swept} dead processes left"))
+        )),
+    })
 }

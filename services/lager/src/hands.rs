@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_ports::{Bus, Client, Publisher};
+use lager_ports::{Bus, Client, Clock, Publisher};
 use lager_topics::{
     Answer, Ask, BridgeRequest, Input, MissionOrder, NavMap, OperatorInput, Order,
     SteeringCommand, SteeringOrder, WarehouseMap,
@@ -19,7 +19,6 @@ const ANSWER: Duration = Duration::from_millis(500);
 
 /// Publishers and the client of one operator.
 pub struct Hands {
-    bus: Bus,
     map: Publisher<NavMap>,
     order: Publisher<MissionOrder>,
     press: Publisher<OperatorInput>,
@@ -31,7 +30,6 @@ impl Hands {
     /// Opens every port an operator writes to.
     pub fn new(bus: &Bus) -> Result<Self> {
         Ok(Self {
-            bus: bus.clone(),
             map: bus.publisher()?,
             order: bus.publisher()?,
             press: bus.publisher()?,
@@ -42,27 +40,25 @@ impl Hands {
 
     /// An id that no order of this or an earlier process has had for the last hour: the
     /// milliseconds of the machine's clock.
-    pub fn fresh_id(&self) -> u32 {
-        let milliseconds = self.bus.clock().monotonic_ns() / 1_000_000;
+    pub fn fresh_id() -> u32 {
+        let milliseconds = Clock::monotonic_ns() / 1_000_000;
         u32::try_from(milliseconds & u64::from(u32::MAX)).unwrap_or(1)
     }
 
     /// Tells the robot its warehouse; late joiners get it too.
-    pub fn publish_map(&mut self, map: &WarehouseMap) -> Result<()> {
-        let now = self.now();
-        self.map.send(now, *map)?;
+    pub fn publish_map(&self, map: &WarehouseMap) -> Result<()> {
+        self.map.send(Clock::monotonic_ns(), *map)?;
         Ok(())
     }
 
     /// Lets late joiners have the map.
-    pub fn tick(&mut self) -> Result<()> {
-        self.map.tick()?;
-        Ok(())
+    pub fn tick(&self) {
+        self.map.tick();
     }
 
     /// Does one thing of the script. A bridge that does not answer is no error: the script asks
     /// again.
-    pub fn carry_out(&mut self, act: Act) -> Result<()> {
+    pub fn carry_out(&self, act: Act) -> Result<()> {
         match act {
             Act::Ask(ask) => {
                 if let Err(silence) = self.ask.call(ask, Duration::from_millis(50)) {
@@ -77,34 +73,27 @@ impl Hands {
     }
 
     /// Asks the bridge and waits for its answer.
-    pub fn ask(&mut self, ask: Ask) -> Result<Answer> {
+    pub fn ask(&self, ask: Ask) -> Result<Answer> {
         self.ask
             .call(ask, ANSWER)
             .context("the bridge does not answer; is the robot up? (`lager up`)")
     }
 
     /// Orders a product.
-    pub fn fetch(&mut self, order: Order) -> Result<()> {
-        let now = self.now();
-        self.order.send(now, order)?;
+    pub fn fetch(&self, order: Order) -> Result<()> {
+        self.order.send(Clock::monotonic_ns(), order)?;
         Ok(())
     }
 
     /// Gives or renews a steering order.
-    pub fn steer(&mut self, order: SteeringOrder) -> Result<()> {
-        let now = self.now();
-        self.steer.send(now, order)?;
+    pub fn steer(&self, order: SteeringOrder) -> Result<()> {
+        self.steer.send(Clock::monotonic_ns(), order)?;
         Ok(())
     }
 
     /// Presses a button.
-    pub fn press(&mut self, input: Input) -> Result<()> {
-        let now = self.now();
-        self.press.send(now, input)?;
+    pub fn press(&self, input: Input) -> Result<()> {
+        self.press.send(Clock::monotonic_ns(), input)?;
         Ok(())
-    }
-
-    fn now(&self) -> u64 {
-        self.bus.clock().monotonic_ns()
     }
 }

@@ -26,7 +26,8 @@ impl Keepers {
     }
 
     /// Remembers the newest value of every service. A killed service's last value is still
-    /// there until its node is swept, so this runs before each sweep.
+    /// there until its node is swept, so this runs before each sweep. Successors that have just
+    /// started are served too.
     pub fn remember(&mut self) -> Result<()> {
         self.bridge.remember()?;
         self.logic.remember()?;
@@ -42,14 +43,6 @@ impl Keepers {
             "simulator" => self.simulator.hand_over()?,
             _ => {}
         }
-        Ok(())
-    }
-
-    /// Lets successors that have just started see what was handed over.
-    pub fn tick(&mut self) -> Result<()> {
-        self.bridge.tick()?;
-        self.logic.tick()?;
-        self.simulator.tick()?;
         Ok(())
     }
 }

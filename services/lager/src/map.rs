@@ -16,12 +16,12 @@ pub fn bus_map(warehouse: &Warehouse) -> WarehouseMap {
         side_length_cm: warehouse.side_length_cm,
         ..WarehouseMap::default()
     };
-    for (slot, product) in map.products.iter_mut().zip(&warehouse.product) {
+    for (slot, (id, square, side)) in map.products.iter_mut().zip(warehouse.map_products()) {
         *slot = MapProduct {
-            id: product.id,
-            x: product.square[0],
-            y: product.square[1],
-            side: match product.side {
+            id,
+            x: square[0],
+            y: square[1],
+            side: match side {
                 lager_plant::Side::Left => Side::Left,
                 lager_plant::Side::Up => Side::Up,
                 lager_plant::Side::Right => Side::Right,

@@ -27,33 +27,70 @@ use lager_wire::{ArmCommand, Command};
 const REPEAT: Duration = Duration::from_millis(500);
 /// How often a running arm command is renewed; its lease is 120 ms.
 const RENEW: Duration = Duration::from_millis(40);
-/// The claw's servo in the reports, counted from 0.
+/// How long logic may be stuck before the operator gives the mission up.
+const STUCK: Duration = Duration::from_secs(10);
+/// The position of the claw's servo when it is closed on nothing.
+const CLAW_CLOSED: u16 = 210;
+/// How far the claw must stay from closed to be holding something, in servo units.
+const HELD_MARGIN: u16 = 40;
+/// A joint is where it should be when no further step would bring it nearer.
+const NEAR: i32 = 2;
+/// Steps for one joint after which something must be wrong with the arm.
+const MOST_STEPS: u16 = 400;
+
+/// The arm's joints and the claw, by their place in the reports.
+const BASE: Joint = Joint {
+    servo: 0,
+    raise: ArmCommand::Left,
+    lower: ArmCommand::Right,
+};
+const SHOULDER: Joint = Joint {
+    servo: 1,
+    raise: ArmCommand::Up,
+    lower: ArmCommand::Down,
+};
+const ELBOW: Joint = Joint {
+    servo: 3,
+    raise: ArmCommand::Out,
+    lower: ArmCommand::In,
+};
 const CLAW: usize = 7;
-/// How far the claw must stay from fully closed to be holding something, in servo units.
-const HELD_MARGIN: u16 = 20;
-/// How often the operator aims anew before it gives up.
+
+/// One joint, and the commands that step it.
+#[derive(Clone, Copy, Debug)]
+struct Joint {
+    servo: usize,
+    raise: ArmCommand,
+    lower: ArmCommand,
+}
+
+/// One move of the routine.
+#[derive(Clone, Copy, Debug)]
+enum Move {
+    /// Give a command once.
+    Once(ArmCommand),
+    /// Step a joint until it stands at a position.
+    Bring(Joint, u16),
+}
+
+/// Opens the claw and brings it around goods that stand as they should, 250 mm ahead of the axle.
+/// The base comes first; where to, the attempt says.
+const REACH: [Move; 4] = [
+    Move::Once(ArmCommand::Release),
+    Move::Bring(ELBOW, 488),
+    Move::Bring(SHOULDER, 311),
+    Move::Once(ArmCommand::Squeeze),
+];
+/// Lifts the claw to where it is carried while the robot drives.
+const LIFT: [Move; 3] = [
+    Move::Bring(SHOULDER, 600),
+    Move::Bring(ELBOW, 400),
+    Move::Bring(BASE, 512),
+];
+/// Where to aim at each attempt: straight ahead first, then 20 and 40 mm to either side.
+const AIMS: [u16; 5] = [512, 533, 491, 554, 470];
+/// How often the operator tries before giving up.
 const ATTEMPTS: usize = AIMS.len();
-
-/// One move of the routine: a command and how often it is given.
-type Move = (ArmCommand, u16);
-
-/// Lowers the open claw around the goods. The counts belong to the arm's carry pose and to goods
-/// that stand in the middle of the square's side.
-const REACH: [Move; 3] = [
-    (ArmCommand::Release, 1),
-    (ArmCommand::Out, 0),
-    (ArmCommand::Down, 0),
-];
-/// Lifts the goods off the shelf, back towards the carry pose.
-const LIFT: [Move; 2] = [(ArmCommand::Up, 0), (ArmCommand::In, 0)];
-/// Where to aim at each attempt: straight first, then to either side.
-const AIMS: [&[Move]; 5] = [
-    &[],
-    &[(ArmCommand::Left, 6)],
-    &[(ArmCommand::Right, 12)],
-    &[(ArmCommand::Left, 18)],
-    &[(ArmCommand::Right, 24)],
-];
 
 /// What the operator sees: the last of each, nothing before the first.
 #[derive(Clone, Copy, Debug, Default)]
@@ -86,6 +123,7 @@ pub struct ScriptedOperator {
     delivered: Vec<i32>,
     step: Step,
     acted: Option<Duration>,
+    stuck_since: Option<Duration>,
     next_id: u32,
 }
 
@@ -106,7 +144,10 @@ enum Step {
 struct Picking {
     attempt: usize,
     stage: Stage,
-    moves: Vec<ArmCommand>,
+    /// What is still to be done, the next last.
+    moves: Vec<Move>,
+    /// Steps given for the move at hand.
+    steps: u16,
     current: Option<SteeringOrder>,
 }
 
@@ -124,6 +165,7 @@ impl ScriptedOperator {
             delivered: Vec::new(),
             step: Step::TakeOver,
             acted: None,
+            stuck_since: None,
             next_id: first_id,
         }
     }
@@ -145,18 +187,25 @@ impl ScriptedOperator {
     /// Looks, and does at most one thing.
     pub fn step(&mut self, now: Duration, seen: &Seen) -> Option<Act> {
         let (health, status) = (seen.health?, seen.status?);
+        if self.is_stuck(now, &status) && self.outcome().is_none() {
+            self.step = Step::Failed(
+                "logic is stuck and waits for a person; `lager topic echo log/thought` tells why"
+                    .into(),
+            );
+        }
         if let Some(next) = self.advance(&health, &status, seen) {
             self.step = next;
             self.acted = None;
         }
-        let pause = match self.step {
+        let pause = match &self.step {
+            Step::Picking { picking, .. } if picking.current.is_none() => Duration::ZERO,
             Step::Picking { .. } => RENEW,
             _ => REPEAT,
         };
         if self.acted.is_some_and(|acted| now < acted + pause) {
             return None;
         }
-        let act = self.act(&health)?;
+        let act = self.act(&health, seen)?;
         self.acted = Some(now);
         Some(act)
     }
@@ -188,6 +237,9 @@ impl ScriptedOperator {
             Step::Picking { order, picking } => match picking.advance(seen.report.as_ref()?) {
                 Grip::Trying => None,
                 Grip::Held => Some(Step::Signalling { order: *order }),
+                Grip::Jammed => Some(Step::Failed(
+                    "a joint of the arm does not get where it should".into(),
+                )),
                 Grip::Empty => Some(Step::Failed(format!(
                     "the claw closed on nothing {ATTEMPTS} times at the station of product {}",
                     status.product
@@ -208,6 +260,14 @@ impl ScriptedOperator {
         }
     }
 
+    fn is_stuck(&mut self, now: Duration, status: &NavigatorStatus) -> bool {
+        if status.phase.get() != Some(Phase::Stuck) {
+            self.stuck_since = None;
+            return false;
+        }
+        now - *self.stuck_since.get_or_insert(now) >= STUCK
+    }
+
     fn next_order(&mut self) -> Step {
         if self.delivered.len() == self.mission.len() {
             return Step::Finished;
@@ -216,21 +276,20 @@ impl ScriptedOperator {
     }
 
     /// What the step wants done now.
-    fn act(&mut self, health: &Health) -> Option<Act> {
+    fn act(&mut self, health: &Health, seen: &Seen) -> Option<Act> {
         match &mut self.step {
-            Step::TakeOver => Some(Act::Ask(Ask {
+            Step::TakeOver if health.mode.get() != Some(Mode::Autonomous) => Some(Act::Ask(Ask {
                 kind: AskKind::SetMode.into(),
                 mode: Mode::Autonomous.into(),
                 ..Ask::default()
-            }))
-            .filter(|_| health.mode.get() != Some(Mode::Autonomous)),
+            })),
             Step::Ordering { order } => Some(Act::Order(Order {
                 id: *order,
                 product: self.mission[self.delivered.len()],
             })),
             Step::Picking { picking, .. } => {
                 let id = self.next_id;
-                let (order, fresh) = picking.order(id)?;
+                let (order, fresh) = picking.order(id, seen.report.as_ref()?)?;
                 self.next_id += u32::from(fresh);
                 Some(Act::Steer(order))
             }
@@ -249,11 +308,17 @@ impl ScriptedOperator {
     }
 }
 
+/// Whether logic is at work on the order it shows.
+fn accepted(phase: Phase) -> bool {
+    !matches!(phase, Phase::WaitingForMap | Phase::WaitingForOrder)
+}
+
 /// What the claw has come to.
 enum Grip {
     Trying,
     Held,
     Empty,
+    Jammed,
 }
 
 impl Picking {
@@ -261,26 +326,36 @@ impl Picking {
         Self {
             attempt: 0,
             stage: Stage::Reaching,
-            moves: routine(AIMS[0].iter().chain(&REACH)),
+            moves: reach(AIMS[0]),
+            steps: 0,
             current: None,
         }
     }
 
     /// Takes note of the steering board's report and goes on when a move has ended.
     fn advance(&mut self, report: &SteeringReport) -> Grip {
-        let Some(order) = &self.current else {
-            return Grip::Trying;
-        };
-        let finished = report.finished_origin.get() == Some(Origin::Operator)
-            && report.finished_id == order.id;
-        if !finished {
-            return Grip::Trying;
+        if let Some(order) = &self.current {
+            let finished = report.finished_origin.get() == Some(Origin::Operator)
+                && report.finished_id == order.id;
+            if !finished {
+                return Grip::Trying;
+            }
+            // A move that was cut short or refused (the robot was not standing yet) is given
+            // again, as a new order.
+            let done = report.finish.get() == Some(Finish::Done);
+            if done && matches!(self.moves.last(), Some(Move::Once(_))) {
+                self.moves.pop();
+            }
+            self.current = None;
         }
-        // A move that was cut short or refused (the robot was not standing yet) is given again,
-        // as a new order.
-        self.current = None;
-        if report.finish.get() == Some(Finish::Done) {
+        while let Some(Move::Bring(joint, to)) = self.moves.last()
+            && step_towards(joint, *to, report).is_none()
+        {
             self.moves.pop();
+            self.steps = 0;
+        }
+        if self.steps > MOST_STEPS {
+            return Grip::Jammed;
         }
         if !self.moves.is_empty() {
             return Grip::Trying;
@@ -288,7 +363,7 @@ impl Picking {
         match self.stage {
             Stage::Reaching => {
                 self.stage = Stage::Lifting;
-                self.moves = routine(&LIFT);
+                self.moves = reversed(&LIFT);
             }
             Stage::Lifting if holds(report) => return Grip::Held,
             Stage::Lifting => {
@@ -297,37 +372,56 @@ impl Picking {
                     return Grip::Empty;
                 };
                 self.stage = Stage::Reaching;
-                self.moves = routine(aim.iter().chain(&REACH));
+                self.moves = reach(*aim);
             }
         }
         Grip::Trying
     }
 
     /// The order to give now; `true` when it is a new one and took `id`.
-    fn order(&mut self, id: u32) -> Option<(SteeringOrder, bool)> {
+    fn order(&mut self, id: u32, report: &SteeringReport) -> Option<(SteeringOrder, bool)> {
         if let Some(order) = self.current {
             return Some((order, false));
         }
+        let command = match self.moves.last()? {
+            Move::Once(command) => *command,
+            Move::Bring(joint, to) => step_towards(joint, *to, report)?,
+        };
         let order = SteeringOrder {
             id,
             origin: Origin::Operator.into(),
             kind: OrderKind::Drive.into(),
-            code: Command::Arm(*self.moves.last()?).code(),
+            code: Command::Arm(command).code(),
             arm_granted: 0,
         };
+        self.steps += 1;
         self.current = Some(order);
         Some((order, true))
     }
 }
 
-/// Single moves, the last to be given first.
-fn routine<'a>(moves: impl IntoIterator<Item = &'a Move>) -> Vec<ArmCommand> {
-    let mut single: Vec<ArmCommand> = moves
-        .into_iter()
-        .flat_map(|(command, times)| core::iter::repeat_n(*command, usize::from(*times)))
-        .collect();
-    single.reverse();
-    single
+/// The command that brings a joint nearer, `None` when it is there. A servo nobody has heard of
+/// yet is not waited for: the first step makes it report.
+fn step_towards(joint: &Joint, to: u16, report: &SteeringReport) -> Option<ArmCommand> {
+    let position = report.servo_position[joint.servo];
+    if position == SERVO_UNKNOWN {
+        return Some(joint.raise);
+    }
+    match i32::from(to) - i32::from(position) {
+        missing if missing > NEAR => Some(joint.raise),
+        missing if missing < -NEAR => Some(joint.lower),
+        _ => None,
+    }
+}
+
+fn reach(aim: u16) -> Vec<Move> {
+    let mut moves = reversed(&REACH);
+    moves.push(Move::Bring(BASE, aim));
+    moves
+}
+
+fn reversed(moves: &[Move]) -> Vec<Move> {
+    moves.iter().rev().copied().collect()
 }
 
 /// Whether the claw was kept from closing all the way.

@@ -7,8 +7,8 @@ use std::time::Duration;
 use anyhow::Result;
 use lager_ports::{Bus, Subscriber};
 use lager_topics::{
-    GoodState, LinkHealth, LogThought, MissionEvent, NavStatus, SensorDistance, SensorLine,
-    SteeringState, TruthPose,
+    Event, EventKind, GoodState, Health, LinkHealth, LogThought, MissionEvent, Mode, NavStatus,
+    NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, TruthPose,
 };
 use serde::Serialize;
 
@@ -80,20 +80,19 @@ impl Narrator {
         if let Some(report) = self.state.latest()? {
             self.seen.report = Some(*report);
         }
-        if let Some(health) = self.health.latest()? {
-            let before = self.seen.health.replace(*health);
-            self.tell_links(before.as_ref(), &self.seen.health.unwrap_or_default());
+        if let Some(health) = self.health.latest()?.map(|health| *health) {
+            let before = self.seen.health.replace(health);
+            self.tell_links(before.as_ref(), &health);
         }
-        if let Some(status) = self.status.latest()? {
-            self.seen.status = Some(*status);
-            self.tell_status(&self.seen.status.unwrap_or_default());
+        if let Some(status) = self.status.latest()?.map(|status| *status) {
+            self.seen.status = Some(status);
+            self.tell_status(&status);
         }
-        while let Some(event) = self.event.receive()? {
+        while let Some(event) = self.event.receive()?.map(|event| *event) {
             self.tell_event(&event);
         }
-        while let Some(thought) = self.thought.receive()? {
-            let line = format!("{}: {}", thought.from, thought.text);
-            self.say(&line);
+        while let Some(thought) = self.thought.receive()?.map(|thought| *thought) {
+            self.say(&format!("{}: {}", thought.from, thought.text));
         }
         if let Some(truth) = self.truth.latest()? {
             let goods: Vec<_> = truth
@@ -148,5 +147,96 @@ impl Narrator {
             self.note(line);
             line.clone_into(&mut self.said);
         }
+    }
+}
+
+impl Narrator {
+    /// Tells what changed on the links and in who may steer.
+    fn tell_links(&mut self, before: Option<&Health>, now: &Health) {
+        let boards = [
+            ("sensor", before.map(|b| b.sensor), now.sensor),
+            ("steering", before.map(|b| b.steering), now.steering),
+        ];
+        for (name, before, now) in boards {
+            let was_up = before.is_some_and(|before| before.up != 0);
+            if now.up != 0 && !was_up {
+                self.note(&format!("the {name} board is connected"));
+            } else if now.up == 0 && was_up {
+                self.note(&format!("the {name} board is silent"));
+            } else if before.is_some_and(|before| before.reboots < now.reboots) {
+                self.note(&format!("the {name} board has restarted ({})", now.reset_cause));
+            }
+        }
+        if before.map(|before| before.mode) != Some(now.mode) {
+            match now.mode.get() {
+                Some(Mode::Autonomous) => self.note("logic steers"),
+                _ => self.note("the operator steers"),
+            }
+        }
+        let was_stopped = before.is_some_and(|before| before.stopped != 0);
+        if (now.stopped != 0) != was_stopped {
+            self.note(if was_stopped {
+                "the stop is released"
+            } else {
+                "STOPPED; `lager resume` lets the robot go on"
+            });
+        }
+    }
+
+    /// Tells what logic is doing, when it does something else than before.
+    fn tell_status(&mut self, status: &NavigatorStatus) {
+        let place = format!("({},{}) heading {}", status.x, status.y, status.heading);
+        let line = match status.phase.get() {
+            Some(Phase::WaitingForMap) => "waits for the map".into(),
+            Some(Phase::WaitingForOrder) => format!("waits for an order at {place}"),
+            Some(Phase::Driving) => format!("drives from {place}"),
+            Some(Phase::Turning) => format!("turns at {place}"),
+            Some(Phase::Approaching) => format!(
+                "looks for the station of product {} from {place}",
+                status.product
+            ),
+            Some(Phase::Positioning) => "turns in to the station".into(),
+            Some(Phase::Picking) => format!("is in position at product {}", status.product),
+            Some(Phase::Leaving) => format!("leaves the station with product {}", status.product),
+            Some(Phase::Exiting) => "follows the line to the delivery station".into(),
+            Some(Phase::Dropping) => format!("lays down product {}", status.product),
+            Some(Phase::BackingOff) => "backs off from the delivery station".into(),
+            Some(Phase::TurningRound) => "turns round".into(),
+            Some(Phase::Returning) => "returns to the warehouse".into(),
+            Some(Phase::Stuck) => format!("is STUCK at {place}"),
+            None => return,
+        };
+        self.say(&line);
+    }
+
+    fn tell_event(&mut self, event: &Event) {
+        let product = event.product;
+        match event.kind.get() {
+            Some(EventKind::GettingItem) => self.note(&format!("fetches product {product}")),
+            Some(EventKind::ItemDelivered) => self.note(&format!("DELIVERED product {product}")),
+            Some(EventKind::Refused) => self.note(&format!("refuses to fetch product {product}")),
+            // What logic is doing tells these already.
+            Some(EventKind::InPosition | EventKind::NextNode) | None => {}
+        }
+    }
+
+    /// The last words: a sentence, or the one line of JSON.
+    pub fn finish(&self, outcome: &Outcome, as_json: bool) -> Result<()> {
+        if as_json {
+            println!("{}", serde_json::to_string(outcome)?);
+            return Ok(());
+        }
+        let said = match &outcome.failure {
+            Some(why) => format!("the mission failed: {why}"),
+            None => format!(
+                "{} delivered in {:.1} s of robot time; {} frames, {} lost",
+                outcome.delivered.len(),
+                outcome.sim_seconds,
+                outcome.frames,
+                outcome.lost
+            ),
+        };
+        self.note(&said);
+        Ok(())
     }
 }

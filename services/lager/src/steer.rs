@@ -51,33 +51,33 @@ impl Operator {
         seconds: Option<f64>,
         shutdown: &Shutdown,
     ) -> Result<String> {
-        let command = parse(command)?;
+        let command = parse(command, OperatorCommand::wheel)?;
+        if matches!(command, OperatorCommand::Arm(_)) {
+            bail!("0x{:02X} moves the arm; use `lager arm`", command.code());
+        }
         if command == OperatorCommand::Stop {
             return self.stop();
-        }
-        if matches!(command, OperatorCommand::Arm(_)) {
-            bail!("`{}` moves the arm; use `lager arm`", command.name());
         }
         let health = self.health()?;
         if health.mode.get() != Some(Mode::Manual) {
             bail!("the robot is autonomous; `lager mode manual` lets you drive");
         }
-        self.carry_out(command.firmware(), seconds, shutdown)
+        self.carry_out(command, seconds, shutdown)
     }
 
     /// `lager arm`: one step of the arm.
     pub fn arm(&mut self, command: &str, shutdown: &Shutdown) -> Result<String> {
-        let command = parse(command)?;
-        let OperatorCommand::Arm(_) = command else {
-            bail!("`{}` drives the wheels; use `lager drive`", command.name());
-        };
-        self.carry_out(command.firmware(), None, shutdown)
+        let command = parse(command, OperatorCommand::arm)?;
+        if !matches!(command, OperatorCommand::Arm(_)) {
+            bail!("0x{:02X} drives the wheels; use `lager drive`", command.code());
+        }
+        self.carry_out(command, None, shutdown)
     }
 
     /// `lager stop`: latched by the bridge before this returns.
     pub fn stop(&mut self) -> Result<String> {
         let order = SteeringOrder {
-            id: self.hands.fresh_id(),
+            id: Hands::fresh_id(),
             origin: Origin::Operator.into(),
             kind: OrderKind::Stop.into(),
             code: Command::Wheel(WheelCommand::Standby).code(),
@@ -126,7 +126,7 @@ impl Operator {
     pub fn fetch(&mut self, product: i32) -> Result<String> {
         let mut status = self.bus.subscriber::<NavStatus>()?;
         let order = Order {
-            id: self.hands.fresh_id(),
+            id: Hands::fresh_id(),
             product,
         };
         let give_up = Instant::now() + PATIENCE;
@@ -186,10 +186,11 @@ impl Operator {
     /// Gives an order and renews it until it has finished or its time is over.
     fn carry_out(
         &mut self,
-        command: Command,
+        command: OperatorCommand,
         seconds: Option<f64>,
         shutdown: &Shutdown,
     ) -> Result<String> {
+        let name = command.name();
         let health = self.health()?;
         if health.stopped != 0 {
             bail!("the robot is stopped; `lager resume` releases the stop");
@@ -197,13 +198,13 @@ impl Operator {
         let refused_before = health.orders_refused;
         let mut state = self.bus.subscriber::<SteeringState>()?;
         let order = SteeringOrder {
-            id: self.hands.fresh_id(),
+            id: Hands::fresh_id(),
             origin: Origin::Operator.into(),
             kind: OrderKind::Drive.into(),
-            code: command.code(),
+            code: command.firmware().code(),
             arm_granted: 0,
         };
-        let clock = self.bus.clock().clone();
+        let clock = *self.bus.clock();
         let end = match seconds {
             Some(seconds) => Some(clock.now() + Duration::try_from_secs_f64(seconds)?),
             None => None,
@@ -220,10 +221,10 @@ impl Operator {
                 accepted |= own(report.current_origin.get(), report.current_id);
                 if own(report.finished_origin.get(), report.finished_id) {
                     return match report.finish.get() {
-                        Some(Finish::Done) => Ok(format!("{command} is done")),
-                        Some(Finish::Aborted) => Err(anyhow!("{command} was cut short")),
+                        Some(Finish::Done) => Ok(format!("`{name}` is done")),
+                        Some(Finish::Aborted) => Err(anyhow!("`{name}` was cut short")),
                         _ => Err(anyhow!(
-                            "the steering board refuses {command}: the arm moves only while the robot stands"
+                            "the steering board refuses `{name}`: the arm moves only while the robot stands"
                         )),
                     };
                 }
@@ -235,28 +236,34 @@ impl Operator {
                 }
                 if !accepted && health.orders_refused > refused_before {
                     bail!(
-                        "the bridge refuses {command} now: somebody else steers, or the mode does not allow it"
+                        "the bridge refuses `{name}` now: somebody else steers, or the mode does not allow it"
                     );
                 }
             }
             if !accepted && Instant::now() >= give_up {
-                bail!("the robot does not carry out {command}; `lager doctor` looks for the cause");
+                bail!("the robot does not carry out `{name}`; `lager doctor` looks for the cause");
             }
         }
-        Ok(format!("let go of {command}"))
+        Ok(format!("let go of `{name}`"))
     }
 }
 
-/// A command by its name or in one of the three forms of its code.
-fn parse(text: &str) -> Result<OperatorCommand> {
-    if let Some(command) = OperatorCommand::all().find(|command| command.name() == text) {
+/// A command by its name, as `by_name` knows them, or in one of the three forms of its code.
+fn parse(
+    text: &str,
+    by_name: fn(&str) -> Option<OperatorCommand>,
+) -> Result<OperatorCommand> {
+    if let Some(command) = by_name(text) {
         return Ok(command);
     }
-    let code = parse_code(text).with_context(|| {
-        let names: Vec<_> = OperatorCommand::all().map(OperatorCommand::name).collect();
-        format!("`{text}` is no command; the names are {}", names.join(", "))
-    })?;
+    let names: Vec<_> = OperatorCommand::ALL
+        .into_iter()
+        .map(OperatorCommand::name)
+        .filter(|name| by_name(name).is_some())
+        .collect();
+    let code = parse_code(text)
+        .with_context(|| format!("`{text}` is no command; the names are {}", names.join(", ")))?;
     OperatorCommand::from_code(code).with_context(|| {
-        format!("no command has the code 0x{code:02X}; wheels are 0x01..0x09, the arm 0xF1..0xFA")
+        format!("0x{code:02X} is no command; the wheels have 0x01 to 0x09, the arm 0xF1 to 0xFA")
     })
 }

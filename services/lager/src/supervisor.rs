@@ -5,13 +5,13 @@
 //! Children die with it. Each asks the kernel for SIGTERM at its parent's death ([`adopt`]), so
 //! even `kill -9` of the supervisor leaves no child.
 
-use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use lager_ports::Shutdown;
 use rustix::process::{Pid, Signal, kill_process};
 
 /// A child that lived this long was healthy: its restart does not wait.
@@ -40,7 +40,6 @@ pub struct Supervisor {
 /// ```
 struct Service {
     name: &'static str,
-    args: Vec<OsString>,
     child: Option<Child>,
     started: Instant,
     start_at: Instant,
@@ -67,12 +66,11 @@ impl Supervisor {
         })
     }
 
-    /// Starts `name`, the subcommand of the service, with further arguments.
-    pub fn start(&mut self, name: &'static str, args: Vec<OsString>) -> Result<()> {
+    /// Starts `name`, the subcommand of the service.
+    pub fn start(&mut self, name: &'static str) -> Result<()> {
         let now = Instant::now();
         let mut service = Service {
             name,
-            args,
             child: None,
             started: now,
             start_at: now,
@@ -87,7 +85,10 @@ impl Supervisor {
     /// Restarts what has ended and is due again; `hand_over` runs before each restart.
     ///
     /// Returns the children found ended by this call.
-    pub fn poll(&mut self, mut hand_over: impl FnMut(&'static str)) -> Result<Vec<Ended>> {
+    pub fn poll(
+        &mut self,
+        mut hand_over: impl FnMut(&'static str) -> Result<()>,
+    ) -> Result<Vec<Ended>> {
         let now = Instant::now();
         let mut ended = Vec::new();
         let mut services = std::mem::take(&mut self.services);
@@ -108,7 +109,7 @@ impl Supervisor {
                 });
             }
             if service.child.is_none() && now >= service.start_at {
-                hand_over(service.name);
+                hand_over(service.name)?;
                 service.restarts += 1;
                 self.spawn(service)?;
             }
@@ -148,7 +149,6 @@ impl Supervisor {
             .arg("--config")
             .arg(&self.config)
             .arg(service.name)
-            .args(&service.args)
             .arg("--parent")
             .arg(std::process::id().to_string())
             .stdin(Stdio::null())
@@ -180,15 +180,26 @@ fn pid_of(child: &Child) -> Pid {
     Pid::from_child(child)
 }
 
-/// Binds this process's life to its supervisor's: SIGTERM when that one dies.
+/// Binds this process's life to its supervisor's: SIGTERM when that one dies, and an end for
+/// certain once the shutdown has been asked for.
 ///
 /// # Errors
 /// When the supervisor was gone before the kernel could be asked.
-pub fn adopt(parent: u32) -> Result<()> {
+pub fn adopt(parent: u32, shutdown: &Shutdown) -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(Signal::TERM))?;
     let actual = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get());
     if actual != i32::try_from(parent)? {
         bail!("the supervisor (process {parent}) is gone");
     }
+    let shutdown = shutdown.clone();
+    std::thread::Builder::new()
+        .name("last-resort".into())
+        .spawn(move || {
+            while !shutdown.is_requested() {
+                std::thread::sleep(Duration::from_millis(100));
+            }
+            std::thread::sleep(PATIENCE);
+            std::process::exit(1);
+        })?;
     Ok(())
 }

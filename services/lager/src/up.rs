@@ -4,25 +4,26 @@
 //! each so that a restarted one goes on where the killed one was, sweeps what dead processes
 //! leave on the bus, tells what the robot does, and plays the operator until a person does.
 
-use std::ffi::OsString;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
-use lager_ports::{Bus, Keeper, Shutdown};
-use lager_topics::{LinkHealth, NavStatus, Role, TruthPose};
+use anyhow::{Result, bail};
+use lager_plant::Warehouse;
+use lager_ports::{Bus, Shutdown};
+use lager_topics::Role;
 
 use crate::cli::UpArgs;
 use crate::config::{Body, Config};
 use crate::exit;
 use crate::hands::Hands;
+use crate::keepers::Keepers;
 use crate::map::bus_map;
-use crate::operator::{Progress, ScriptedOperator};
+use crate::operator::ScriptedOperator;
 use crate::report::{Narrator, Outcome};
 use crate::runtime::RuntimeFolder;
 use crate::supervisor::Supervisor;
 
-/// The pace of this process's own work.
+/// The pace of this process's own work: 20 ms of robot time, at most this in real time.
 const TICK: Duration = Duration::from_millis(10);
 /// How often dead nodes are swept from the bus.
 const SWEEP: Duration = Duration::from_millis(250);
@@ -33,6 +34,8 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     config.validate()?;
     let warehouse = config.warehouse()?;
     let mission = mission(&warehouse, &args.mission)?;
+    // A real robot does not move off by itself: there somebody has to ask for the script.
+    let scripted = args.headless || config.body == Body::Sim;
 
     let folder = RuntimeFolder::create(&config)?;
     let _lock = folder.lock(&config.name)?;
@@ -45,64 +48,83 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     let bus = Bus::open(&config.bus()?, Role::Supervisor)?;
     let mut keepers = Keepers::new(&bus)?;
     let mut narrator = Narrator::new(&bus, args.json)?;
-    let mut hands = Hands::new(&bus)?;
+    let hands = Hands::new(&bus)?;
     hands.publish_map(&bus_map(&warehouse))?;
 
     let mut supervisor = Supervisor::new(file)?;
     if config.body == Body::Sim {
-        supervisor.start("simulator", Vec::new())?;
+        supervisor.start("simulator")?;
     }
-    supervisor.start("bridge", Vec::<OsString>::new())?;
-    supervisor.start("logic", Vec::new())?;
+    supervisor.start("bridge")?;
+    supervisor.start("logic")?;
 
     let started = Instant::now();
     let robot_start = bus.clock().now();
-    let mut operator = ScriptedOperator::new(mission, hands.fresh_id());
+    let mut operator = scripted.then(|| ScriptedOperator::new(mission, Hands::fresh_id()));
     let mut swept = started;
-    let mut failure = None;
     while !shutdown.is_requested() {
         keepers.remember()?;
         for ended in supervisor.poll(|service| keepers.hand_over(service))? {
             narrator.note(&format!("the {} ended ({})", ended.service, ended.how));
         }
-        keepers.tick()?;
         if swept.elapsed() >= SWEEP {
             bus.sweep();
             swept = Instant::now();
         }
-
-        let now = bus.clock().now();
-        narrator.look(now)?;
-        if let Progress::Act(act) = operator.step(now, &narrator.seen()) {
-            hands.carry_out(act)?;
-        }
-        hands.tick()?;
-        match operator.outcome() {
-            Some(Ok(())) if args.exit_when_done => break,
-            Some(Err(why)) if args.exit_when_done => {
-                failure = Some(why.to_owned());
+        narrator.look(bus.clock().now() - robot_start)?;
+        hands.tick();
+        if let Some(operator) = &mut operator {
+            if let Some(act) = operator.step(bus.clock().now(), &narrator.seen()) {
+                hands.carry_out(act)?;
+            }
+            if operator.outcome().is_some() && args.exit_when_done {
                 break;
             }
-            _ => {}
         }
-        std::thread::sleep(TICK);
+        std::thread::sleep(bus.clock().real(2 * TICK).min(TICK));
     }
 
+    // The robot is stopped before anything else is looked at.
+    supervisor.stop();
+    narrator.look(bus.clock().now() - robot_start)?;
+    let delivered = operator
+        .as_ref()
+        .map_or_else(Vec::new, |operator| operator.delivered().to_vec());
+    let failure = match operator.as_ref().and_then(ScriptedOperator::outcome) {
+        Some(Err(why)) => Some(why.to_owned()),
+        _ => delivered
+            .iter()
+            .find(|product| narrator.truly_delivered(**product) == Some(false))
+            .map(|product| format!("product {product} does not lie at the delivery station")),
+    };
     let outcome = Outcome {
-        delivered: operator.delivered().to_vec(),
+        delivered,
         sim_seconds: (bus.clock().now() - robot_start).as_secs_f64(),
         wall_seconds: started.elapsed().as_secs_f64(),
+        frames: narrator.frames(),
+        lost: narrator.lost(),
         restarts: supervisor.restarts(),
         failure,
     };
-    supervisor.stop();
-    narrator.look(bus.clock().now())?;
-    narrator.finish(&outcome)?;
+    narrator.finish(&outcome, args.json)?;
     bus.sweep();
-    Ok(match &outcome.failure {
-        Some(_) => exit::NOT_DELIVERED,
-        None => ExitCode::SUCCESS,
+    Ok(if outcome.failure.is_some() {
+        exit::not_delivered()
+    } else {
+        ExitCode::SUCCESS
     })
+}
+
+/// The products to fetch: those asked for, or the warehouse's first.
+pub fn mission(warehouse: &Warehouse, wanted: &[i32]) -> Result<Vec<i32>> {
+    let known: Vec<i32> = warehouse.map_products().map(|(id, ..)| id).collect();
+    if let Some(unknown) = wanted.iter().find(|id| !known.contains(id)) {
+        bail!("the warehouse has no product {unknown}; it has {known:?}");
+    }
+    if wanted.is_empty() {
+        return Ok(known.into_iter().take(1).collect());
+    }
+    Ok(wanted.to_vec())
 }
 
 /// Puts the command line's wishes over the configuration's.

@@ -1,1 +1,24 @@
-//! The logic unit: a pure navigator in a thin shell.
+//! The logic unit (L1-L10): a pure navigator in a thin shell on the bus.
+//!
+//! The [`Navigator`] takes events and time and yields the one steering order that should be in
+//! force, with the mission's events and thoughts. It is apart from its shell ([`run`]) so that
+//! whole missions, restarts at every moment included, run in virtual time in a test.
+//!
+//! **Invariant:** the navigator never reads a clock, never allocates and never knows of the bus;
+//! the shell never decides.
+
+#![forbid(unsafe_code)]
+
+mod command;
+mod config;
+pub mod heading;
+pub mod judge;
+pub mod map;
+pub mod marks;
+mod navigator;
+pub mod odometer;
+pub mod route;
+pub mod turn;
+
+pub use config::LogicConfig;
+pub use navigator::{Input, Navigator, Output};

@@ -9,7 +9,9 @@ mod rate;
 use std::io::{self, Write};
 use std::time::Duration;
 
-use lager_ports::{Bus, PortError, ReceiveError, Shutdown, Subscriber, TopicInfo};
+use lager_ports::{
+    Bus, IntrospectError, Layout, PortError, ReceiveError, Shutdown, Subscriber,
+};
 use lager_topics::{TOPICS, Topic, TopicVisitor, UnknownTopic, visit};
 use serde_json::json;
 
@@ -24,6 +26,9 @@ pub enum ToolError {
     /// No topic has that name.
     #[error(transparent)]
     Unknown(#[from] UnknownTopic),
+    /// The bus could not be looked at.
+    #[error(transparent)]
+    Look(#[from] IntrospectError),
     /// The topic could not be opened.
     #[error(transparent)]
     Open(#[from] PortError),
@@ -40,19 +45,28 @@ pub enum ToolError {
 
 /// `topic list`: every topic that is open on the bus, of every robot.
 pub fn list(bus: &Bus, as_json: bool, out: &mut impl Write) -> Result<(), ToolError> {
-    let topics = bus.topics();
+    let topics = bus.topics()?;
     if topics.is_empty() && !as_json {
         writeln!(out, "no topic is open on this bus; `lager up` starts a robot")?;
     }
     for topic in topics {
         if as_json {
-            writeln!(out, "{}", describe(&topic))?;
-        } else {
-            writeln!(
+            let value = json!({
+                "robot": topic.robot.as_str(), "topic": topic.name,
+                "publishers": topic.publishers, "subscribers": topic.subscribers,
+                "observers": topic.observers, "ours": topic.layout == Layout::Ours,
+            });
+            writeln!(out, "{value}")?;
+            continue;
+        }
+        let name = format!("lager/{}/{}", topic.robot, topic.name);
+        match topic.layout {
+            Layout::Ours => writeln!(
                 out,
-                "{:32} {:2} publishers {:2} subscribers",
-                topic.name, topic.publishers, topic.subscribers
-            )?;
+                "{name:36} {:2} publishers {:2} subscribers, {} of them observers",
+                topic.publishers, topic.subscribers, topic.observers
+            )?,
+            _ => writeln!(out, "{name:36} of another build: its layout is not this one's")?,
         }
     }
     Ok(())
@@ -65,9 +79,9 @@ pub fn info(bus: &Bus, name: &str, as_json: bool, out: &mut impl Write) -> Resul
         .find(|entry| entry.name == name)
         .ok_or_else(|| UnknownTopic(name.to_owned()))?;
     let live = bus
-        .topics()
+        .topics_of(bus.robot())
         .into_iter()
-        .find(|topic| topic.robot == bus.robot() && topic.topic == name);
+        .find(|topic| topic.name == name);
     let (publishers, subscribers) = live
         .as_ref()
         .map_or((0, 0), |topic| (topic.publishers, topic.subscribers));
@@ -119,6 +133,14 @@ pub fn info(bus: &Bus, name: &str, as_json: bool, out: &mut impl Write) -> Resul
         out,
         "  has now     {publishers} publishers, {subscribers} subscribers"
     )?;
+    let ends = live.iter().flat_map(|topic| {
+        let writers = topic.writers.iter().map(|peer| ("written", peer));
+        writers.chain(topic.readers.iter().map(|peer| ("read", peer)))
+    });
+    for (done, peer) in ends {
+        let role = peer.role.map_or("a stranger".into(), |role| role.to_string());
+        writeln!(out, "    {done:7} by {role}, process {}", peer.pid)?;
+    }
     Ok(())
 }
 
@@ -186,11 +208,4 @@ impl<W: Write> TopicVisitor for Echo<'_, W> {
         self.out.flush()?;
         Ok(())
     }
-}
-
-fn describe(topic: &TopicInfo) -> serde_json::Value {
-    json!({
-        "robot": topic.robot.to_string(), "topic": topic.topic,
-        "publishers": topic.publishers, "subscribers": topic.subscribers,
-    })
 }

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, Clock, Shutdown, Stamp, Subscriber};
-use lager_topics::{Topic, TopicVisitor, visit};
+use lager_ports::{Bus, Clock, Shutdown, Subscriber};
+use lager_topics::{Stamp, Topic, TopicVisitor, visit};
 use serde_json::json;
 
 use crate::{POLL, ToolError};

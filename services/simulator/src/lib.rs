@@ -1,1 +1,23 @@
 //! The robot without hardware: plant and board control behind the UART bytes of the real boards.
+//!
+//! [`Robot`] is pure: both boards run `lager_control`, wired to the world of `lager_plant`, and
+//! speak bytes at the baud rate in virtual time. [`run`] is its shell as a process: two ptys in
+//! place of the USB cables, real time times the speed of the bus's clock, and `truth/pose`.
+//!
+//! Nobody on the Pi can tell it from the boards, and it knows nothing of who is there: it never
+//! reads a topic but its own, from before its restart.
+//!
+//! Safe state: the steering board's own. A simulator that ends takes the robot with it; a
+//! restarted one begins with both boards starting, motors off.
+#![forbid(unsafe_code)]
+
+mod boards;
+mod pty;
+mod robot;
+mod shell;
+mod truth;
+mod uart;
+
+pub use robot::{Robot, RobotOptions, Truth, Wire};
+pub use shell::{RunError, SimulatorConfig, run};
+pub use truth::{message, world_state};

@@ -13,7 +13,7 @@ pub use link::{BoardHealth, Health, Mode};
 pub use log::Thought;
 pub use mission::{Event, EventKind, Input, InputKind, Order};
 pub use nav::{
-    Goal, Heading, MapProduct, NavigatorStatus, Phase, Route, RouteNode, Side, WarehouseMap,
+    Goal, Heading, MapProduct, NavigatorStatus, Phase, Route, RouteNode, Side, Step, WarehouseMap,
 };
 pub use request::{Answer, Ask, AskKind, Outcome};
 pub use sensor::{DistanceFrame, LineFrame};

@@ -49,16 +49,37 @@ coded! {
         Positioning = 5,
         /// It stands at the goods; the operator moves the arm (L10).
         Picking = 6,
-        /// It backs out of the pick station.
+        /// It turns back from a pick station onto the line.
         Leaving = 7,
         /// It follows the way out to the place of delivery (L8).
         Exiting = 8,
         /// It lets go of the goods.
         Dropping = 9,
+        /// It backs away from the goods it has let go.
+        BackingOff = 10,
+        /// It turns round at the place of delivery.
+        TurningRound = 11,
         /// It comes back into the warehouse.
-        Returning = 10,
-        /// It cannot go on without help.
-        Stuck = 11,
+        Returning = 12,
+        /// It cannot go on without help (AMB-49).
+        Stuck = 13,
+    }
+}
+
+coded! {
+    /// What the navigator looks for on the line it drives along.
+    pub enum Step {
+        /// The next mark it expects.
+        Seeking = 0,
+        /// The pick station's mark has been seen; the axle has yet to come to it.
+        ToStation = 1,
+        /// The node's mark has been seen; the axle has yet to come to it.
+        ToNode = 2,
+        /// A mark to both sides has been seen on the way out; if the line ends it was the cross
+        /// bar.
+        AtBar = 3,
+        /// The node is so near that the axle is driven to it whether or not its mark is seen.
+        NearNode = 4,
     }
 }
 
@@ -71,49 +92,72 @@ coded! {
         Product = 1,
         /// The place of delivery.
         Delivery = 2,
+        /// The delivery corner, after a delivery: the place to wait for an order (AMB-50).
+        Home = 3,
     }
 }
 
 payload! {
     /// The navigator's state: what observers want to see and a restarted navigator needs.
-    pub struct NavigatorStatus: 56 bytes {
+    pub struct NavigatorStatus: 72 bytes {
         /// Samples of `sensor/line` the navigator has missed.
         pub frames_lost: u64,
         /// Samples of `sensor/line` the navigator has read.
         pub frames: u64,
-        /// The order it is on.
+        /// The order it is on, or was on last.
         pub order_id: u32,
+        /// The product of that order.
+        pub product: i32,
+        /// The order that waits, if `pending` is 1.
+        pub pending_id: u32,
+        /// The product of the order that waits.
+        pub pending_product: i32,
         /// The steering order it gave last.
         pub command_id: u32,
-        /// Way driven since the node last passed, in mm.
-        pub travelled_mm: u32,
-        /// The product it is to fetch.
-        pub product: i32,
         /// Products delivered.
         pub delivered: u32,
+        /// Way the axle has come since the node last passed, in mm; on the way back from the
+        /// place of delivery, since its cross bar.
+        pub travelled_mm: i32,
+        /// From the delivery corner to the cross bar as measured on the way out, in mm; 0 =
+        /// never driven.
+        pub exit_mm: i32,
         /// Node last passed.
         pub x: i16,
         /// Node last passed.
         pub y: i16,
+        /// Degrees turned since the last heading it is sure of, positive = clockwise.
+        pub turned_deg: i16,
         /// What it does.
         pub phase: Tag<Phase>,
+        /// Step within a drive.
+        pub step: Tag<Step>,
         /// Where it looks.
         pub heading: Tag<Heading>,
+        /// Where it turns to.
+        pub target: Tag<Heading>,
         /// What it heads for.
         pub goal: Tag<Goal>,
-        /// The mark it is on.
+        /// How often the mark under the sensors has been seen to the left (bits 0..=1) and to the
+        /// right (bits 2..=3), each up to 3; bit 4 = a cross bar has been judged.
         pub mark: u8,
         /// Command code it wants.
         pub code: u8,
-        /// Step within the phase.
-        pub step: u8,
+        /// How often the turn or the drop under way has been begun anew.
+        pub tries: u8,
+        /// How often it has passed the pick station without finding it.
+        pub misses: u8,
+        /// 1 = one more order waits.
+        pub pending: u8,
+        /// Distance to what is in front, in cm, 255 = nothing seen.
+        pub distance_cm: u8 = 255,
         /// Who may drive.
         pub mode: Tag<Mode>,
         /// 1 = a stop is latched.
         pub stopped: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 8],
+        pub reserved: [u8; 5],
     }
 }
 

@@ -1,0 +1,241 @@
+//! A process's membership on the bus.
+
+use core::time::Duration;
+use std::fmt;
+use std::sync::Arc;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::NodeCreationFailure;
+use iceoryx2::prelude::{
+    LogLevel, Node, NodeBuilder, NodeName, PortName, SignalHandlingMode, ipc, set_log_level,
+};
+use lager_topics::{Request, Role, Topic};
+
+use crate::clock::Clock;
+use crate::config::BusConfig;
+use crate::error::{IntrospectError, OpenError, PortError};
+use crate::introspect::{self, NodeInfo, TopicInfo};
+use crate::keeper::{self, Keeper};
+use crate::name::{self, RobotName};
+use crate::publisher::Publisher;
+use crate::request::{Client, Server};
+use crate::subscriber::Subscriber;
+use crate::waiter::{Policy, Waiter};
+
+/// A process's membership on the bus; clones share it.
+///
+/// It may be sent to any thread. Ports are made from it in the thread that uses them and stay
+/// there.
+#[derive(Clone)]
+pub struct Bus {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    node: Node<ipc::Service>,
+    config: Config,
+    robot: RobotName,
+    role: Role,
+    clock: Clock,
+    port_name: PortName,
+}
+
+impl Bus {
+    /// Joins the bus as `role`, after sweeping what killed processes left behind.
+    ///
+    /// No signal handler is installed.
+    ///
+    /// # Errors
+    /// The configuration is not usable, or the bus's files are not.
+    pub fn open(config: &BusConfig, role: Role) -> Result<Self, OpenError> {
+        let transport = config.transport()?;
+        set_log_level(log_level());
+        let node = make_node(&transport, &config.robot, role)?;
+        node.blocking_cleanup_dead_nodes(OTHERS_SWEEP);
+        let port_name = PortName::new(&name::port(role, std::process::id()))
+            .expect("a role and a number fit into a port's name");
+        Ok(Self {
+            shared: Arc::new(Shared {
+                node,
+                config: transport,
+                robot: config.robot.clone(),
+                role,
+                clock: Clock::new(config.speed),
+                port_name,
+            }),
+        })
+    }
+
+    /// The robot's clock.
+    pub fn clock(&self) -> &Clock {
+        &self.shared.clock
+    }
+
+    /// The robot's name.
+    pub fn robot(&self) -> &RobotName {
+        &self.shared.robot
+    }
+
+    /// What this process is on the bus.
+    pub fn role(&self) -> Role {
+        self.shared.role
+    }
+
+    /// Removes what killed processes left behind; returns how many of them there were. If
+    /// another process is sweeping at the same moment it is waited for, at most 100 ms each.
+    ///
+    /// Samples a killed writer has sent stay with subscribers that have received from it before,
+    /// until they are drained; a keeper should still drain first ([`Keeper::remember`]).
+    pub fn sweep(&self) -> usize {
+        // The count is of processes on one machine.
+        self.shared
+            .node
+            .blocking_cleanup_dead_nodes(OTHERS_SWEEP)
+            .cleanups as usize
+    }
+
+    /// A writer of `T`, to be used in this thread. It rings the actors of `T`, now and later.
+    ///
+    /// # Errors
+    /// Too many writers, a process of another build on the topic, or no resources.
+    pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, PortError> {
+        Publisher::new(self)
+    }
+
+    /// A reader of `T`, to be used in this thread.
+    ///
+    /// # Errors
+    /// Too many readers, a process of another build on the topic, or no resources.
+    pub fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, PortError> {
+        Subscriber::new(self)
+    }
+
+    /// What wakes this process when a topic it acts on has news; to be used in this thread.
+    ///
+    /// # Errors
+    /// The role acts on nothing, or there are no resources.
+    pub fn waiter(&self, policy: Policy) -> Result<Waiter, PortError> {
+        Waiter::new(self, policy)
+    }
+
+    /// The asking side of `R`, to be used in this thread.
+    ///
+    /// # Errors
+    /// Too many clients, a process of another build, or no resources.
+    pub fn client<R: Request>(&self) -> Result<Client<R>, PortError> {
+        Client::new(self)
+    }
+
+    /// The answering side of `R`, to be used in this thread.
+    ///
+    /// # Errors
+    /// Too many servers, a process of another build, or no resources.
+    pub fn server<R: Request>(&self) -> Result<Server<R>, PortError> {
+        Server::new(self)
+    }
+
+    /// Keeps the last value of `T` for its writer's successor.
+    ///
+    /// # Errors
+    /// As for a subscriber.
+    pub fn keeper<T: Topic>(&self) -> Result<Keeper<T>, PortError> {
+        Keeper::new(self)
+    }
+
+    /// The last value of a topic this process writes itself, from before its restart; waits for
+    /// it at most `timeout` of real time. `None` is a first start, or nobody kept it.
+    ///
+    /// Call it before making the topic's publisher.
+    ///
+    /// # Errors
+    /// As for a subscriber.
+    pub fn kept<T: Topic>(
+        &self,
+        timeout: Duration,
+    ) -> Result<Option<T::Payload>, PortError> {
+        keeper::kept::<T>(self, timeout)
+    }
+
+    /// Every topic in use on this bus, of every robot.
+    ///
+    /// # Errors
+    /// The bus's files cannot be listed.
+    pub fn topics(&self) -> Result<Vec<TopicInfo>, IntrospectError> {
+        introspect::topics(self)
+    }
+
+    /// Every topic of the table as one robot uses it; those not in use have no ports.
+    pub fn topics_of(&self, robot: &RobotName) -> Vec<TopicInfo> {
+        introspect::topics_of(self, robot)
+    }
+
+    /// Every process on this bus, living or dead.
+    ///
+    /// # Errors
+    /// The bus's files cannot be listed.
+    pub fn nodes(&self) -> Result<Vec<NodeInfo>, IntrospectError> {
+        introspect::list(&self.shared.config)
+    }
+
+    pub(crate) fn node(&self) -> &Node<ipc::Service> {
+        &self.shared.node
+    }
+
+    pub(crate) fn transport(&self) -> &Config {
+        &self.shared.config
+    }
+
+    pub(crate) fn port_name(&self) -> &PortName {
+        &self.shared.port_name
+    }
+}
+
+impl fmt::Debug for Bus {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Bus")
+            .field("robot", &self.shared.robot)
+            .field("role", &self.shared.role)
+            .finish_non_exhaustive()
+    }
+}
+
+/// How long a sweep waits for another one that has the same dead process in hand.
+pub(crate) const OTHERS_SWEEP: Duration = Duration::from_millis(100);
+
+fn make_node(
+    config: &Config,
+    robot: &RobotName,
+    role: Role,
+) -> Result<Node<ipc::Service>, OpenError> {
+    let name = NodeName::new(&name::node(robot, role, std::process::id()))
+        .expect("robot, role and number fit into a node's name");
+    NodeBuilder::new()
+        .name(&name)
+        .config(config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .map_err(|failure| {
+            let root = config.global.root_path().to_string();
+            match failure {
+                NodeCreationFailure::InsufficientPermissions => OpenError::Permission { root },
+                other => OpenError::Transport {
+                    detail: format!("{other:?}"),
+                    root,
+                },
+            }
+        })
+}
+
+/// iceoryx2 reports what `ports` handles itself, so it speaks only when asked for by name.
+fn log_level() -> LogLevel {
+    // The target under which iceoryx2 hands its messages to `tracing`.
+    const TARGET: &str = "iceoryx2_bb_loggers::tracing";
+    if tracing::enabled!(target: TARGET, tracing::Level::TRACE) {
+        LogLevel::Trace
+    } else if tracing::enabled!(target: TARGET, tracing::Level::DEBUG) {
+        LogLevel::Debug
+    } else {
+        LogLevel::Fatal
+    }
+}

@@ -1,0 +1,194 @@
+//! What can go wrong, one enum per operation; every message says what to do.
+
+use std::path::PathBuf;
+
+use lager_topics::Role;
+
+/// Why a process could not join the bus.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OpenError {
+    /// The prefix cannot be part of a file name.
+    #[error("`{0}` cannot be the bus's prefix; use letters, digits, `_` and `-` only")]
+    Prefix(String),
+    /// The root is not an absolute path.
+    #[error("`{0}` cannot be the bus's root folder; give an absolute path")]
+    Root(PathBuf),
+    /// The root leaves no room for the names of sockets.
+    #[error("the bus's root folder `{root}` is too long; use at most {limit} bytes, for example one below /tmp")]
+    RootTooLong {
+        /// The folder.
+        root: PathBuf,
+        /// The longest that works, in bytes.
+        limit: usize,
+    },
+    /// The speed is not a positive number.
+    #[error("a robot cannot live {0} times as fast as real time; give a positive number")]
+    Speed(f64),
+    /// The user may not write where the bus lives.
+    #[error("no permission to use the bus's files in {root} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user")]
+    Permission {
+        /// The folder.
+        root: String,
+    },
+    /// The transport failed.
+    #[error("the bus could not be opened ({detail}); check that /dev/shm and {root} exist and are not full, then try again")]
+    Transport {
+        /// What the transport says.
+        detail: String,
+        /// The folder.
+        root: String,
+    },
+}
+
+/// Why a port could not be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PortError {
+    /// All places for observers are taken.
+    #[error("`{topic}` already has {limit} observers, which is the limit; stop one of them (`lager topic info {topic}` lists them) and try again")]
+    TooManyObservers {
+        /// The topic.
+        topic: String,
+        /// Places for observers.
+        limit: usize,
+    },
+    /// All places for readers are taken.
+    #[error("`{topic}` has no place for another reader (limit {limit}); stop a service that runs twice and try again")]
+    TooManyReaders {
+        /// The topic.
+        topic: String,
+        /// Places for readers.
+        limit: usize,
+    },
+    /// All places for writers are taken.
+    #[error("`{topic}` already has {limit} writers, which is the limit; stop one of them and try again")]
+    TooManyWriters {
+        /// The topic or request.
+        topic: String,
+        /// Places for writers.
+        limit: usize,
+    },
+    /// Too many processes have it open.
+    #[error("too many processes use `{topic}` (limit {limit}); stop one of them and try again")]
+    TooManyProcesses {
+        /// The topic or request.
+        topic: String,
+        /// Places for processes.
+        limit: usize,
+    },
+    /// A running process uses another layout or other limits.
+    #[error("`{topic}` is in use with another layout or other limits ({detail}): a process of another build of lager is running; stop all processes of this robot, bring them to one build and start them again")]
+    OtherLayout {
+        /// The topic or request.
+        topic: String,
+        /// Which property differs.
+        detail: String,
+    },
+    /// A running process uses another version of the transport.
+    #[error("`{topic}` belongs to a process with another version of iceoryx2 (this build has 0.10.0, and versions do not mix); stop that process, update it and start again")]
+    OtherVersion {
+        /// The topic or request.
+        topic: String,
+    },
+    /// The shared files make no sense.
+    #[error("the shared files of `{topic}` are damaged or belong to another version of iceoryx2 than 0.10.0; stop every process on this bus, start again, and if it stays so run `lager doctor`")]
+    Damaged {
+        /// The topic or request.
+        topic: String,
+    },
+    /// The user may not use the shared files.
+    #[error("no permission to use the shared files of `{topic}`; run all of a robot's processes as one user")]
+    Permission {
+        /// The topic or request.
+        topic: String,
+    },
+    /// Others kept creating and removing it.
+    #[error("`{topic}` is being created or removed by other processes and did not settle ({detail}); try again")]
+    Busy {
+        /// The topic or request.
+        topic: String,
+        /// What was met last.
+        detail: String,
+    },
+    /// Only services that act on a topic may wait.
+    #[error("{role} is not woken by any topic: observers poll on a timer")]
+    NotAnActor {
+        /// The role.
+        role: Role,
+    },
+    /// The transport failed.
+    #[error("the port of `{topic}` could not be made ({detail}); check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached")]
+    Transport {
+        /// The topic or request.
+        topic: String,
+        /// What the transport says.
+        detail: String,
+    },
+}
+
+/// Why a sample was not sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// Too many loans are open.
+    #[error("{limit} samples are on loan and not sent yet; send or drop one first")]
+    TooManyLoans {
+        /// Loans at the same time.
+        limit: usize,
+    },
+    /// The transport failed; the sample is counted as lost by its readers.
+    #[error("the sample could not be sent ({0}); if it happens again, restart this service")]
+    Transport(String),
+}
+
+/// Why a sample could not be received.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ReceiveError {
+    /// Too many samples are held.
+    #[error("{limit} samples are held; drop one before receiving the next")]
+    TooManyHeld {
+        /// Samples at the same time.
+        limit: usize,
+    },
+    /// The transport failed.
+    #[error("the writer could not be reached ({0}); the next attempt may succeed")]
+    Transport(String),
+}
+
+/// Why a request was not answered.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CallError {
+    /// Nobody answers such requests.
+    #[error("{actor} is not running, so nobody answers `{request}`; start it and try again")]
+    NoServer {
+        /// The request.
+        request: &'static str,
+        /// Who would answer.
+        actor: Role,
+    },
+    /// The answer did not come in time.
+    #[error("{actor} did not answer `{request}` in time; it may be restarting, try again")]
+    NoAnswer {
+        /// The request.
+        request: &'static str,
+        /// Who would answer.
+        actor: Role,
+    },
+    /// The transport failed.
+    #[error("`{request}` could not be sent ({detail}); try again")]
+    Transport {
+        /// The request.
+        request: &'static str,
+        /// What the transport says.
+        detail: String,
+    },
+}
+
+/// Why the bus could not be looked over.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IntrospectError {
+    /// The configuration names no bus.
+    #[error(transparent)]
+    Config(#[from] OpenError),
+    /// The transport failed.
+    #[error("the bus's files could not be listed ({0}); check the permissions of the bus's root folder")]
+    Transport(String),
+}

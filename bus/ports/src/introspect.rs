@@ -1,0 +1,248 @@
+//! Who is on the bus and what is in use there. Only looks; nothing here creates a topic.
+
+use iceoryx2::config::Config;
+use iceoryx2::node::NodeView;
+use iceoryx2::prelude::{
+    CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service,
+    ipc,
+};
+use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
+use lager_topics::{Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
+
+use crate::bus::{Bus, OTHERS_SWEEP};
+use crate::config::BusConfig;
+use crate::error::IntrospectError;
+use crate::name::{self, RobotName};
+use crate::service;
+
+/// How a topic in use compares with this build's table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Nobody uses it.
+    Unused,
+    /// As in the table.
+    Ours,
+    /// The name is in the table, but the processes that use it are of another build.
+    Other,
+    /// The name is not in the table.
+    Unknown,
+}
+
+/// One end of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Peer {
+    /// What the process is; `None` if it is not one of ours.
+    pub role: Option<Role>,
+    /// Its process id; 0 if it is not one of ours.
+    pub pid: u32,
+}
+
+impl Peer {
+    fn of(port_name: &str) -> Self {
+        match name::parse_port(port_name) {
+            Some((role, pid)) => Self {
+                role: Some(role),
+                pid,
+            },
+            None => Self { role: None, pid: 0 },
+        }
+    }
+}
+
+/// A topic of one robot, as it is in use.
+#[derive(Clone, Debug)]
+pub struct TopicInfo {
+    /// The robot.
+    pub robot: RobotName,
+    /// The name behind `lager/<robot>/`.
+    pub name: String,
+    /// The line of this build's table.
+    pub entry: Option<&'static TopicEntry>,
+    /// How the topic in use compares with it. Ends are only known if it is [`Layout::Ours`].
+    pub layout: Layout,
+    /// Number of writers. A killed one counts until it is swept.
+    pub publishers: usize,
+    /// Number of readers. A killed one counts until it is swept.
+    pub subscribers: usize,
+    /// Number of readers that are observers.
+    pub observers: usize,
+    /// The writers.
+    pub writers: Vec<Peer>,
+    /// The readers.
+    pub readers: Vec<Peer>,
+}
+
+impl TopicInfo {
+    fn without_ends(robot: &RobotName, name: &str, layout: Layout) -> Self {
+        Self {
+            robot: robot.clone(),
+            name: name.to_owned(),
+            entry: TOPICS.iter().find(|entry| entry.name == name),
+            layout,
+            publishers: 0,
+            subscribers: 0,
+            observers: 0,
+            writers: Vec::new(),
+            readers: Vec::new(),
+        }
+    }
+}
+
+/// Whether a process lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NodeState {
+    /// It does.
+    Alive,
+    /// It was killed, and what it left is not swept yet.
+    Stale,
+    /// Not known: its files belong to another user or are damaged.
+    Unknown,
+}
+
+/// A process on the bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeInfo {
+    /// The node's name; `lager/<robot>/<role>/<pid>` for one of ours, empty if unknown.
+    pub name: String,
+    /// The executable's file name, empty if unknown.
+    pub executable: String,
+    /// The robot, if the process is one of ours.
+    pub robot: Option<RobotName>,
+    /// The role, if the process is one of ours.
+    pub role: Option<Role>,
+    /// The process id; 0 if unknown.
+    pub pid: u32,
+    /// Whether it lives.
+    pub state: NodeState,
+}
+
+/// Every process on a bus, living or dead, without joining it (joining sweeps).
+///
+/// # Errors
+/// The configuration is not usable, or the bus's files cannot be listed.
+pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
+    list(&config.transport()?)
+}
+
+/// Removes what killed processes left behind, without joining the bus; returns how many of them
+/// there were.
+///
+/// # Errors
+/// The configuration is not usable, or the bus's files cannot be listed.
+pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
+    let mut removed = 0;
+    Node::<ipc::Service>::list(&config.transport()?, |state| {
+        if let IpcNodeState::Dead(dead) = state {
+            removed += usize::from(dead.blocking_remove_stale_resources(OTHERS_SWEEP).is_ok());
+        }
+        CallbackProgression::Continue
+    })
+    .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    Ok(removed)
+}
+
+pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
+    let mut found = Vec::new();
+    Node::<ipc::Service>::list(config, |state| {
+        let (details, state) = match &state {
+            IpcNodeState::Alive(view) => (view.details().as_ref(), NodeState::Alive),
+            IpcNodeState::Dead(view) => (view.details().as_ref(), NodeState::Stale),
+            IpcNodeState::Inaccessible(_) | IpcNodeState::Undefined(_) => {
+                (None, NodeState::Unknown)
+            }
+        };
+        let name = details.map_or_else(String::new, |details| details.name().to_string());
+        let ours = name::parse_node(&name);
+        found.push(NodeInfo {
+            executable: details.map_or_else(String::new, |details| details.executable().to_string()),
+            robot: ours.as_ref().map(|(robot, _, _)| robot.clone()),
+            role: ours.as_ref().map(|(_, role, _)| *role),
+            // Process ids are positive.
+            pid: details.map_or(0, |details| details.process_id().value() as u32),
+            name,
+            state,
+        });
+        CallbackProgression::Continue
+    })
+    .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    found.sort_by(|a, b| (&a.name, a.pid).cmp(&(&b.name, b.pid)));
+    Ok(found)
+}
+
+pub(crate) fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
+    let mut in_use = Vec::new();
+    ipc::Service::list(bus.transport(), |details| {
+        let details = details.static_details;
+        if matches!(
+            details.messaging_pattern(),
+            MessagingPattern::PublishSubscribe(_)
+        ) && let Some((robot, topic)) = name::parse_service(details.name().as_str())
+        {
+            in_use.push((robot, place(topic), topic.to_owned()));
+        }
+        CallbackProgression::Continue
+    })
+    .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    in_use.sort();
+    Ok(in_use
+        .iter()
+        .map(|(robot, _, topic)| look(bus, robot, topic))
+        .collect())
+}
+
+pub(crate) fn topics_of(bus: &Bus, robot: &RobotName) -> Vec<TopicInfo> {
+    TOPICS
+        .iter()
+        .map(|entry| look(bus, robot, entry.name))
+        .collect()
+}
+
+/// Topics are listed in the table's order, others behind them.
+fn place(topic: &str) -> usize {
+    TOPICS
+        .iter()
+        .position(|entry| entry.name == topic)
+        .unwrap_or(TOPICS.len())
+}
+
+fn look(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
+    visit(topic, Look { bus, robot })
+        .unwrap_or_else(|_| TopicInfo::without_ends(robot, topic, Layout::Unknown))
+}
+
+struct Look<'a> {
+    bus: &'a Bus,
+    robot: &'a RobotName,
+}
+
+impl TopicVisitor for Look<'_> {
+    type Output = TopicInfo;
+
+    fn visit<T: Topic>(self) -> TopicInfo {
+        let without_ends = |layout| TopicInfo::without_ends(self.robot, T::NAME, layout);
+        let service = match service::existing_topic::<T>(self.bus, self.robot) {
+            Ok(Some(service)) => service,
+            Ok(None) => return without_ends(Layout::Unused),
+            Err(_) => return without_ends(Layout::Other),
+        };
+        let mut info = without_ends(Layout::Ours);
+        let ends = service.dynamic_config();
+        ends.list_publishers(|details| {
+            info.writers.push(Peer::of(details.publisher_name.as_str()));
+            CallbackProgression::Continue
+        });
+        ends.list_subscribers(|details| {
+            info.readers
+                .push(Peer::of(details.subscriber_name.as_str()));
+            CallbackProgression::Continue
+        });
+        info.publishers = info.writers.len();
+        info.subscribers = info.readers.len();
+        info.observers = info
+            .readers
+            .iter()
+            .filter(|peer| peer.role.is_some_and(Role::is_observer))
+            .count();
+        info
+    }
+}

@@ -1,0 +1,289 @@
+//! Opening services: names, limits, the layout check, and what each refusal means.
+
+use iceoryx2::node::Node;
+use iceoryx2::prelude::{AttributeVerifier, SemanticString, ServiceName, ipc};
+use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
+use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
+use iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
+use iceoryx2::service::builder::request_response::{
+    RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
+};
+use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
+use lager_topics::{Payload, Qos, Request, Role, Schema, Stamp, Topic};
+
+use crate::bus::Bus;
+use crate::error::PortError;
+use crate::name::{self, RobotName};
+pub(crate) use crate::patience::{Fault, patiently};
+
+/// Samples a subscriber may hold at the same time.
+pub(crate) const MAX_HELD: usize = 4;
+
+/// Samples a publisher may have on loan at the same time.
+pub(crate) const MAX_LOANS: usize = 2;
+
+/// Clients, servers and processes of one request service; a killed one keeps its place until swept.
+pub(crate) const MAX_CLIENTS: usize = 32;
+pub(crate) const MAX_SERVERS: usize = 4;
+const MAX_REQUEST_NODES: usize = MAX_CLIENTS + MAX_SERVERS + 16;
+
+/// Ends of one wake service: two waiters, since a killed one keeps its place until swept, and two
+/// more for a role that is started twice by mistake; every publisher of every topic the role acts
+/// on, from every process.
+pub(crate) const MAX_LISTENERS: usize = 4;
+pub(crate) const MAX_NOTIFIERS: usize = 256;
+const MAX_WAKE_NODES: usize = 128;
+
+const SCHEMA_KEY: &str = "lager.schema";
+
+pub(crate) type TopicService<T> =
+    publish_subscribe::PortFactory<ipc::Service, <T as Topic>::Payload, Stamp>;
+
+pub(crate) type RequestService<R> = request_response::PortFactory<
+    ipc::Service,
+    <R as Request>::Request,
+    (),
+    <R as Request>::Reply,
+    (),
+>;
+
+pub(crate) type WakeService = event::PortFactory<ipc::Service>;
+
+/// Opens or creates the service of a topic with the limits of the table.
+pub(crate) fn topic<T: Topic>(bus: &Bus) -> Result<TopicService<T>, PortError> {
+    patiently(bus, T::NAME, || {
+        let qos = T::QOS;
+        builder::<T>(bus.node(), bus.robot())?
+            .max_publishers(qos.max_publishers())
+            .max_subscribers(qos.max_subscribers())
+            .max_nodes(qos.max_nodes())
+            .subscriber_max_buffer_size(qos.buffer)
+            .subscriber_max_borrowed_samples(MAX_HELD)
+            .history_size(qos.history)
+            .enable_safe_overflow(true)
+            .open_or_create_with_attributes(&layout::<T::Payload, Stamp>())
+            .map_err(|error| topic_fault(T::NAME, &qos, error))
+    })
+}
+
+/// Opens the service of a robot's topic if it exists. Never creates it.
+pub(crate) fn existing_topic<T: Topic>(
+    bus: &Bus,
+    robot: &RobotName,
+) -> Result<Option<TopicService<T>>, PortError> {
+    patiently(bus, T::NAME, || {
+        match builder::<T>(bus.node(), robot)?
+            .open_with_attributes(&layout::<T::Payload, Stamp>())
+        {
+            Ok(service) => Ok(Some(service)),
+            Err(
+                PublishSubscribeOpenError::DoesNotExist
+                | PublishSubscribeOpenError::IsMarkedForDestruction,
+            ) => Ok(None),
+            Err(error) => Err(topic_fault(
+                T::NAME,
+                &T::QOS,
+                PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(error),
+            )),
+        }
+    })
+}
+
+fn builder<T: Topic>(
+    node: &Node<ipc::Service>,
+    robot: &RobotName,
+) -> Result<
+    iceoryx2::service::builder::publish_subscribe::Builder<T::Payload, Stamp, ipc::Service>,
+    Fault,
+> {
+    Ok(node
+        .service_builder(&service_name(robot, T::NAME)?)
+        .publish_subscribe::<T::Payload>()
+        .user_header::<Stamp>())
+}
+
+/// Opens or creates the service of a request.
+pub(crate) fn request<R: Request>(bus: &Bus) -> Result<RequestService<R>, PortError> {
+    patiently(bus, R::NAME, || {
+        bus.node()
+            .service_builder(&service_name(bus.robot(), R::NAME)?)
+            .request_response::<R::Request, R::Reply>()
+            .max_clients(MAX_CLIENTS)
+            .max_servers(MAX_SERVERS)
+            .max_nodes(MAX_REQUEST_NODES)
+            .max_active_requests_per_client(2)
+            .max_loaned_requests(1)
+            .max_response_buffer_size(1)
+            .max_borrowed_responses_per_pending_response(1)
+            .enable_safe_overflow_for_requests(true)
+            .enable_safe_overflow_for_responses(true)
+            // A request whose asker has given up must not be carried out later.
+            .enable_fire_and_forget_requests(false)
+            .open_or_create_with_attributes(&layout::<R::Request, R::Reply>())
+            .map_err(|error| request_fault(R::NAME, error))
+    })
+}
+
+/// Opens or creates the service through which `role` is woken.
+pub(crate) fn wake(bus: &Bus, role: Role) -> Result<WakeService, PortError> {
+    let name = wake_name(role);
+    patiently(bus, &name, || {
+        bus.node()
+            .service_builder(&service_name(bus.robot(), &name)?)
+            .event()
+            .max_listeners(MAX_LISTENERS)
+            .max_notifiers(MAX_NOTIFIERS)
+            .max_nodes(MAX_WAKE_NODES)
+            // Each drain looks at every id, and a wake is only a hint.
+            .event_id_max_value(0)
+            .open_or_create()
+            .map_err(|error| wake_fault(&name, error))
+    })
+}
+
+/// The relative name of the service through which `role` is woken.
+pub(crate) fn wake_name(role: Role) -> String {
+    format!("wake/{role}")
+}
+
+/// The layout both sides must share: a difference refuses the service.
+pub(crate) fn layout<A: Payload, B: Schema>() -> AttributeVerifier {
+    let key = AttributeKey::new(SCHEMA_KEY.as_bytes()).expect("the key is short and not empty");
+    let value = AttributeValue::new(format!("{:016x}.{:016x}", A::HASH, B::HASH).as_bytes())
+        .expect("two hashes are short and not empty");
+    AttributeVerifier::new()
+        .require(&key, &value)
+        .expect("one attribute fits")
+}
+
+fn service_name(robot: &RobotName, topic: &str) -> Result<ServiceName, Fault> {
+    let full = name::service(robot, topic);
+    ServiceName::new(&full).map_err(|_| {
+        Fault::Lasting(PortError::Transport {
+            topic: topic.to_owned(),
+            detail: format!("`{full}` is too long for a service's name"),
+        })
+    })
+}
+
+fn topic_fault(topic: &str, qos: &Qos, error: PublishSubscribeOpenOrCreateError) -> Fault {
+    use PublishSubscribeCreateError as Create;
+    use PublishSubscribeOpenError as Open;
+    use PublishSubscribeOpenOrCreateError as Either;
+    let detail = match error {
+        Either::PublishSubscribeOpenError(open) => match open {
+            Open::IncompatibleTypes
+            | Open::IncompatibleMessagingPattern
+            | Open::IncompatibleAttributes
+            | Open::DoesNotSupportRequestedMinBufferSize
+            | Open::DoesNotSupportRequestedMinHistorySize
+            | Open::DoesNotSupportRequestedMinSubscriberBorrowedSamples
+            | Open::DoesNotSupportRequestedAmountOfPublishers
+            | Open::DoesNotSupportRequestedAmountOfSubscribers
+            | Open::DoesNotSupportRequestedAmountOfNodes
+            | Open::IncompatibleOverflowBehavior => {
+                return other_layout(topic, &format!("{open:?}"));
+            }
+            Open::InsufficientPermissions => return no_permission(topic),
+            Open::VersionMismatch => return other_version(topic),
+            Open::ExceedsMaxNumberOfNodes => return crowded(topic, qos.max_nodes()),
+            passing => format!("{passing:?}"),
+        },
+        Either::PublishSubscribeCreateError(create) => match create {
+            Create::InsufficientPermissions => return no_permission(topic),
+            passing => format!("{passing:?}"),
+        },
+        Either::SystemInFlux => "SystemInFlux".to_owned(),
+    };
+    Fault::Passing(detail)
+}
+
+fn request_fault(request: &str, error: RequestResponseOpenOrCreateError) -> Fault {
+    use RequestResponseCreateError as Create;
+    use RequestResponseOpenError as Open;
+    use RequestResponseOpenOrCreateError as Either;
+    let detail = match error {
+        Either::RequestResponseOpenError(open) => match open {
+            Open::InsufficientPermissions => return no_permission(request),
+            Open::VersionMismatch => return other_version(request),
+            Open::ExceedsMaxNumberOfNodes => return crowded(request, MAX_REQUEST_NODES),
+            Open::Interrupt
+            | Open::DoesNotExist
+            | Open::HangsInCreation
+            | Open::InternalFailure
+            | Open::IsMarkedForDestruction
+            | Open::ServiceInCorruptedState
+            | Open::UnableToCreateServiceTag => format!("{open:?}"),
+            incompatible => return other_layout(request, &format!("{incompatible:?}")),
+        },
+        Either::RequestResponseCreateError(create) => match create {
+            Create::InsufficientPermissions => return no_permission(request),
+            passing => format!("{passing:?}"),
+        },
+        Either::SystemInFlux => "SystemInFlux".to_owned(),
+    };
+    Fault::Passing(detail)
+}
+
+fn wake_fault(name: &str, error: EventOpenOrCreateError) -> Fault {
+    use EventCreateError as Create;
+    use EventOpenError as Open;
+    use EventOpenOrCreateError as Either;
+    let detail = match error {
+        Either::EventOpenError(open) => match open {
+            Open::InsufficientPermissions => return no_permission(name),
+            Open::VersionMismatch => return other_version(name),
+            Open::ExceedsMaxNumberOfNodes => return crowded(name, MAX_WAKE_NODES),
+            Open::Interrupt
+            | Open::DoesNotExist
+            | Open::HangsInCreation
+            | Open::InternalFailure
+            | Open::IsMarkedForDestruction
+            | Open::ServiceInCorruptedState
+            | Open::UnableToCreateServiceTag => format!("{open:?}"),
+            incompatible => return other_layout(name, &format!("{incompatible:?}")),
+        },
+        Either::EventCreateError(create) => match create {
+            Create::InsufficientPermissions => return no_permission(name),
+            passing => format!("{passing:?}"),
+        },
+        Either::SystemInFlux => "SystemInFlux".to_owned(),
+    };
+    Fault::Passing(detail)
+}
+
+fn other_layout(topic: &str, detail: &str) -> Fault {
+    Fault::Lasting(PortError::OtherLayout {
+        topic: topic.to_owned(),
+        detail: detail.to_owned(),
+    })
+}
+
+fn other_version(topic: &str) -> Fault {
+    Fault::Lasting(PortError::OtherVersion {
+        topic: topic.to_owned(),
+    })
+}
+
+fn no_permission(topic: &str) -> Fault {
+    Fault::Lasting(PortError::Permission {
+        topic: topic.to_owned(),
+    })
+}
+
+fn crowded(topic: &str, limit: usize) -> Fault {
+    Fault::Full(PortError::TooManyProcesses {
+        topic: topic.to_owned(),
+        limit,
+    })
+}
+
+/// A port that could not be made for want of resources.
+pub(crate) fn no_resources(topic: &str, detail: impl core::fmt::Debug) -> Fault {
+    Fault::Lasting(PortError::Transport {
+        topic: topic.to_owned(),
+        detail: format!("{detail:?}"),
+    })
+}

@@ -1,0 +1,135 @@
+//! A bus of its own for each test.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_ports::{Bus, BusConfig, Publisher, RobotName, Subscriber, remove_stale_nodes};
+use lager_topics::{LineFrame, Role, SensorLine};
+
+/// A bus nobody else is on. Dropping it proves that nothing of it is left.
+pub(crate) struct Domain {
+    pub(crate) config: BusConfig,
+}
+
+impl Domain {
+    pub(crate) fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let id = format!(
+            "lp{}x{}",
+            std::process::id(),
+            NEXT.fetch_add(1, Ordering::Relaxed)
+        );
+        Self::at(&format!("{id}_"), std::env::temp_dir().join(id))
+    }
+
+    pub(crate) fn at(prefix: &str, root: PathBuf) -> Self {
+        Self {
+            config: BusConfig {
+                prefix: Some(prefix.to_owned()),
+                root: Some(root),
+                ..BusConfig::default()
+            },
+        }
+    }
+
+    pub(crate) fn open(&self, role: Role) -> Bus {
+        Bus::open(&self.config, role).unwrap()
+    }
+
+    pub(crate) fn open_robot(&self, robot: &str, role: Role) -> Bus {
+        let config = BusConfig {
+            robot: robot.parse::<RobotName>().unwrap(),
+            ..self.config.clone()
+        };
+        Bus::open(&config, role).unwrap()
+    }
+
+    /// What processes have in shared memory on this bus.
+    pub(crate) fn in_shared_memory(&self) -> Vec<String> {
+        let mut left = self.left_in_shared_memory();
+        // The transport keeps one small segment for each bus for ever.
+        left.retain(|name| !name.ends_with(".global_mgmt"));
+        left
+    }
+
+    fn left_in_shared_memory(&self) -> Vec<String> {
+        let prefix = self.config.prefix.as_deref().unwrap();
+        std::fs::read_dir("/dev/shm")
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .filter(|name| name.starts_with(prefix))
+            .collect()
+    }
+
+    /// Files (not folders) below the root.
+    pub(crate) fn left_below_root(&self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        let mut folders = vec![self.config.root.clone().unwrap()];
+        while let Some(folder) = folders.pop() {
+            let Ok(entries) = std::fs::read_dir(folder) else {
+                continue;
+            };
+            for entry in entries {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else {
+                    files.push(path);
+                }
+            }
+        }
+        files
+    }
+}
+
+impl Drop for Domain {
+    fn drop(&mut self) {
+        let swept = remove_stale_nodes(&self.config);
+        let left = self.in_shared_memory();
+        let files = self.left_below_root();
+        for name in self.left_in_shared_memory() {
+            let _ = std::fs::remove_file(PathBuf::from("/dev/shm").join(name));
+        }
+        let _ = std::fs::remove_dir_all(self.config.root.as_ref().unwrap());
+        if !std::thread::panicking() {
+            swept.unwrap();
+            assert_eq!(left, Vec::<String>::new());
+            assert_eq!(files, Vec::<PathBuf>::new());
+        }
+    }
+}
+
+/// Waits until `done`; the watchdog against hanging for ever, not an assertion about time.
+#[track_caller]
+pub(crate) fn until(what: &str, mut done: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !done() {
+        assert!(
+            start.elapsed() < Duration::from_secs(60),
+            "gave up waiting until {what}"
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// A line frame that can be told from others.
+pub(crate) fn frame(number: u32) -> LineFrame {
+    LineFrame {
+        link_epoch: number,
+        ..LineFrame::default()
+    }
+}
+
+pub(crate) fn send(publisher: &Publisher<SensorLine>, number: u32) {
+    publisher.send(0, frame(number)).unwrap();
+}
+
+/// Everything there is to receive.
+pub(crate) fn drain(subscriber: &mut Subscriber<SensorLine>) -> Vec<u32> {
+    let mut numbers = Vec::new();
+    while let Some(sample) = subscriber.receive().unwrap() {
+        numbers.push(sample.link_epoch);
+    }
+    numbers
+}

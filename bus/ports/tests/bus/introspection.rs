@@ -1,0 +1,125 @@
+//! What tools see of the bus.
+
+use lager_ports::{Layout, NodeState, Peer, nodes, remove_stale_nodes};
+use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
+
+use crate::domain::Domain;
+use crate::process::Player;
+
+#[test]
+fn topics_in_use_are_listed_with_their_ends() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    let logic = domain.open(Role::Logic);
+    let observer = domain.open(Role::Observer);
+    let _writer = bridge.publisher::<SensorLine>().unwrap();
+    let _actor = logic.subscriber::<SensorLine>().unwrap();
+    let _observers = [
+        observer.subscriber::<SensorLine>().unwrap(),
+        observer.subscriber::<SensorLine>().unwrap(),
+    ];
+    let _status = logic.publisher::<NavStatus>().unwrap();
+
+    let topics = observer.topics().unwrap();
+    let names: Vec<_> = topics.iter().map(|topic| topic.name.as_str()).collect();
+    assert_eq!(names, ["sensor/line", "nav/status"]);
+
+    let line = &topics[0];
+    assert_eq!(line.robot.as_str(), "r1");
+    assert_eq!(line.layout, Layout::Ours);
+    assert_eq!(line.entry.unwrap().name, "sensor/line");
+    assert_eq!((line.publishers, line.subscribers), (1, 3));
+    assert_eq!(line.observers, 2);
+    let pid = std::process::id();
+    assert_eq!(
+        line.writers,
+        [Peer {
+            role: Some(Role::Bridge),
+            pid
+        }]
+    );
+    assert!(line.readers.contains(&Peer {
+        role: Some(Role::Logic),
+        pid
+    }));
+    assert_eq!((topics[1].publishers, topics[1].subscribers), (1, 0));
+}
+
+#[test]
+fn looking_does_not_create_topics() {
+    let domain = Domain::new();
+    let observer = domain.open(Role::Observer);
+    let all = observer.topics_of(observer.robot());
+    assert_eq!(all.len(), TOPICS.len());
+    assert!(all.iter().all(|topic| topic.layout == Layout::Unused));
+    assert!(observer.topics().unwrap().is_empty());
+}
+
+#[test]
+fn topics_of_other_robots_are_seen_by_name() {
+    let domain = Domain::new();
+    let other = domain.open_robot("r2", Role::Bridge);
+    let _writer = other.publisher::<SensorLine>().unwrap();
+    let observer = domain.open_robot("r1", Role::Observer);
+    let _own = observer.subscriber::<SensorLine>().unwrap();
+
+    let seen: Vec<_> = observer
+        .topics()
+        .unwrap()
+        .into_iter()
+        .map(|topic| (topic.robot.to_string(), topic.publishers, topic.subscribers))
+        .collect();
+    assert_eq!(seen, [("r1".to_owned(), 0, 1), ("r2".to_owned(), 1, 0)]);
+
+    let line = &observer.topics_of(other.robot())[0];
+    assert_eq!((line.publishers, line.subscribers), (1, 0));
+}
+
+#[test]
+fn processes_are_listed_with_robot_and_role() {
+    let domain = Domain::new();
+    let bridge = domain.open_robot("r1", Role::Bridge);
+    let _logic = domain.open_robot("r2", Role::Logic);
+    let listed = bridge.nodes().unwrap();
+    let seen: Vec<_> = listed
+        .iter()
+        .map(|node| {
+            (
+                node.robot.as_ref().unwrap().as_str(),
+                node.role.unwrap(),
+                node.pid,
+                node.state,
+            )
+        })
+        .collect();
+    let pid = std::process::id();
+    assert_eq!(
+        seen,
+        [
+            ("r1", Role::Bridge, pid, NodeState::Alive),
+            ("r2", Role::Logic, pid, NodeState::Alive)
+        ]
+    );
+    assert_eq!(listed[0].name, format!("lager/r1/bridge/{pid}"));
+}
+
+#[test]
+fn a_killed_process_is_listed_as_stale_until_it_is_removed() {
+    let domain = Domain::new();
+    assert_eq!(nodes(&domain.config).unwrap(), []);
+    let player = Player::start(&domain, "line-writer");
+    let pid = player.pid();
+    assert_eq!(nodes(&domain.config).unwrap()[0].state, NodeState::Alive);
+    player.kill();
+
+    let left = nodes(&domain.config).unwrap();
+    assert_eq!(left.len(), 1);
+    assert_eq!(left[0].state, NodeState::Stale);
+    assert_eq!((left[0].role, left[0].pid), (Some(Role::Bridge), pid));
+    assert_ne!(domain.in_shared_memory(), Vec::<String>::new());
+
+    assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 1);
+    assert_eq!(nodes(&domain.config).unwrap(), []);
+    assert_eq!(domain.in_shared_memory(), Vec::<String>::new());
+    assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 0);
+}

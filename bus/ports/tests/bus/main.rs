@@ -1,0 +1,12 @@
+//! The bus as its users meet it: real shared memory, real processes, real `kill -9`.
+//!
+//! Every test has a bus of its own and checks at its end that nothing is left of it.
+
+mod domain;
+mod introspection;
+mod killed;
+mod limits;
+mod process;
+mod requests;
+mod samples;
+mod waiting;

@@ -1,0 +1,162 @@
+//! Other processes: this test binary started again, playing one part until it is killed.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::time::Duration;
+
+use lager_ports::{Bus, BusConfig, Policy};
+use lager_topics::{
+    Answer, BridgeRequest, NavStatus, NavigatorStatus, Outcome, Role, SensorLine, SteeringCommand,
+};
+
+use crate::domain::{Domain, frame};
+
+const PART: &str = "LAGER_PORTS_TEST_PART";
+const PREFIX: &str = "LAGER_PORTS_TEST_PREFIX";
+const ROOT: &str = "LAGER_PORTS_TEST_ROOT";
+
+/// A process that plays a part and waits to be killed.
+pub(crate) struct Player {
+    child: Child,
+    // The player ends when this closes, so that none outlives a failed test.
+    _stdin: ChildStdin,
+}
+
+impl Player {
+    /// Starts a process in `part` and waits until it is ready.
+    pub(crate) fn start(domain: &Domain, part: &str) -> Self {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["process::player", "--exact", "--ignored", "--nocapture"])
+            .env(PART, part)
+            .env(PREFIX, domain.config.prefix.as_deref().unwrap())
+            .env(ROOT, domain.config.root.as_ref().unwrap())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let stdin = child.stdin.take().unwrap();
+        let ready = BufReader::new(child.stdout.take().unwrap())
+            .lines()
+            .any(|line| line.unwrap().ends_with("READY"));
+        assert!(ready, "the player `{part}` ended before it was ready");
+        Self {
+            child,
+            _stdin: stdin,
+        }
+    }
+
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// `kill -9`, and waits until it is gone.
+    pub(crate) fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+}
+
+impl Drop for Player {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn ready() {
+    println!("READY");
+    std::io::stdout().flush().unwrap();
+}
+
+/// Returns when the parent is gone or done with this process.
+fn until_parent_ends() {
+    let mut nothing = String::new();
+    let _ = std::io::stdin().read_line(&mut nothing);
+    std::process::exit(0);
+}
+
+fn open(role: Role) -> Bus {
+    let config = BusConfig {
+        prefix: std::env::var(PREFIX).ok(),
+        root: std::env::var(ROOT).ok().map(PathBuf::from),
+        ..BusConfig::default()
+    };
+    Bus::open(&config, role).unwrap()
+}
+
+#[test]
+#[ignore = "a part for the other tests to start and kill"]
+fn player() {
+    let Ok(part) = std::env::var(PART) else {
+        return;
+    };
+    match part.as_str() {
+        "line-writer" => {
+            let bus = open(Role::Bridge);
+            let publisher = bus.publisher::<SensorLine>().unwrap();
+            for number in 0..10 {
+                publisher.send(0, frame(number)).unwrap();
+            }
+            ready();
+            until_parent_ends();
+        }
+        "line-reader" => {
+            let bus = open(Role::Observer);
+            let _subscriber = bus.subscriber::<SensorLine>().unwrap();
+            ready();
+            until_parent_ends();
+        }
+        "navigator" => {
+            let bus = open(Role::Logic);
+            let publisher = bus.publisher::<NavStatus>().unwrap();
+            for order_id in 0..=7 {
+                let status = NavigatorStatus {
+                    order_id,
+                    ..NavigatorStatus::default()
+                };
+                publisher.send(1234, status).unwrap();
+            }
+            ready();
+            until_parent_ends();
+        }
+        "deaf-bridge" => {
+            // Acts on steering/command and answers requests, but does neither.
+            let bus = open(Role::Bridge);
+            let _waiter = bus.waiter(Policy::Block).unwrap();
+            let _subscriber = bus.subscriber::<SteeringCommand>().unwrap();
+            let _server = bus.server::<BridgeRequest>().unwrap();
+            ready();
+            until_parent_ends();
+        }
+        "bridge" => {
+            let bus = open(Role::Bridge);
+            let waiter = bus.waiter(Policy::Block).unwrap();
+            let server = bus.server::<BridgeRequest>().unwrap();
+            ready();
+            std::thread::spawn(until_parent_ends);
+            loop {
+                waiter.wait(Duration::from_millis(20));
+                server
+                    .serve(|ask| Answer {
+                        outcome: Outcome::Done.into(),
+                        gain_p: ask.gain_p,
+                        ..Answer::default()
+                    })
+                    .unwrap();
+            }
+        }
+        "asker" => {
+            // Asks and is killed before anybody answers.
+            let bus = open(Role::Operator);
+            let client = bus.client::<BridgeRequest>().unwrap();
+            std::thread::spawn(|| {
+                std::thread::sleep(Duration::from_millis(20));
+                ready();
+                until_parent_ends();
+            });
+            let _ = client.call(lager_topics::Ask::default(), Duration::from_secs(60));
+        }
+        other => panic!("there is no part `{other}`"),
+    }
+}

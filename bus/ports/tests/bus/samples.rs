@@ -1,0 +1,379 @@
+//! What is sent and what arrives.
+
+use std::sync::Barrier;
+
+use lager_ports::{Bus, BusConfig, Clock, ReceiveError, SendError};
+use lager_topics::{
+    LogThought, NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine, Text, Thought,
+};
+
+use crate::domain::{Domain, drain, send};
+
+#[test]
+fn a_sample_arrives_with_its_stamp() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    assert!(subscriber.receive().unwrap().is_none());
+
+    let before = Clock::monotonic_ns();
+    let mut loan = publisher.loan().unwrap();
+    assert_eq!(*loan, Default::default());
+    loan.link_epoch = 42;
+    loan.source_time_ns(17);
+    loan.send().unwrap();
+    let after = Clock::monotonic_ns();
+
+    let sample = subscriber.receive().unwrap().unwrap();
+    assert_eq!(sample.link_epoch, 42);
+    let stamp = sample.stamp();
+    assert_eq!(stamp.sequence, 0);
+    assert_eq!(stamp.source_time_ns, 17);
+    assert!((before..=after).contains(&stamp.publish_time_ns));
+    assert_eq!(stamp.epoch, publisher.epoch());
+    assert_eq!(stamp.writer, std::process::id());
+    assert!(subscriber.receive().unwrap().is_none());
+}
+
+#[test]
+fn a_dropped_loan_leaves_no_gap() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    send(&publisher, 1);
+    drop(publisher.loan().unwrap());
+    send(&publisher, 2);
+    assert_eq!(drain(&mut subscriber), [1, 2]);
+    assert_eq!(subscriber.lost(), 0);
+}
+
+#[test]
+fn two_domains_do_not_meet() {
+    let here = Domain::new();
+    let there = Domain::new();
+    // The same folder but another prefix, and the same prefix but another folder, are apart too.
+    let other_prefix = Domain::at("lpother_", here.config.root.clone().unwrap());
+    let other_root = Domain::at(
+        here.config.prefix.as_deref().unwrap(),
+        std::env::temp_dir().join(format!("lp{}other", std::process::id())),
+    );
+    {
+        let bus = here.open(Role::Bridge);
+        let publisher = bus.publisher::<SensorLine>().unwrap();
+        let mut strangers: Vec<_> = [&there, &other_prefix, &other_root]
+            .iter()
+            .map(|domain| {
+                let bus = domain.open(Role::Logic);
+                let subscriber = bus.subscriber::<SensorLine>().unwrap();
+                (bus, subscriber)
+            })
+            .collect();
+        let mut friend = here.open(Role::Logic).subscriber::<SensorLine>().unwrap();
+        send(&publisher, 1);
+        for (bus, subscriber) in &mut strangers {
+            assert_eq!(drain(subscriber), Vec::<u32>::new());
+            assert_eq!(bus.nodes().unwrap().len(), 1);
+        }
+        assert_eq!(drain(&mut friend), [1]);
+    }
+    drop((there, other_prefix, other_root));
+}
+
+#[test]
+fn two_robots_on_one_bus_do_not_hear_each_other() {
+    let domain = Domain::new();
+    let bus = domain.open_robot("r1", Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    let mut own = domain
+        .open_robot("r1", Role::Logic)
+        .subscriber::<SensorLine>()
+        .unwrap();
+    let mut other = domain
+        .open_robot("r2", Role::Logic)
+        .subscriber::<SensorLine>()
+        .unwrap();
+    send(&publisher, 1);
+    assert_eq!(drain(&mut own), [1]);
+    assert_eq!(drain(&mut other), Vec::<u32>::new());
+}
+
+#[test]
+fn who_sleeps_through_a_thousand_samples_knows_how_many_he_missed() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    for number in 0..1000 {
+        send(&publisher, number);
+    }
+    assert_eq!(drain(&mut subscriber), (936..1000).collect::<Vec<_>>());
+    assert_eq!(subscriber.received(), 64);
+    assert_eq!(subscriber.lost(), 936);
+
+    // Awake, he misses nothing; asleep again, he counts on.
+    send(&publisher, 1000);
+    assert_eq!(drain(&mut subscriber), [1000]);
+    assert_eq!(subscriber.lost(), 936);
+    for number in 0..100 {
+        send(&publisher, number);
+    }
+    assert_eq!(drain(&mut subscriber).len(), 64);
+    assert_eq!(subscriber.lost(), 936 + 36);
+}
+
+#[test]
+fn each_writer_is_counted_for_itself() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<OperatorInput>().unwrap();
+    let one = bus.publisher::<OperatorInput>().unwrap();
+    let two = bus.publisher::<OperatorInput>().unwrap();
+    for number in 0..20 {
+        one.send(0, Default::default()).unwrap();
+        if number % 2 == 0 {
+            two.send(0, Default::default()).unwrap();
+        }
+    }
+    while subscriber.receive().unwrap().is_some() {}
+    // Each writer has a buffer of 16 of its own.
+    assert_eq!(subscriber.lost(), 4);
+    assert_eq!(subscriber.received(), 16 + 10);
+    assert_eq!(subscriber.writers_heard(), 2);
+}
+
+#[test]
+fn who_comes_late_has_not_lost_what_was_before() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    for number in 0..10 {
+        send(&publisher, number);
+    }
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    send(&publisher, 10);
+    assert_eq!(drain(&mut subscriber), [10]);
+    assert_eq!(subscriber.lost(), 0);
+}
+
+#[test]
+fn a_restarted_writer_is_a_new_stream_and_no_loss() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let first = bus.publisher::<SensorLine>().unwrap();
+    for number in 0..5 {
+        send(&first, number);
+    }
+    assert_eq!(drain(&mut subscriber).len(), 5);
+    let first_epoch = first.epoch();
+    drop(first);
+
+    let second = bus.publisher::<SensorLine>().unwrap();
+    assert!(second.epoch() > first_epoch);
+    send(&second, 5);
+    let sample = subscriber.receive().unwrap().unwrap();
+    assert_eq!(sample.stamp().sequence, 0);
+    assert_eq!(sample.stamp().epoch, second.epoch());
+    assert_eq!(subscriber.lost(), 0);
+    assert_eq!(subscriber.writers_heard(), 2);
+}
+
+#[test]
+fn samples_of_a_writer_that_has_left_still_arrive() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    send(&publisher, 1);
+    assert_eq!(drain(&mut subscriber), [1]);
+    send(&publisher, 2);
+    send(&publisher, 3);
+    drop(publisher);
+    assert_eq!(drain(&mut subscriber), [2, 3]);
+    assert_eq!(subscriber.lost(), 0);
+}
+
+#[test]
+fn a_late_joiner_gets_the_last_state_at_the_writers_tick() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Logic);
+    let publisher = bus.publisher::<NavStatus>().unwrap();
+    for order_id in 1..=3 {
+        let status = NavigatorStatus {
+            order_id,
+            ..NavigatorStatus::default()
+        };
+        publisher.send(0, status).unwrap();
+    }
+    let mut late = domain
+        .open(Role::Observer)
+        .subscriber::<NavStatus>()
+        .unwrap();
+    assert!(late.latest().unwrap().is_none());
+    publisher.tick();
+    let sample = late.latest().unwrap().unwrap();
+    assert_eq!(sample.order_id, 3);
+    assert_eq!(sample.stamp().sequence, 2);
+    drop(sample);
+    assert_eq!(late.lost(), 0);
+
+    // Once is enough.
+    publisher.tick();
+    assert!(late.latest().unwrap().is_none());
+}
+
+#[test]
+fn a_late_joiner_of_a_stream_gets_nothing_old() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    send(&publisher, 1);
+    let mut late = bus.subscriber::<SensorLine>().unwrap();
+    publisher.tick();
+    assert_eq!(drain(&mut late), Vec::<u32>::new());
+}
+
+#[test]
+fn the_latest_is_what_was_published_last_by_anybody() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let one = bus.publisher::<SensorLine>().unwrap();
+    let two = bus.publisher::<SensorLine>().unwrap();
+    send(&one, 1);
+    send(&two, 2);
+    send(&one, 3);
+    send(&two, 4);
+    send(&one, 5);
+    assert_eq!(subscriber.latest().unwrap().unwrap().link_epoch, 5);
+    assert!(subscriber.latest().unwrap().is_none());
+    assert_eq!(subscriber.received(), 5);
+}
+
+#[test]
+fn text_travels() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Logic);
+    let mut subscriber = bus.subscriber::<LogThought>().unwrap();
+    let publisher = bus.publisher::<LogThought>().unwrap();
+    let thought = Thought {
+        text: Text::new("Hyllan är tom."),
+        from: Role::Logic.into(),
+    };
+    publisher.send(0, thought).unwrap();
+    assert_eq!(*subscriber.receive().unwrap().unwrap(), thought);
+}
+
+#[test]
+fn a_fifth_held_sample_is_refused_and_nothing_is_lost_by_it() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    for number in 0..5 {
+        send(&publisher, number);
+    }
+    let mut held: Vec<_> = (0..4)
+        .map(|_| subscriber.receive().unwrap().unwrap())
+        .collect();
+    assert_eq!(
+        subscriber.receive().unwrap_err(),
+        ReceiveError::TooManyHeld { limit: 4 }
+    );
+    held.pop();
+    assert_eq!(drain(&mut subscriber), [4]);
+    assert_eq!(held[0].link_epoch, 0);
+    assert_eq!(subscriber.lost(), 0);
+}
+
+#[test]
+fn a_third_open_loan_is_refused() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    let _one = publisher.loan().unwrap();
+    let two = publisher.loan().unwrap();
+    assert_eq!(
+        publisher.loan().err(),
+        Some(SendError::TooManyLoans { limit: 2 })
+    );
+    two.send().unwrap();
+    assert!(publisher.loan().is_ok());
+}
+
+#[test]
+fn a_bus_is_shared_between_threads_and_ports_are_made_in_theirs() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let sent = Barrier::new(5);
+    let read = Barrier::new(5);
+    std::thread::scope(|scope| {
+        for thread in 0..4 {
+            let bus = bus.clone();
+            let (sent, read) = (&sent, &read);
+            scope.spawn(move || {
+                let publisher = bus.publisher::<SensorLine>().unwrap();
+                for number in 0..10 {
+                    send(&publisher, thread * 100 + number);
+                }
+                sent.wait();
+                // A publisher that leaves before it was heard at all is forgotten.
+                read.wait();
+            });
+        }
+        sent.wait();
+        let mut numbers = drain(&mut subscriber);
+        read.wait();
+        numbers.sort_unstable();
+        let expected: Vec<u32> = (0..4)
+            .flat_map(|thread| (0..10).map(move |number| thread * 100 + number))
+            .collect();
+        assert_eq!(numbers, expected);
+        assert_eq!(subscriber.lost(), 0);
+    });
+}
+
+#[test]
+fn the_clock_of_a_hurried_robot_runs_faster() {
+    let domain = Domain::new();
+    let config = BusConfig {
+        speed: 4.0,
+        ..domain.config.clone()
+    };
+    let bus = Bus::open(&config, Role::Logic).unwrap();
+    let real = Clock::monotonic_ns();
+    let robot = bus.clock().now();
+    assert!(robot.as_nanos() >= u128::from(real) * 4);
+}
+
+#[test]
+fn processes_that_come_and_go_at_once_agree_on_one_topic() {
+    const PARTIES: usize = 6;
+    let domain = Domain::new();
+    let together = Barrier::new(PARTIES);
+    std::thread::scope(|scope| {
+        for _ in 0..PARTIES {
+            scope.spawn(|| {
+                for _ in 0..10 {
+                    // All create the topic at once, and all leave it at once.
+                    together.wait();
+                    let bus = domain.open(Role::Bridge);
+                    let mut subscriber = bus.subscriber::<OperatorInput>().unwrap();
+                    together.wait();
+                    let publisher = bus.publisher::<OperatorInput>().unwrap();
+                    publisher.send(0, Default::default()).unwrap();
+                    together.wait();
+                    let mut writers = std::collections::HashSet::new();
+                    while let Some(sample) = subscriber.receive().unwrap() {
+                        writers.insert(sample.stamp().epoch);
+                    }
+                    assert_eq!(writers.len(), PARTIES);
+                    together.wait();
+                }
+            });
+        }
+    });
+}

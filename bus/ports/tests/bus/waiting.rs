@@ -1,0 +1,243 @@
+//! Waking: by a ring, by a time-out, across restarts and threads.
+
+use std::sync::Barrier;
+use std::time::{Duration, Instant};
+
+use lager_ports::{Policy, PortError, Shutdown, Wake};
+use lager_topics::{OperatorInput, Role, SensorDistance, SensorLine, SteeringCommand};
+
+use crate::domain::{Domain, drain, send, until};
+
+/// Long enough that a ring, not the time-out, ends the wait.
+const LONG: Duration = Duration::from_secs(60);
+
+const POLICIES: [Policy; 3] = [Policy::Block, Policy::Spin, Policy::Adaptive];
+
+#[test]
+fn a_sample_wakes_the_actor_under_every_policy() {
+    for policy in POLICIES {
+        let domain = Domain::new();
+        let logic = domain.open(Role::Logic);
+        let waiter = logic.waiter(policy).unwrap();
+        let mut subscriber = logic.subscriber::<SensorLine>().unwrap();
+        let bridge = domain.open(Role::Bridge);
+        let publisher = bridge.publisher::<SensorLine>().unwrap();
+        for number in 0..100 {
+            send(&publisher, number);
+            assert_eq!(waiter.wait(LONG), Wake::Rung, "{policy}");
+            assert_eq!(drain(&mut subscriber), [number]);
+        }
+    }
+}
+
+#[test]
+fn a_sleeping_actor_is_woken_from_another_thread() {
+    for policy in POLICIES {
+        let domain = Domain::new();
+        let logic = domain.open(Role::Logic);
+        let waiter = logic.waiter(policy).unwrap();
+        let mut subscriber = logic.subscriber::<SensorLine>().unwrap();
+        let bridge = domain.open(Role::Bridge);
+        let read = Barrier::new(2);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let publisher = bridge.publisher::<SensorLine>().unwrap();
+                // So that the actor sleeps by now; if not, the test is only easier.
+                std::thread::sleep(Duration::from_millis(30));
+                send(&publisher, 5);
+                read.wait();
+            });
+            let mut numbers = Vec::new();
+            while numbers.is_empty() {
+                assert_eq!(waiter.wait(LONG), Wake::Rung, "{policy}");
+                numbers.extend(drain(&mut subscriber));
+            }
+            assert_eq!(numbers, [5]);
+            read.wait();
+        });
+    }
+}
+
+#[test]
+fn without_a_ring_the_wait_ends_by_its_time_out() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    for policy in POLICIES {
+        let waiter = logic.waiter(policy).unwrap();
+        for timeout in [0, 1, 999, 20_000].map(Duration::from_micros) {
+            let start = Instant::now();
+            assert_eq!(waiter.wait(timeout), Wake::TimedOut, "{policy} {timeout:?}");
+            assert!(start.elapsed() >= timeout, "{policy} {timeout:?}");
+        }
+    }
+}
+
+#[test]
+fn many_samples_may_come_with_one_ring() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    let mut subscriber = logic.subscriber::<SensorLine>().unwrap();
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    for number in 0..50 {
+        send(&publisher, number);
+    }
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    assert_eq!(drain(&mut subscriber).len(), 50);
+    assert_eq!(waiter.wait(Duration::ZERO), Wake::TimedOut);
+}
+
+#[test]
+fn one_waiter_serves_all_topics_of_its_role() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    let bridge = domain.open(Role::Bridge);
+    let line = bridge.publisher::<SensorLine>().unwrap();
+    let distance = bridge.publisher::<SensorDistance>().unwrap();
+    let input = bridge.publisher::<OperatorInput>().unwrap();
+    send(&line, 0);
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    distance.send(0, Default::default()).unwrap();
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    input.send(0, Default::default()).unwrap();
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+}
+
+#[test]
+fn a_sample_rings_every_actor_of_its_topic_and_nobody_else() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let bridge = domain.open(Role::Bridge);
+    let logic_waiter = logic.waiter(Policy::Block).unwrap();
+    let bridge_waiter = bridge.waiter(Policy::Block).unwrap();
+    let comm = domain.open(Role::Comm);
+
+    let input = comm.publisher::<OperatorInput>().unwrap();
+    input.send(0, Default::default()).unwrap();
+    assert_eq!(logic_waiter.wait(LONG), Wake::Rung);
+    assert_eq!(bridge_waiter.wait(LONG), Wake::Rung);
+
+    let command = comm.publisher::<SteeringCommand>().unwrap();
+    command.send(0, Default::default()).unwrap();
+    assert_eq!(bridge_waiter.wait(LONG), Wake::Rung);
+    assert_eq!(
+        logic_waiter.wait(Duration::from_millis(5)),
+        Wake::TimedOut
+    );
+}
+
+#[test]
+fn an_actor_that_starts_after_the_writer_is_rung_too() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    send(&publisher, 0);
+    for _ in 0..3 {
+        // Comes, is rung, goes; and comes again.
+        let logic = domain.open(Role::Logic);
+        let waiter = logic.waiter(Policy::Block).unwrap();
+        send(&publisher, 1);
+        assert_eq!(waiter.wait(LONG), Wake::Rung);
+    }
+    send(&publisher, 2);
+}
+
+#[test]
+fn two_waiters_of_one_role_are_both_rung() {
+    let domain = Domain::new();
+    let one = domain.open(Role::Logic);
+    let two = domain.open(Role::Logic);
+    let waiters = [
+        one.waiter(Policy::Block).unwrap(),
+        two.waiter(Policy::Block).unwrap(),
+    ];
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    send(&publisher, 0);
+    for waiter in &waiters {
+        assert_eq!(waiter.wait(LONG), Wake::Rung);
+    }
+}
+
+#[test]
+fn a_ringer_wakes_from_any_thread() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    let waiter = bridge.waiter(Policy::Block).unwrap();
+    let ringer = waiter.ringer().unwrap();
+    for _ in 0..10 {
+        let ringer = ringer.clone();
+        let thread = std::thread::spawn(move || ringer.ring());
+        assert_eq!(waiter.wait(LONG), Wake::Rung);
+        thread.join().unwrap();
+    }
+}
+
+#[test]
+fn a_wish_to_stop_wakes_whoever_waits() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    let waiter = bridge.waiter(Policy::Block).unwrap();
+    let shutdown = Shutdown::new();
+    shutdown.wake(waiter.ringer().unwrap());
+    assert!(!shutdown.is_requested());
+    let thread = std::thread::spawn({
+        let shutdown = shutdown.clone();
+        move || shutdown.request()
+    });
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    until("the wish is seen", || shutdown.is_requested());
+    thread.join().unwrap();
+
+    // Who begins to wait after the wish is woken as well.
+    shutdown.wake(waiter.ringer().unwrap());
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+}
+
+#[test]
+fn observers_have_no_waiter() {
+    let domain = Domain::new();
+    let observer = domain.open(Role::Observer);
+    let error = observer.waiter(Policy::Block).unwrap_err();
+    assert_eq!(
+        error,
+        PortError::NotAnActor {
+            role: Role::Observer
+        }
+    );
+    assert!(error.to_string().contains("observers poll"));
+}
+
+#[test]
+fn no_ring_is_lost_in_a_storm() {
+    const LAST: u32 = 100_000;
+    for policy in POLICIES {
+        let domain = Domain::new();
+        let logic = domain.open(Role::Logic);
+        let waiter = logic.waiter(policy).unwrap();
+        let mut subscriber = logic.subscriber::<SensorLine>().unwrap();
+        let bridge = domain.open(Role::Bridge);
+        let read = Barrier::new(2);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let publisher = bridge.publisher::<SensorLine>().unwrap();
+                for number in 0..=LAST {
+                    send(&publisher, number);
+                }
+                read.wait();
+            });
+            let mut last = None;
+            while last != Some(LAST) {
+                assert_eq!(waiter.wait(LONG), Wake::Rung, "{policy} after {last:?}");
+                last = drain(&mut subscriber).pop().or(last);
+            }
+            read.wait();
+        });
+        assert_eq!(
+            subscriber.received() + subscriber.lost(),
+            u64::from(LAST) + 1
+        );
+    }
+}

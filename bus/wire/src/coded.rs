@@ -1,0 +1,43 @@
+//! The one way an enum gets its byte: an explicit code per variant, read back by a match.
+//!
+//! It is apart so that no packet rests on the order of an enum and nothing is ever transmuted.
+
+/// Defines an enum whose variants have fixed one-byte codes.
+macro_rules! coded {
+    (
+        $(#[$meta:meta])*
+        pub enum $name:ident {
+            $( $(#[$variant_meta:meta])* $variant:ident = $code:literal, )*
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[repr(u8)]
+        pub enum $name {
+            $( $(#[$variant_meta])* $variant = $code, )*
+        }
+
+        impl $name {
+            /// Every variant, in the order of the codes.
+            pub const ALL: &'static [Self] = &[ $( Self::$variant, )* ];
+
+            /// The variant with this code, if there is one.
+            pub const fn from_code(code: u8) -> Option<Self> {
+                match code {
+                    $( $code => Some(Self::$variant), )*
+                    _ => None,
+                }
+            }
+
+            /// The byte that stands for this variant on the wire.
+            pub const fn code(self) -> u8 {
+                match self {
+                    $( Self::$variant => $code, )*
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use coded;

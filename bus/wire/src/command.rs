@@ -1,0 +1,112 @@
+//! The steering board's own commands, by the codes of its header file (K, styrenhet.h).
+//!
+//! They are apart from the operator's commands because the same byte means different things on
+//! the two lists: 7 is "right" to an operator and a quarter turn left to the board (AMB-2).
+
+use crate::coded::coded;
+
+coded! {
+    /// What the wheels do; the high nibble of the code is 0 (T3).
+    pub enum WheelCommand {
+        /// Stand still. The arm may move only in this state (T4).
+        Standby = 1,
+        /// Straight ahead without looking at the line.
+        ManualForward = 2,
+        /// Follow the line forward.
+        ActiveForward = 3,
+        /// Straight back without looking at the line.
+        ManualBackward = 4,
+        /// Follow the line backward.
+        ActiveBackward = 5,
+        /// Turn left until told otherwise.
+        ManualLeft = 6,
+        /// A quarter turn left, once. Only the logic unit may ask for it.
+        LeftPerp = 7,
+        /// 45 degrees left, once.
+        LeftDiag = 8,
+        /// Turn right until told otherwise.
+        ManualRight = 9,
+        /// A quarter turn right, once. Only the logic unit may ask for it.
+        RightPerp = 10,
+        /// 45 degrees right, once.
+        RightDiag = 11,
+    }
+}
+
+impl WheelCommand {
+    /// Whether it runs once and ends by itself, rather than being a setpoint that holds.
+    pub const fn is_one_shot(self) -> bool {
+        matches!(
+            self,
+            Self::LeftPerp | Self::LeftDiag | Self::RightPerp | Self::RightDiag
+        )
+    }
+}
+
+coded! {
+    /// One step of the arm; the high nibble of the code is F (T3).
+    pub enum ArmCommand {
+        /// Turn the gripper clockwise.
+        Clockwise = 0xF1,
+        /// Turn the gripper counter-clockwise.
+        CounterClockwise = 0xF2,
+        /// Draw the arm in.
+        In = 0xF3,
+        /// Reach out.
+        Out = 0xF4,
+        /// Raise the arm.
+        Up = 0xF5,
+        /// Lower the arm.
+        Down = 0xF6,
+        /// Swing the arm left.
+        Left = 0xF7,
+        /// Swing the arm right.
+        Right = 0xF8,
+        /// Close the gripper until it holds something (AMB-29).
+        Squeeze = 0xF9,
+        /// Open the gripper.
+        Release = 0xFA,
+        /// The delivery sequence: lower, open, back up. Only the logic unit may ask for it
+        /// (AMB-27).
+        Drop = 0xFB,
+    }
+}
+
+/// A command as the steering board executes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Command {
+    /// For the wheels.
+    Wheel(WheelCommand),
+    /// For the arm.
+    Arm(ArmCommand),
+}
+
+impl Command {
+    /// The command with this firmware code; `None` for the codes no list defines (AMB-52).
+    pub const fn from_code(code: u8) -> Option<Self> {
+        if let Some(wheel) = WheelCommand::from_code(code) {
+            Some(Self::Wheel(wheel))
+        } else if let Some(arm) = ArmCommand::from_code(code) {
+            Some(Self::Arm(arm))
+        } else {
+            None
+        }
+    }
+
+    /// The firmware code: 1 to 11 for the wheels, 0xF1 to 0xFB for the arm.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Wheel(wheel) => wheel.code(),
+            Self::Arm(arm) => arm.code(),
+        }
+    }
+
+    /// Whether it runs once and reports, rather than being a setpoint that holds. Timed turns and
+    /// all arm commands do.
+    pub const fn is_one_shot(self) -> bool {
+        match self {
+            Self::Wheel(wheel) => wheel.is_one_shot(),
+            Self::Arm(_) => true,
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What the sensor board tells the Pi: line state, raw line bits, distance (U5, U13, AMB-11, AMB-13).
+
+use core::fmt;
+
+use crate::coded::coded;
+use crate::handshake::Version;
+use crate::payload::{Bytes, Fault, unused_from};
+
+coded! {
+    /// The robot's position on the line (U13), as the robot stands: `LeftOfLine` means that the
+    /// robot is to the left of the tape (AMB-19).
+    pub enum LineState {
+        /// The tape is under the middle of the sensor.
+        OnLine = 0,
+        /// No tape is under the sensor.
+        NotOnLine = 1,
+        /// The robot is left of the line.
+        LeftOfLine = 2,
+        /// The robot is right of the line.
+        RightOfLine = 3,
+        /// A mark, or a crossing's arm, on the left side only.
+        StationToLeft = 4,
+        /// A mark, or a crossing's arm, on the right side only.
+        StationToRight = 5,
+        /// Tape on both sides and the line goes on.
+        FourWay = 6,
+        /// Tape was on both sides and the line has ended: the delivery bar.
+        DropStation = 7,
+    }
+}
+
+impl LineState {
+    pub(crate) fn write(self, payload: &mut Bytes) {
+        payload[0] = self.code();
+    }
+
+    pub(crate) fn read(version: Version, payload: &Bytes) -> Result<Self, Fault> {
+        if version == Version::One {
+            unused_from(1, payload)?;
+        }
+        Self::from_code(payload[0]).ok_or(Fault { index: 0 })
+    }
+}
+
+/// One reading of the eleven line sensors; a set bit is tape (S6). Bit 10 is the leftmost sensor
+/// (AMB-17).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct LineBits(pub u16);
+
+impl LineBits {
+    /// How many sensors sit side by side (S5).
+    pub const SENSORS: u8 = 11;
+    /// The bits that are sensors.
+    pub const MASK: u16 = (1 << Self::SENSORS) - 1;
+
+    /// A reading from the low eleven bits; the bits above are dropped.
+    pub const fn new(bits: u16) -> Self {
+        Self(bits & Self::MASK)
+    }
+
+    /// Whether sensor `index` sees tape: 0 is the leftmost, 10 the rightmost, and what is beyond
+    /// them sees none.
+    pub const fn sensor(self, index: u8) -> bool {
+        index < Self::SENSORS && self.0 & (1 << (Self::SENSORS - 1 - index)) != 0
+    }
+
+    pub(crate) fn write(self, payload: &mut Bytes) {
+        payload[..2].copy_from_slice(&Self::new(self.0).0.to_le_bytes());
+    }
+
+    pub(crate) fn read(version: Version, payload: &Bytes, given: usize) -> Result<Self, Fault> {
+        if given < 2 {
+            return Err(Fault { index: 1 });
+        }
+        if version == Version::One {
+            unused_from(2, payload)?;
+        }
+        let bits = u16::from_le_bytes([payload[0], payload[1]]);
+        if bits & !Self::MASK != 0 {
+            return Err(Fault { index: 1 });
+        }
+        Ok(Self(bits))
+    }
+}
+
+/// A distance in whole centimetres, as the IR sensor gives it (S8, AMB-13).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Centimetres(pub u8);
+
+impl Centimetres {
+    /// Nothing in range, or no valid reading.
+    pub const NONE: Self = Self(255);
+
+    /// The distance, if there is one.
+    pub const fn get(self) -> Option<u8> {
+        if self.0 == Self::NONE.0 {
+            None
+        } else {
+            Some(self.0)
+        }
+    }
+
+    pub(crate) fn write(self, payload: &mut Bytes) {
+        payload[0] = self.0;
+    }
+
+    pub(crate) fn read(version: Version, payload: &Bytes) -> Result<Self, Fault> {
+        if version == Version::One {
+            unused_from(1, payload)?;
+        }
+        Ok(Self(payload[0]))
+    }
+}
+
+impl fmt::Display for Centimetres {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.get() {
+            Some(distance) => write!(formatter, "{distance} cm"),
+            None => formatter.write_str("none"),
+        }
+    }
+}

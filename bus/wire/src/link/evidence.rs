@@ -1,0 +1,172 @@
+//! What makes the Pi believe that a board is there: runs of SYNs, runs of data.
+//!
+//! A version-1 SYN proves itself by its check value. Nothing protects an original packet, so an
+//! original board is believed only by repetition, in a stream without stray bytes, and when no
+//! version-1 packet has come for a while. It is apart from the link because belief is all it
+//! knows: it holds no peer, counts no loss and answers nothing.
+
+use core::time::Duration;
+
+use super::handshake;
+use crate::handshake::{Callsign, ResetCause, SynAck, Version};
+use crate::packet::{PACKET_LENGTH, Packet, PacketId};
+
+/// How long no version-1 packet may have come before an original board is believed.
+const ORIGINAL_AFTER: Duration = Duration::from_millis(300);
+/// How many original SYNs in a row are believed when they are alike but for the id.
+const ORIGINAL_SYNS: u8 = 3;
+/// How many are believed when only their meaning is alike: an original board does not clear the
+/// payload bytes it does not use, so they may differ from SYN to SYN.
+const ORIGINAL_SYNS_UNLIKE: u8 = 6;
+/// How many version-1 SYNs in a row are a reboot when they come after data.
+const REBOOT_SYNS: u8 = 2;
+/// How many packets with consecutive ids show that an original board is running.
+const RUNNING_PACKETS: u8 = 8;
+/// Up to how many wrong bits an original SYN is taken for a damaged version-1 SYN.
+const DAMAGE_BITS: u32 = 3;
+
+/// A SYN from a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Syn {
+    pub(super) version: Version,
+    pub(super) callsign: Callsign,
+    /// The packet; an original one's without its id.
+    pub(super) bytes: [u8; PACKET_LENGTH],
+    /// How many bytes the original's decoder had skipped by then.
+    pub(super) skipped: u32,
+}
+
+/// SYNs in a row from one board by one version.
+#[derive(Clone, Copy, Debug)]
+struct SynRun {
+    last: Syn,
+    count: u8,
+    /// How many of the last ones were alike in every byte.
+    alike: u8,
+}
+
+/// Original data packets with consecutive ids from one board.
+#[derive(Clone, Copy, Debug)]
+struct DataRun {
+    callsign: Callsign,
+    last_id: PacketId,
+    count: u8,
+}
+
+/// What has been heard of a board.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Evidence {
+    syns: Option<SynRun>,
+    data: Option<DataRun>,
+    /// When listening began or a version-1 packet last came, whichever is later.
+    without_one_since: Option<Duration>,
+}
+
+impl Evidence {
+    /// Listening begins at `now`, unless it has begun.
+    pub(super) fn listen(&mut self, now: Duration) {
+        self.without_one_since.get_or_insert(now);
+    }
+
+    /// A version-1 packet has come.
+    pub(super) fn heard_one(&mut self, now: Duration) {
+        self.without_one_since = Some(now);
+    }
+
+    /// Something has come that no waiting board sends.
+    pub(super) fn break_syns(&mut self) {
+        self.syns = None;
+    }
+
+    /// Something has come that no running board sends.
+    pub(super) fn break_data(&mut self) {
+        self.data = None;
+    }
+
+    /// Whether a board's SYN is believed with those before it. `after_data`: the board was up and
+    /// has sent data, so one stray SYN must not bring it down.
+    pub(super) fn believes_syn(&mut self, syn: Syn, after_data: bool, now: Duration) -> bool {
+        if syn.version == Version::Original && is_damaged_one(&syn.bytes) {
+            self.syns = None;
+            return false;
+        }
+        let run = self.extended(syn);
+        self.syns = Some(run);
+        match syn.version {
+            Version::One => run.count >= if after_data { REBOOT_SYNS } else { 1 },
+            Version::Original => {
+                self.is_without_one(now)
+                    && (run.alike >= ORIGINAL_SYNS || run.count >= ORIGINAL_SYNS_UNLIKE)
+            }
+        }
+    }
+
+    fn extended(&self, syn: Syn) -> SynRun {
+        let (count, alike) = match &self.syns {
+            Some(run) if syn.continues(&run.last) => {
+                (run.count, if syn == run.last { run.alike } else { 0 })
+            }
+            _ => (0, 0),
+        };
+        SynRun {
+            last: syn,
+            count: count.saturating_add(1),
+            alike: alike.saturating_add(1),
+        }
+    }
+
+    /// The original board that `packet`, with those before it, shows to be running.
+    pub(super) fn believes_data(&mut self, packet: &Packet, now: Duration) -> Option<Callsign> {
+        let Some(callsign) = packet.payload.kind().comes_only_from() else {
+            self.data = None;
+            return None;
+        };
+        let count = match self.data {
+            Some(run) if run.callsign == callsign && run.last_id.next() == packet.id => {
+                run.count.saturating_add(1)
+            }
+            _ => 1,
+        };
+        self.data = Some(DataRun {
+            callsign,
+            last_id: packet.id,
+            count,
+        });
+        (count >= RUNNING_PACKETS && self.is_without_one(now)).then_some(callsign)
+    }
+
+    fn is_without_one(&self, now: Duration) -> bool {
+        self.without_one_since
+            .is_some_and(|since| now.saturating_sub(since) >= ORIGINAL_AFTER)
+    }
+}
+
+impl Syn {
+    /// Whether this SYN goes on where `last` was. Noise on the line of a version-1 board leaves
+    /// stray bytes between what looks like original SYNs; an original board leaves none.
+    fn continues(&self, last: &Self) -> bool {
+        self.version == last.version
+            && self.callsign == last.callsign
+            && (self.version == Version::One || self.skipped == last.skipped)
+    }
+}
+
+/// Whether an original SYN is really a version-1 SYN with a few wrong bits. Line faults can be
+/// steady, and then damaged SYNs are alike. A damaged header may also make the same bytes read as
+/// a SYN that starts elsewhere in the round of eleven, so every turn of it is compared.
+fn is_damaged_one(bytes: &[u8; PACKET_LENGTH]) -> bool {
+    let signs = [Callsign::Sensor, Callsign::Steering];
+    signs.into_iter().any(|sign| {
+        ResetCause::ALL.iter().any(|reset| {
+            let whole = handshake(SynAck::Syn, sign, *reset, Version::One);
+            (0..PACKET_LENGTH).any(|turn| {
+                let turned = whole.iter().cycle().skip(turn);
+                let wrong: u32 = turned
+                    .zip(bytes)
+                    .map(|(expected, found)| (expected ^ found).count_ones())
+                    .sum();
+                wrong <= DAMAGE_BITS
+            })
+        })
+    })
+}

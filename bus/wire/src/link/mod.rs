@@ -1,0 +1,48 @@
+//! Both ends of a line as pure machines: handshake, ids, loss.
+//!
+//! ```text
+//!  board                                   Pi
+//!    | -- SYN/board, every 100 ms ---------> |   believed at once if its CRC fits
+//!    | <------------------------- ACK/raspi -|   ids restart at 0 both ways
+//!    | -- data ----------------------------> |
+//!    | <--------------------- data ----------|
+//!    |                                       |
+//!    | <-- SYN/raspi, every 100 ms ----------|   a Pi that has just started, or hears nothing
+//!    | -- SYN/board at once ---------------> |   the board keeps running, only the ids restart
+//! ```
+//!
+//! Handshake packets stand outside the id count and carry id 0. They live beside each other so
+//! that they are tested against each other; neither does input or output nor reads a clock.
+
+mod board;
+mod evidence;
+mod host;
+mod transmitter;
+
+pub use board::{BoardEvent, BoardLink};
+pub use host::{HostEvent, HostLink, LinkCounters, Up};
+pub use transmitter::HostTransmitter;
+
+use crate::handshake::{Callsign, Handshake, ResetCause, SynAck, Version};
+use crate::packet::{PACKET_LENGTH, Packet, PacketId};
+use crate::payload::Payload;
+
+/// The bytes of a handshake packet.
+fn handshake(
+    kind: SynAck,
+    sign: Callsign,
+    reset: ResetCause,
+    version: Version,
+) -> [u8; PACKET_LENGTH] {
+    let handshake = Handshake {
+        kind,
+        sign,
+        version,
+        reset,
+    };
+    Packet {
+        id: PacketId::default(),
+        payload: Payload::Handshake(handshake),
+    }
+    .encode(version)
+}

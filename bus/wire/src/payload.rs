@@ -1,0 +1,161 @@
+//! What a packet carries: one payload per kind, and the rules every payload keeps.
+//!
+//! The layouts stand beside their types; here is only the choice between them. Version 1 checks
+//! every byte it can (unused bytes, complements, ranges), the original checks what it must.
+
+use crate::board::{ArmData, BoardStatus};
+use crate::coded::coded;
+use crate::handshake::{Callsign, Handshake, Version};
+use crate::line::{Centimetres, LineBits, LineState};
+use crate::setting::{Setting, SettingReply};
+use crate::steer::{SteerCommand, SteerData};
+
+/// How many payload bytes a full packet has (U7).
+pub const PAYLOAD_LENGTH: usize = 8;
+
+/// The payload part of a packet; bytes beyond a short packet's payload are 0.
+pub(crate) type Bytes = [u8; PAYLOAD_LENGTH];
+
+/// The payload byte that breaks a rule.
+pub(crate) struct Fault {
+    pub(crate) index: u8,
+}
+
+/// Version 1's rule that bytes without a meaning are 0.
+pub(crate) fn unused_from(first: u8, payload: &Bytes) -> Result<(), Fault> {
+    match (first..)
+        .zip(&payload[usize::from(first)..])
+        .find(|(_, byte)| **byte != 0)
+    {
+        Some((index, _)) => Err(Fault { index }),
+        None => Ok(()),
+    }
+}
+
+coded! {
+    /// A packet's kind, the high nibble of its first byte (U5). 6 to 9 exist in version 1 only.
+    pub enum Kind {
+        /// SYN or ACK.
+        Handshake = 0,
+        /// The robot's position on the line.
+        LineData = 1,
+        /// What the IR sensor sees.
+        Distance = 2,
+        /// The eleven line sensors as they are (AMB-11).
+        RawLine = 3,
+        /// A command to the steering board.
+        SteerCommand = 4,
+        /// What the steering board does (AMB-12).
+        SteerData = 5,
+        /// A setting to a board.
+        Setting = 6,
+        /// The board's answer to a setting.
+        SettingReply = 7,
+        /// One servo of the arm.
+        ArmData = 8,
+        /// How a board is.
+        BoardStatus = 9,
+    }
+}
+
+impl Kind {
+    /// Whether this kind exists in a version.
+    pub const fn exists_in(self, version: Version) -> bool {
+        match version {
+            Version::Original => self.code() <= Self::SteerData.code(),
+            Version::One => true,
+        }
+    }
+
+    /// The board that alone sends this kind, if one does.
+    pub const fn comes_only_from(self) -> Option<Callsign> {
+        match self {
+            Self::LineData | Self::Distance | Self::RawLine => Some(Callsign::Sensor),
+            Self::SteerData | Self::ArmData => Some(Callsign::Steering),
+            Self::Handshake
+            | Self::SteerCommand
+            | Self::Setting
+            | Self::SettingReply
+            | Self::BoardStatus => None,
+        }
+    }
+}
+
+/// A packet's content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Payload {
+    /// SYN or ACK.
+    Handshake(Handshake),
+    /// The robot's position on the line.
+    Line(LineState),
+    /// What the IR sensor sees.
+    Distance(Centimetres),
+    /// The eleven line sensors as they are.
+    RawLine(LineBits),
+    /// A command to the steering board.
+    SteerCommand(SteerCommand),
+    /// What the steering board does.
+    SteerData(SteerData),
+    /// A setting to a board.
+    Setting(Setting),
+    /// The board's answer to a setting.
+    SettingReply(SettingReply),
+    /// One servo of the arm.
+    ArmData(ArmData),
+    /// How a board is.
+    BoardStatus(BoardStatus),
+}
+
+impl Payload {
+    /// The kind that the packet's header states.
+    pub const fn kind(&self) -> Kind {
+        match self {
+            Self::Handshake(_) => Kind::Handshake,
+            Self::Line(_) => Kind::LineData,
+            Self::Distance(_) => Kind::Distance,
+            Self::RawLine(_) => Kind::RawLine,
+            Self::SteerCommand(_) => Kind::SteerCommand,
+            Self::SteerData(_) => Kind::SteerData,
+            Self::Setting(_) => Kind::Setting,
+            Self::SettingReply(_) => Kind::SettingReply,
+            Self::ArmData(_) => Kind::ArmData,
+            Self::BoardStatus(_) => Kind::BoardStatus,
+        }
+    }
+
+    pub(crate) fn write(&self, version: Version, payload: &mut Bytes) {
+        match self {
+            Self::Handshake(handshake) => handshake.write(version, payload),
+            Self::Line(state) => state.write(payload),
+            Self::Distance(distance) => distance.write(payload),
+            Self::RawLine(bits) => bits.write(payload),
+            Self::SteerCommand(command) => command.write(version, payload),
+            Self::SteerData(data) => data.write(version, payload),
+            Self::Setting(setting) => setting.write(payload),
+            Self::SettingReply(reply) => reply.write(payload),
+            Self::ArmData(data) => data.write(payload),
+            Self::BoardStatus(status) => status.write(payload),
+        }
+    }
+
+    /// `given` is how many of the bytes the packet really had.
+    pub(crate) fn read(
+        kind: Kind,
+        version: Version,
+        payload: &Bytes,
+        given: usize,
+    ) -> Result<Self, Fault> {
+        Ok(match kind {
+            Kind::Handshake => Self::Handshake(Handshake::read(version, payload)?),
+            Kind::LineData => Self::Line(LineState::read(version, payload)?),
+            Kind::Distance => Self::Distance(Centimetres::read(version, payload)?),
+            Kind::RawLine => Self::RawLine(LineBits::read(version, payload, given)?),
+            Kind::SteerCommand => Self::SteerCommand(SteerCommand::read(version, payload, given)?),
+            Kind::SteerData => Self::SteerData(SteerData::read(version, payload)?),
+            Kind::Setting => Self::Setting(Setting::read(payload)?),
+            Kind::SettingReply => Self::SettingReply(SettingReply::read(payload)?),
+            Kind::ArmData => Self::ArmData(ArmData::read(payload)?),
+            Kind::BoardStatus => Self::BoardStatus(BoardStatus::read(payload)?),
+        })
+    }
+}

@@ -1,0 +1,12 @@
+//! The wire protocol from outside: bytes in, packets and events out.
+
+mod commands;
+mod errors;
+mod golden;
+mod line;
+mod link;
+mod noise;
+mod original;
+mod reset;
+mod sample;
+mod split;

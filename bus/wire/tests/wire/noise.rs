@@ -1,0 +1,140 @@
+//! Ten megabytes of noise, by both rules.
+//!
+//! The decoder has a fixed size and cannot allocate, so "no growth" holds by construction; what is
+//! shown here is that it never panics, how little noise passes, and that it comes back at once.
+
+use lager_wire::{Decoder, Version};
+
+use crate::sample::{Noise, distance};
+
+const MEGABYTES_10: usize = 10_000_000;
+
+/// Noise that is as like packets as noise can be: mostly bytes that are headers and lengths.
+fn hostile(noise: &mut Noise) -> u8 {
+    match noise.number() >> 61 {
+        0 | 1 => 11,
+        2 => 0,
+        3 => noise.byte() & 0x0F,
+        4 => noise.byte() & 0x5F,
+        5 => 0xFF,
+        _ => noise.byte(),
+    }
+}
+
+fn packets_in_noise(version: Version, seed: u64, byte: fn(&mut Noise) -> u8) -> u32 {
+    let mut noise = Noise::new(seed);
+    let mut decoder = Decoder::new(version);
+    let mut passed = 0;
+    for _ in 0..MEGABYTES_10 {
+        passed += u32::from(decoder.push(byte(&mut noise)).is_some());
+    }
+    assert_eq!(decoder.counters().packets, passed);
+    let skipped = decoder.counters().skipped_bytes;
+    assert!(usize::try_from(skipped).unwrap() <= MEGABYTES_10);
+    passed
+}
+
+#[test]
+fn noise_hardly_ever_passes_as_a_version_one_packet() {
+    // Expected by the odds: 10 of 16 kinds, 1 of 256 lengths and 1 of 256 check values leave
+    // 95 windows of 10 MB; rules on the content leave well under one.
+    assert_eq!(packets_in_noise(Version::One, 1, Noise::byte), 0);
+    let like_packets = packets_in_noise(Version::One, 2, hostile);
+    println!("version 1: {like_packets} packets in 10 MB of hostile noise");
+    assert!(like_packets < 1_000, "{like_packets}");
+}
+
+#[test]
+fn noise_seldom_passes_as_an_original_packet() {
+    // Without a check value only structure is left: a few packets per megabyte. A link believes
+    // none of it before eight consecutive ids.
+    let plain = packets_in_noise(Version::Original, 3, Noise::byte);
+    println!("original: {plain} packets in 10 MB of noise");
+    assert!(plain < 300, "{plain}");
+    // Hostile noise is full of original packets; here it only has to be survived.
+    let like_packets = packets_in_noise(Version::Original, 4, hostile);
+    println!("original: {like_packets} packets in 10 MB of hostile noise");
+}
+
+#[test]
+fn the_first_version_one_packet_behind_noise_is_accepted() {
+    let mut noise = Noise::new(5);
+    let mut decoder = Decoder::new(Version::One);
+    for round in 0..20_000 {
+        let length = noise.number() % 40;
+        for _ in 0..length {
+            decoder.push(noise.byte());
+        }
+        let sent = distance(round as u8, 37);
+        let received: Vec<_> = sent
+            .encode(Version::One)
+            .into_iter()
+            .filter_map(|byte| decoder.push(byte))
+            .collect();
+        assert_eq!(received, [sent], "round {round}");
+    }
+}
+
+#[test]
+fn behind_noise_at_most_one_original_packet_is_missed() {
+    let mut noise = Noise::new(6);
+    for round in 0..20_000 {
+        let mut decoder = Decoder::new(Version::Original);
+        for _ in 0..noise.number() % 200 {
+            decoder.push(noise.byte());
+        }
+        let first = noise.byte();
+        let sent: Vec<_> = (0..6)
+            .map(|n| distance(first.wrapping_add(n), 37))
+            .collect();
+        let received: Vec<_> = sent
+            .iter()
+            .flat_map(|packet| packet.encode(Version::Original))
+            .filter_map(|byte| decoder.push(byte))
+            .collect();
+        // The last one that was sent is the last one received, and none from the second on is
+        // missing. What noise made up may stand before.
+        assert!(
+            received.ends_with(&sent[1..]),
+            "round {round}: {received:?}"
+        );
+    }
+}
+
+#[test]
+fn a_decoder_that_is_in_step_gives_an_original_packet_at_its_last_byte() {
+    let mut decoder = Decoder::new(Version::Original);
+    for id in 0..40 {
+        let bytes = distance(id, 80).encode(Version::Original);
+        let (last, rest) = bytes.split_last().unwrap();
+        for byte in rest {
+            let held = decoder.push(*byte);
+            // Only the very first waits, for the header of the second.
+            assert_eq!(held.is_some(), id == 1 && held == Some(distance(0, 80)));
+        }
+        assert_eq!(decoder.push(*last).is_some(), id > 0);
+    }
+    assert_eq!(decoder.counters().packets, 40);
+    assert_eq!(decoder.counters().skipped_bytes, 0);
+}
+
+#[test]
+fn a_lost_byte_costs_an_original_board_one_packet() {
+    for cut in 0..11 {
+        let mut decoder = Decoder::new(Version::Original);
+        let mut received = Vec::new();
+        for id in 0..20 {
+            let bytes = distance(id, 80).encode(Version::Original);
+            for (index, byte) in bytes.into_iter().enumerate() {
+                if id == 7 && index == cut {
+                    continue;
+                }
+                received.extend(decoder.push(byte));
+            }
+        }
+        let ids: Vec<_> = received.iter().map(|packet| packet.id.get()).collect();
+        let missing = (0..16).filter(|id| !ids.contains(id)).count();
+        assert!(missing <= 1, "byte {cut} lost: {ids:?}");
+        assert_eq!(ids.last(), Some(&(19 % 16)));
+    }
+}

@@ -1,0 +1,174 @@
+//! Writing packets into a fixed buffer.
+
+use core::fmt;
+
+use crate::{BROADCAST_ID, ErrorBits, HEADER, Instruction, MAX_FRAME, OVERHEAD, checksum};
+
+/// Why a packet could not be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EncodeError {
+    /// More parameters than [`MAX_FRAME`] has room for.
+    TooLong {
+        /// Bytes the packet would have had.
+        length: usize,
+    },
+    /// A servo of a SYNC_WRITE has another number of values than the first.
+    UnevenValues {
+        /// Id of that servo.
+        id: u8,
+    },
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooLong { length } => {
+                write!(
+                    f,
+                    "the packet would have {length} bytes, split it: {MAX_FRAME} fit"
+                )
+            }
+            Self::UnevenValues { id } => {
+                write!(
+                    f,
+                    "servo {id} has another number of values than the first, give every servo the same"
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// One finished packet, ready for the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame {
+    bytes: [u8; MAX_FRAME],
+    length: u8,
+}
+
+impl Frame {
+    /// The packet's bytes, header to checksum.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes[..usize::from(self.length)]
+    }
+
+    /// Asks servo `id` for a sign of life.
+    #[must_use]
+    pub fn ping(id: u8) -> Self {
+        Self::fitting(id, Instruction::Ping, &[])
+    }
+
+    /// Asks servo `id` for `count` registers from `address` on.
+    #[must_use]
+    pub fn read(id: u8, address: u8, count: u8) -> Self {
+        Self::fitting(id, Instruction::Read, &[address, count])
+    }
+
+    /// Writes `values` from `address` on, at once.
+    pub fn write(id: u8, address: u8, values: &[u8]) -> Result<Self, EncodeError> {
+        Builder::new(id, Instruction::Write.code())
+            .byte(address)
+            .bytes(values)
+            .finish()
+    }
+
+    /// Writes `values` from `address` on when [`Frame::action`] comes.
+    pub fn reg_write(id: u8, address: u8, values: &[u8]) -> Result<Self, EncodeError> {
+        Builder::new(id, Instruction::RegWrite.code())
+            .byte(address)
+            .bytes(values)
+            .finish()
+    }
+
+    /// Carries out the writes held back; to all servos with [`BROADCAST_ID`].
+    #[must_use]
+    pub fn action(id: u8) -> Self {
+        Self::fitting(id, Instruction::Action, &[])
+    }
+
+    /// Writes the same registers of several servos at once. Nobody answers.
+    pub fn sync_write(address: u8, servos: &[(u8, &[u8])]) -> Result<Self, EncodeError> {
+        let width = servos.first().map_or(0, |(_, values)| values.len());
+        let mut builder = Builder::new(BROADCAST_ID, Instruction::SyncWrite.code())
+            .byte(address)
+            .byte(u8::try_from(width).unwrap_or(u8::MAX));
+        for (id, values) in servos {
+            if values.len() != width {
+                return Err(EncodeError::UnevenValues { id: *id });
+            }
+            builder = builder.byte(*id).bytes(values);
+        }
+        builder.finish()
+    }
+
+    /// Any instruction with any parameters.
+    pub fn instruction(
+        id: u8,
+        instruction: Instruction,
+        parameters: &[u8],
+    ) -> Result<Self, EncodeError> {
+        Builder::new(id, instruction.code())
+            .bytes(parameters)
+            .finish()
+    }
+
+    /// A servo's answer.
+    pub fn status(id: u8, errors: ErrorBits, parameters: &[u8]) -> Result<Self, EncodeError> {
+        Builder::new(id, errors.bits()).bytes(parameters).finish()
+    }
+
+    /// A packet whose at most two parameters are sure to fit.
+    fn fitting(id: u8, instruction: Instruction, parameters: &[u8]) -> Self {
+        debug_assert!(parameters.len() <= 2);
+        Builder::new(id, instruction.code())
+            .bytes(parameters)
+            .close()
+    }
+}
+
+/// A packet under construction. It goes on counting when the buffer is full, so that the error can tell.
+struct Builder {
+    bytes: [u8; MAX_FRAME],
+    used: usize,
+}
+
+impl Builder {
+    fn new(id: u8, code: u8) -> Self {
+        let mut bytes = [0; MAX_FRAME];
+        bytes[..5].copy_from_slice(&[HEADER[0], HEADER[1], id, 0, code]);
+        Self { bytes, used: 5 }
+    }
+
+    fn byte(mut self, byte: u8) -> Self {
+        if let Some(place) = self.bytes.get_mut(self.used) {
+            *place = byte;
+        }
+        self.used += 1;
+        self
+    }
+
+    fn bytes(self, bytes: &[u8]) -> Self {
+        bytes.iter().fold(self, |builder, byte| builder.byte(*byte))
+    }
+
+    fn finish(self) -> Result<Frame, EncodeError> {
+        if self.used >= MAX_FRAME {
+            return Err(EncodeError::TooLong {
+                length: self.used + 1,
+            });
+        }
+        Ok(self.close())
+    }
+
+    fn close(mut self) -> Frame {
+        let parameters = self.used + 1 - OVERHEAD;
+        self.bytes[3] = (parameters + 2) as u8;
+        self.bytes[self.used] = checksum(&self.bytes[2..self.used]);
+        Frame {
+            bytes: self.bytes,
+            length: (self.used + 1) as u8,
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! The arm: eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6, AMB-29..32).
+//!
+//! ```text
+//!   id   1 base   2+3 shoulder   4+5 elbow   6 wrist   7 wrist rotation   8 gripper
+//!
+//!   position grows:  1 to the left   2 up   4 out   6 tilting the gripper up
+//!                    7 counter-clockwise   8 opening
+//!   3 and 5 face their partners: their position is 1023 minus the partner's
+//! ```
+//!
+//! What the module does with its one wire, most urgent first: the command under way ([`program`]), bringing
+//! a servo into service, looking at one servo after the other. A servo is brought into service without
+//! moving it, so that nothing held is dropped when the board restarts:
+//!
+//! ```text
+//!              answers             goal = position         torque on
+//!   unseen ---------------> seen -----------------> held ------------> ready
+//!   missing <----------- no answer, twice, wherever it happens ---------'
+//!      '-- answers ------^
+//! ```
+//!
+//! A missing servo never holds up the others: it is flagged, left out, and asked again in its turn.
+
+mod config;
+mod program;
+mod servo;
+
+use lager_ax12::ErrorBits;
+use lager_wire::{ArmCommand, ArmData};
+
+pub use config::{ArmConfig, Limits, Pose};
+pub use program::Outcome;
+use program::Program;
+use servo::{Servo, Setup};
+
+use crate::SteeringBoard;
+use crate::servo_bus::{Answer, ServoBus};
+use crate::time::{first, reached};
+
+/// How many servos the arm has; ids 1..=8, at index id - 1.
+pub const SERVOS: usize = 8;
+
+/// Index of the base's servo.
+pub(crate) const BASE: usize = 0;
+/// Index of the shoulder's first servo.
+pub(crate) const SHOULDER: usize = 1;
+/// Index of the elbow's first servo.
+pub(crate) const ELBOW: usize = 3;
+/// Index of the wrist's servo.
+pub(crate) const WRIST: usize = 5;
+/// Index of the wrist rotation's servo.
+pub(crate) const ROTATION: usize = 6;
+/// Index of the gripper's servo.
+pub(crate) const GRIPPER: usize = 7;
+
+/// The servo that faces this one, if the joint has two.
+pub(crate) const fn partner(index: usize) -> Option<usize> {
+    match index {
+        SHOULDER => Some(SHOULDER + 1),
+        ELBOW => Some(ELBOW + 1),
+        _ => None,
+    }
+}
+
+const fn id(index: usize) -> u8 {
+    index as u8 + 1
+}
+
+const fn bit(index: usize) -> u8 {
+    1 << index
+}
+
+/// One question to a servo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Job {
+    Look(usize),
+    Goal { index: usize, speed: u16 },
+    SwitchOn(usize),
+}
+
+impl Job {
+    const fn index(self) -> usize {
+        match self {
+            Self::Look(index) | Self::Goal { index, .. } | Self::SwitchOn(index) => index,
+        }
+    }
+}
+
+/// The arm's servos and what they are doing.
+#[derive(Debug, Clone)]
+pub struct Arm {
+    config: ArmConfig,
+    bus: ServoBus,
+    servos: [Servo; SERVOS],
+    program: Program,
+    /// The question under way and whether the program asked it.
+    asked: Option<(Job, bool)>,
+    /// Servos the program has moved or tried to.
+    touched: u8,
+    /// Whether a servo the program needs has failed.
+    failed: bool,
+    finished: Option<Outcome>,
+    /// Servos whose state is to be told to the Pi.
+    untold: u8,
+    next_round: usize,
+    round_due_us: u32,
+}
+
+impl Arm {
+    /// An arm nobody has looked at yet.
+    #[must_use]
+    pub fn new(config: ArmConfig, now_us: u32) -> Self {
+        Self {
+            bus: ServoBus::new(config.reply_timeout_us),
+            config,
+            servos: [Servo::default(); SERVOS],
+            program: Program::Idle,
+            asked: None,
+            touched: 0,
+            failed: false,
+            finished: None,
+            untold: 0,
+            next_round: 0,
+            round_due_us: now_us,
+        }
+    }
+
+    /// Whether a command is under way, or its end not yet fetched.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        !matches!(self.program, Program::Idle) || self.finished.is_some()
+    }
+
+    /// Begins a command; `false`, and nothing happens, while [`Arm::is_busy`].
+    pub fn start(&mut self, command: ArmCommand, now_us: u32) -> bool {
+        if self.is_busy() {
+            return false;
+        }
+        self.touched = 0;
+        self.failed = false;
+        self.begin(command, now_us);
+        true
+    }
+
+    /// Stops the command under way where it is. [`Arm::poll`] tells when that is done.
+    pub fn abort(&mut self) {
+        let mut being_written = 0;
+        if let Some((job, by_program)) = &mut self.asked
+            && core::mem::take(by_program)
+            && matches!(job, Job::Goal { .. })
+        {
+            being_written = bit(job.index());
+        }
+        self.break_off(being_written);
+    }
+
+    /// Takes in what the servos sent and puts the next question. The end of a command, once.
+    pub fn poll(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Outcome> {
+        if let Some(answer) = self.bus.poll(board, now_us)
+            && let Some((job, by_program)) = self.asked.take()
+        {
+            let fine = self.note(job, answer);
+            if by_program {
+                self.proceed(job, fine, now_us);
+            }
+        }
+        if self.bus.is_idle() {
+            self.asked = self.choose(now_us);
+            if let Some((job, _)) = self.asked {
+                self.ask(job, board, now_us);
+            }
+        }
+        self.finished.take()
+    }
+
+    /// When [`Arm::poll`] is wanted at the latest.
+    #[must_use]
+    pub fn next_due_us(&self, now_us: u32) -> u32 {
+        if let Some(due_us) = self.bus.next_due_us() {
+            return due_us;
+        }
+        let round_due_us = if self.unfinished_setup().is_some() { now_us } else { self.round_due_us };
+        match self.program_due_us(now_us) {
+            Some(due_us) => first(now_us, due_us, round_due_us),
+            None => round_due_us,
+        }
+    }
+
+    /// A servo's state that the Pi has not been told, if there is one; telling it is then done.
+    pub fn take_report(&mut self) -> Option<ArmData> {
+        let index = self.untold_index()?;
+        self.untold &= !bit(index);
+        let servo = &self.servos[index];
+        Some(ArmData {
+            servo: id(index),
+            errors: servo.errors.bits(),
+            position: servo.look.position,
+            load: servo.look.load,
+            decivolts: servo.look.decivolts,
+            celsius: servo.look.celsius,
+        })
+    }
+
+    /// Whether [`Arm::take_report`] has something.
+    #[must_use]
+    pub fn has_report(&self) -> bool {
+        self.untold_index().is_some()
+    }
+
+    /// Has every servo's state told again, as to a Pi that has just come.
+    pub fn tell_all(&mut self) {
+        self.untold = u8::MAX;
+    }
+
+    /// Servos in trouble, id 1 in bit 0: missing, stuck, or reporting an error.
+    #[must_use]
+    pub fn errors(&self) -> u8 {
+        let mut errors = 0;
+        for (index, servo) in self.servos.iter().enumerate() {
+            if servo.is_in_trouble() {
+                errors |= bit(index);
+            }
+        }
+        errors
+    }
+
+    /// Questions that stayed without an answer, saturating.
+    #[must_use]
+    pub fn timeouts(&self) -> u8 {
+        self.bus.timeouts()
+    }
+
+    fn untold_index(&self) -> Option<usize> {
+        (0..SERVOS).find(|index| self.untold & bit(*index) != 0 && self.servos[*index].is_seen())
+    }
+
+    fn unfinished_setup(&self) -> Option<Job> {
+        self.servos.iter().enumerate().find_map(|(index, servo)| match servo.setup {
+            Setup::Unseen => Some(Job::Look(index)),
+            Setup::Seen => Some(Job::Goal { index, speed: self.config.sequence_speed }),
+            Setup::Held => Some(Job::SwitchOn(index)),
+            Setup::Ready | Setup::Missing => None,
+        })
+    }
+
+    fn choose(&mut self, now_us: u32) -> Option<(Job, bool)> {
+        if let Some(job) = self.program_job(now_us) {
+            return Some((job, true));
+        }
+        if let Some(job) = self.unfinished_setup() {
+            return Some((job, false));
+        }
+        if !reached(now_us, self.round_due_us) {
+            return None;
+        }
+        let index = self.next_round;
+        self.next_round = (index + 1) % SERVOS;
+        self.round_due_us = now_us.wrapping_add(self.config.round_period_us);
+        self.untold |= bit(index);
+        Some((Job::Look(index), false))
+    }
+
+    fn ask(&mut self, job: Job, board: &mut impl SteeringBoard, now_us: u32) {
+        match job {
+            Job::Look(index) => self.bus.look(id(index), board, now_us),
+            Job::Goal { index, speed } => {
+                let values = (self.servos[index].goal, speed, self.config.torque_limit);
+                self.bus.set_goal(id(index), values, board, now_us);
+            }
+            Job::SwitchOn(index) => self.bus.switch_on(id(index), board, now_us),
+        }
+    }
+
+    /// Writes an answer down; whether the servo did what it was asked.
+    fn note(&mut self, job: Job, answer: Answer) -> bool {
+        const NOT_DONE: ErrorBits =
+            ErrorBits::CHECKSUM.union(ErrorBits::INSTRUCTION).union(ErrorBits::RANGE);
+        let servo = &mut self.servos[job.index()];
+        let Answer::Status { errors, look } = answer else {
+            servo.setup = Setup::Missing;
+            return false;
+        };
+        servo.errors = errors;
+        let done = !errors.intersects(NOT_DONE);
+        match (job, look) {
+            (Job::Look(_), Some(look)) => servo.seen(look),
+            (Job::Look(_), None) => {
+                servo.setup = Setup::Missing;
+                return false;
+            }
+            (Job::Goal { .. }, _) if servo.setup == Setup::Seen => {
+                servo.setup = if done { Setup::Held } else { Setup::Missing };
+            }
+            (Job::SwitchOn(_), _) => {
+                servo.setup = if done { Setup::Ready } else { Setup::Missing };
+            }
+            (Job::Goal { .. }, _) => {}
+        }
+        done
+    }
+}

@@ -1,0 +1,427 @@
+//! The commands of the arm while they run (K, A6).
+//!
+//! ```text
+//!   step, Release   Move
+//!   Drop            Move to the drop pose --> Move: open --> Move to the carry pose
+//!   Squeeze         write a step closer --> pause, look --> load, no movement, closed: over
+//!                        ^----------------------'
+//!
+//!   Move:    write every goal --> look at the servos not yet there, one after the other
+//!            A servo leaves the list when it has arrived, rests, is overloaded, does not answer,
+//!            or the time is up.
+//!
+//!   abort:   Move --> Freeze: look where each moving servo is, make that its goal
+//! ```
+//!
+//! Every state ends: each question has a time-out, each Move a deadline, and a squeeze has no more steps
+//! than the gripper has way.
+
+use lager_ax12::{ErrorBits, table};
+use lager_wire::ArmCommand;
+
+use super::servo::NEAR_GOAL;
+use super::{
+    Arm, BASE, ELBOW, GRIPPER, Job, Pose, ROTATION, SERVOS, SHOULDER, WRIST, bit, partner,
+};
+use crate::time::reached;
+
+/// How a command of the arm ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// It was carried out.
+    Done,
+    /// It was broken off, or a servo it needs did not do its part.
+    Aborted,
+}
+
+/// Steps of a squeeze without movement after which something is held (AMB-29).
+const STILL_STEPS: u8 = 4;
+
+/// Errors with which a servo switches its torque off.
+const GIVES_UP: ErrorBits = ErrorBits::OVERLOAD.union(ErrorBits::OVERHEATING);
+
+/// What a command is doing.
+#[derive(Debug, Clone)]
+pub(super) enum Program {
+    Idle,
+    Move(Move),
+    Squeeze(Squeeze),
+    Freeze(Freeze),
+}
+
+/// Servos under way to their goals.
+#[derive(Debug, Clone)]
+pub(super) struct Move {
+    /// Goals still to be written.
+    write: u8,
+    /// Servos not yet there.
+    wait: u8,
+    /// Servos that stood still when last looked at.
+    resting: u8,
+    last_looked: usize,
+    speed: u16,
+    tolerance: u16,
+    timeout_us: u32,
+    deadline_us: u32,
+    look_due_us: u32,
+    then: Then,
+}
+
+/// What follows a Move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Then {
+    Nothing,
+    Open,
+    Raise,
+}
+
+/// The gripper closing.
+#[derive(Debug, Clone)]
+pub(super) struct Squeeze {
+    /// Whether the next thing is to write a step.
+    stepping: bool,
+    look_due_us: u32,
+    last_position: u16,
+    still: u8,
+}
+
+/// Moving servos being stopped where they are.
+#[derive(Debug, Clone)]
+pub(super) struct Freeze {
+    left: u8,
+    /// Whether the first of them was looked at and its goal set to where it is.
+    looked: bool,
+}
+
+impl Arm {
+    pub(super) fn begin(&mut self, command: ArmCommand, now_us: u32) {
+        match command {
+            ArmCommand::Left => self.step(BASE, true, now_us),
+            ArmCommand::Right => self.step(BASE, false, now_us),
+            ArmCommand::Up => self.step(SHOULDER, true, now_us),
+            ArmCommand::Down => self.step(SHOULDER, false, now_us),
+            ArmCommand::Out => self.step(ELBOW, true, now_us),
+            ArmCommand::In => self.step(ELBOW, false, now_us),
+            ArmCommand::CounterClockwise => self.step(ROTATION, true, now_us),
+            ArmCommand::Clockwise => self.step(ROTATION, false, now_us),
+            ArmCommand::Squeeze => self.squeeze(now_us),
+            ArmCommand::Release => self.open(Then::Nothing, now_us),
+            ArmCommand::Drop => self.take_pose(self.config.drop, Then::Open, now_us),
+        }
+    }
+
+    /// Ends the command. `being_written` is the servo whose new goal is on the wire, as a bit.
+    pub(super) fn break_off(&mut self, being_written: u8) {
+        let moving = match &self.program {
+            Program::Idle | Program::Freeze(_) => return,
+            Program::Move(movement) => movement.wait & (!movement.write | being_written),
+            // A squeeze is at most one small step from standing, and what it holds shall stay held.
+            Program::Squeeze(_) => 0,
+        };
+        self.failed = true;
+        self.program = Program::Freeze(Freeze { left: moving, looked: false });
+        if moving == 0 {
+            self.finish();
+        }
+    }
+
+    pub(super) fn program_job(&mut self, now_us: u32) -> Option<Job> {
+        match &mut self.program {
+            Program::Idle => None,
+            Program::Move(movement) => {
+                if let Some(index) = lowest(movement.write) {
+                    return Some(Job::Goal { index, speed: movement.speed });
+                }
+                if !reached(now_us, movement.look_due_us) {
+                    return None;
+                }
+                let after = movement.last_looked + 1;
+                let index = (after..after + SERVOS)
+                    .map(|index| index % SERVOS)
+                    .find(|index| movement.wait & bit(*index) != 0)?;
+                movement.last_looked = index;
+                Some(Job::Look(index))
+            }
+            Program::Squeeze(squeeze) if squeeze.stepping => {
+                Some(Job::Goal { index: GRIPPER, speed: self.config.step_speed })
+            }
+            Program::Squeeze(squeeze) => {
+                reached(now_us, squeeze.look_due_us).then_some(Job::Look(GRIPPER))
+            }
+            Program::Freeze(freeze) => {
+                let index = lowest(freeze.left)?;
+                Some(if freeze.looked {
+                    Job::Goal { index, speed: self.config.sequence_speed }
+                } else {
+                    Job::Look(index)
+                })
+            }
+        }
+    }
+
+    pub(super) fn program_due_us(&self, now_us: u32) -> Option<u32> {
+        match &self.program {
+            Program::Idle => None,
+            Program::Move(movement) if movement.write == 0 => Some(movement.look_due_us),
+            Program::Squeeze(squeeze) if !squeeze.stepping => Some(squeeze.look_due_us),
+            Program::Move(_) | Program::Squeeze(_) | Program::Freeze(_) => Some(now_us),
+        }
+    }
+
+    /// The program's question was answered; `fine` when the servo did what it was asked.
+    pub(super) fn proceed(&mut self, job: Job, fine: bool, now_us: u32) {
+        match core::mem::replace(&mut self.program, Program::Idle) {
+            Program::Idle => {}
+            Program::Move(movement) => self.proceed_move(movement, job, fine, now_us),
+            Program::Squeeze(squeeze) => self.proceed_squeeze(squeeze, job, fine, now_us),
+            Program::Freeze(freeze) => self.proceed_freeze(freeze, job, fine),
+        }
+    }
+
+    fn finish(&mut self) {
+        self.program = Program::Idle;
+        self.untold |= self.touched;
+        self.finished = Some(if self.failed { Outcome::Aborted } else { Outcome::Done });
+    }
+
+    /// One small step of a joint.
+    fn step(&mut self, joint: usize, forward: bool, now_us: u32) {
+        let partner = partner(joint);
+        let base = match partner {
+            Some(partner) if !self.servos[joint].is_ready() => {
+                table::MAX_POSITION - self.servos[partner].base()
+            }
+            _ => self.servos[joint].base(),
+        };
+        let step = self.config.step;
+        let goal = if forward { base.saturating_add(step) } else { base.saturating_sub(step) };
+        let mut goals = Goals::default();
+        goals.joint(joint, self.config.limits[joint].clamp(goal));
+        let (speed, timeout_us) = (self.config.step_speed, self.config.step_timeout_us);
+        self.go(&goals, Way { speed, timeout_us, tolerance: 1, then: Then::Nothing }, now_us);
+    }
+
+    fn take_pose(&mut self, pose: Pose, then: Then, now_us: u32) {
+        let mut goals = Goals::default();
+        for (joint, position) in
+            [(BASE, pose.base), (SHOULDER, pose.shoulder), (ELBOW, pose.elbow), (WRIST, pose.wrist)]
+        {
+            goals.joint(joint, self.config.limits[joint].clamp(position));
+        }
+        self.go_softly(&goals, then, now_us);
+    }
+
+    fn open(&mut self, then: Then, now_us: u32) {
+        let mut goals = Goals::default();
+        goals.joint(GRIPPER, self.config.limits[GRIPPER].clamp(self.config.gripper_open));
+        self.go_softly(&goals, then, now_us);
+    }
+
+    fn go_softly(&mut self, goals: &Goals, then: Then, now_us: u32) {
+        let (speed, timeout_us) = (self.config.sequence_speed, self.config.sequence_timeout_us);
+        self.go(goals, Way { speed, timeout_us, tolerance: 6, then }, now_us);
+    }
+
+    /// Sends servos to their goals; those out of service are left out.
+    fn go(&mut self, goals: &Goals, way: Way, now_us: u32) {
+        let mut write = 0;
+        for index in 0..SERVOS {
+            let Some(goal) = goals.0[index] else { continue };
+            self.touched |= bit(index);
+            if self.servos[index].is_ready() {
+                self.servos[index].goal = goal;
+                self.servos[index].stuck = false;
+                write |= bit(index);
+            } else {
+                self.failed = true;
+            }
+        }
+        let movement = Move {
+            write,
+            wait: write,
+            resting: 0,
+            last_looked: 0,
+            speed: way.speed,
+            tolerance: way.tolerance,
+            timeout_us: way.timeout_us,
+            deadline_us: now_us.wrapping_add(way.timeout_us),
+            look_due_us: now_us,
+            then: way.then,
+        };
+        self.go_on(movement, now_us);
+    }
+
+    fn proceed_move(&mut self, mut movement: Move, job: Job, fine: bool, now_us: u32) {
+        let index = job.index();
+        if !fine {
+            movement.write &= !bit(index);
+            movement.wait &= !bit(index);
+            self.failed = true;
+        } else if let Job::Goal { .. } = job {
+            movement.write &= !bit(index);
+            movement.deadline_us = now_us.wrapping_add(movement.timeout_us);
+        } else {
+            self.judge(&mut movement, index);
+        }
+        movement.look_due_us = now_us.wrapping_add(self.config.look_period_us);
+        if movement.write == 0 && movement.wait != 0 && reached(now_us, movement.deadline_us) {
+            self.give_up(&mut movement);
+        }
+        self.go_on(movement, now_us);
+    }
+
+    /// Whether a servo that was looked at is where it should be, or will never be.
+    fn judge(&mut self, movement: &mut Move, index: usize) {
+        let servo = &self.servos[index];
+        let rests = !servo.look.moving;
+        if servo.errors.intersects(GIVES_UP) {
+            self.failed = true;
+        } else if !rests || servo.distance() > movement.tolerance {
+            // A servo that has not yet begun to move rests too; only the second time counts.
+            let rested = movement.resting & bit(index) != 0;
+            movement.resting &= !bit(index);
+            if !rests {
+                return;
+            }
+            movement.resting |= bit(index);
+            if !rested {
+                return;
+            }
+            self.note_stuck(index);
+        }
+        movement.wait &= !bit(index);
+    }
+
+    fn give_up(&mut self, movement: &mut Move) {
+        for index in 0..SERVOS {
+            if movement.wait & bit(index) != 0 {
+                self.note_stuck(index);
+            }
+        }
+        movement.wait = 0;
+    }
+
+    /// A servo that stopped short. A load bends every servo a little; only what is far off is a failure.
+    fn note_stuck(&mut self, index: usize) {
+        if self.servos[index].distance() > NEAR_GOAL {
+            self.servos[index].stuck = true;
+            self.failed = true;
+        }
+    }
+
+    fn go_on(&mut self, movement: Move, now_us: u32) {
+        if movement.write != 0 || movement.wait != 0 {
+            self.program = Program::Move(movement);
+            return;
+        }
+        match movement.then {
+            Then::Nothing => self.finish(),
+            Then::Open => self.open(Then::Raise, now_us),
+            Then::Raise => self.take_pose(self.config.carry, Then::Nothing, now_us),
+        }
+    }
+
+    fn squeeze(&mut self, now_us: u32) {
+        self.touched |= bit(GRIPPER);
+        if !self.servos[GRIPPER].is_ready() {
+            self.failed = true;
+            self.finish();
+            return;
+        }
+        self.servos[GRIPPER].stuck = false;
+        self.servos[GRIPPER].goal = self.closer(self.servos[GRIPPER].base());
+        self.program = Program::Squeeze(Squeeze {
+            stepping: true,
+            look_due_us: now_us,
+            last_position: self.servos[GRIPPER].look.position,
+            still: 0,
+        });
+    }
+
+    fn proceed_squeeze(&mut self, mut squeeze: Squeeze, job: Job, fine: bool, now_us: u32) {
+        if !fine {
+            self.failed = true;
+            self.finish();
+            return;
+        }
+        if let Job::Goal { .. } = job {
+            squeeze.stepping = false;
+            squeeze.look_due_us = now_us.wrapping_add(self.config.squeeze_period_us);
+            self.program = Program::Squeeze(squeeze);
+            return;
+        }
+        let servo = &self.servos[GRIPPER];
+        let position = servo.look.position;
+        if position == squeeze.last_position {
+            squeeze.still += 1;
+        } else {
+            squeeze.still = 0;
+            squeeze.last_position = position;
+        }
+        let gave_up = servo.errors.intersects(GIVES_UP);
+        let loaded = servo.look.load.unsigned_abs() >= self.config.squeeze_load;
+        let closed = servo.goal == self.closer(servo.goal) && servo.distance() <= self.config.step;
+        if gave_up || loaded || closed || squeeze.still >= STILL_STEPS {
+            self.failed |= gave_up;
+            self.finish();
+            return;
+        }
+        self.servos[GRIPPER].goal = self.closer(self.servos[GRIPPER].goal);
+        squeeze.stepping = true;
+        self.program = Program::Squeeze(squeeze);
+    }
+
+    /// One step towards the closed gripper and not beyond it.
+    fn closer(&self, position: u16) -> u16 {
+        let (open, closed) = (self.config.gripper_open, self.config.gripper_closed);
+        let step = self.config.step;
+        let closer = if closed < open {
+            position.saturating_sub(step).max(closed)
+        } else {
+            position.saturating_add(step).min(closed)
+        };
+        self.config.limits[GRIPPER].clamp(closer)
+    }
+
+    fn proceed_freeze(&mut self, mut freeze: Freeze, job: Job, fine: bool) {
+        let index = job.index();
+        freeze.looked = matches!(job, Job::Look(_)) && fine;
+        if freeze.looked {
+            self.servos[index].goal = self.servos[index].look.position;
+        } else {
+            freeze.left &= !bit(index);
+        }
+        let left = freeze.left;
+        self.program = Program::Freeze(freeze);
+        if left == 0 {
+            self.finish();
+        }
+    }
+}
+
+/// Goals of some of the servos.
+#[derive(Default)]
+struct Goals([Option<u16>; SERVOS]);
+
+impl Goals {
+    /// Sets a joint's goal, its mirrored servo included.
+    fn joint(&mut self, joint: usize, goal: u16) {
+        self.0[joint] = Some(goal);
+        if let Some(partner) = partner(joint) {
+            self.0[partner] = Some(table::MAX_POSITION - goal);
+        }
+    }
+}
+
+/// How a Move goes.
+struct Way {
+    speed: u16,
+    timeout_us: u32,
+    /// How near to its goal a resting servo has arrived.
+    tolerance: u16,
+    then: Then,
+}
+
+fn lowest(mask: u8) -> Option<usize> {
+    (mask != 0).then_some(mask.trailing_zeros() as usize)
+}

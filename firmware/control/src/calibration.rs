@@ -1,0 +1,134 @@
+//! Calibrating the line sensors (E9): the operator moves the array over floor and tape for a while, and the
+//! threshold of every channel becomes the middle of what it saw.
+//!
+//! ```text
+//!   idle -- start --> watching -- time is up --> thresholds, idle
+//! ```
+//!
+//! A channel that saw no contrast keeps its threshold.
+
+use crate::time::reached;
+
+/// Number of line sensors.
+pub(crate) const CHANNELS: usize = 11;
+
+/// The least span between floor and tape, in ADC steps, that is believed.
+const LEAST_CONTRAST: u8 = 40;
+
+#[derive(Debug, Clone)]
+struct Watch {
+    ends_us: u32,
+    seq: u8,
+    lowest: [u8; CHANNELS],
+    highest: [u8; CHANNELS],
+}
+
+/// The thresholds in force, and a calibration while it runs.
+#[derive(Debug, Clone)]
+pub(crate) struct Calibration {
+    thresholds: [u8; CHANNELS],
+    watch: Option<Watch>,
+}
+
+/// A calibration that has come to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Calibrated {
+    /// Number of the setting that started it.
+    pub(crate) seq: u8,
+    /// Channels that have a new threshold, 0..=11.
+    pub(crate) channels: u8,
+}
+
+impl Calibration {
+    pub(crate) const fn new(thresholds: [u8; CHANNELS]) -> Self {
+        Self { thresholds, watch: None }
+    }
+
+    /// Starts to watch for `span_us`. One that runs under the same number goes on.
+    pub(crate) fn start(&mut self, seq: u8, span_us: u32, now_us: u32) {
+        if self.watch.as_ref().is_some_and(|watch| watch.seq == seq) {
+            return;
+        }
+        self.watch = Some(Watch {
+            ends_us: now_us.wrapping_add(span_us),
+            seq,
+            lowest: [u8::MAX; CHANNELS],
+            highest: [u8::MIN; CHANNELS],
+        });
+    }
+
+    pub(crate) fn is_running(&self) -> bool {
+        self.watch.is_some()
+    }
+
+    /// Whether this reading of a channel is tape.
+    pub(crate) fn judge(&mut self, channel: usize, reading: u8) -> bool {
+        if let Some(watch) = &mut self.watch {
+            watch.lowest[channel] = watch.lowest[channel].min(reading);
+            watch.highest[channel] = watch.highest[channel].max(reading);
+        }
+        reading >= self.thresholds[channel]
+    }
+
+    /// Ends the watching when its time is up.
+    pub(crate) fn finish(&mut self, now_us: u32) -> Option<Calibrated> {
+        let watch = self.watch.take_if(|watch| reached(now_us, watch.ends_us))?;
+        let mut channels = 0;
+        for (channel, threshold) in self.thresholds.iter_mut().enumerate() {
+            let contrast = watch.highest[channel].saturating_sub(watch.lowest[channel]);
+            if contrast >= LEAST_CONTRAST {
+                // The upper half rounds up, so that a reading at the floor's level is never tape.
+                *threshold = watch.lowest[channel] + contrast.div_ceil(2);
+                channels += 1;
+            }
+        }
+        Some(Calibrated { seq: watch.seq, channels })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_become_the_middle_of_what_was_seen() {
+        let mut calibration = Calibration::new([128; CHANNELS]);
+        assert!(!calibration.judge(0, 100));
+        calibration.start(9, 1_000, 0);
+        for channel in 0..CHANNELS {
+            for reading in [20, 90, 30] {
+                assert!(!calibration.judge(channel, reading));
+            }
+        }
+        assert_eq!(calibration.finish(999), None);
+        assert_eq!(calibration.finish(1_000), Some(Calibrated { seq: 9, channels: 11 }));
+        assert!(!calibration.is_running());
+        assert!(calibration.judge(3, 55));
+        assert!(!calibration.judge(3, 54));
+    }
+
+    #[test]
+    fn a_channel_without_contrast_keeps_its_threshold() {
+        let mut calibration = Calibration::new([128; CHANNELS]);
+        calibration.start(1, 1_000, 0);
+        for channel in 0..CHANNELS {
+            calibration.judge(channel, 30);
+            calibration.judge(channel, if channel == 4 { 69 } else { 200 });
+        }
+        assert_eq!(calibration.finish(1_000), Some(Calibrated { seq: 1, channels: 10 }));
+        assert!(!calibration.judge(4, 127));
+        assert!(calibration.judge(4, 128));
+        assert!(calibration.judge(5, 115));
+    }
+
+    #[test]
+    fn a_repeated_start_does_not_begin_again() {
+        let mut calibration = Calibration::new([128; CHANNELS]);
+        calibration.start(1, 1_000, 0);
+        calibration.start(1, 1_000, 900);
+        assert!(calibration.finish(1_000).is_some());
+        calibration.start(2, 1_000, 1_500);
+        calibration.start(3, 1_000, 2_000);
+        assert_eq!(calibration.finish(2_900), None, "a new number begins again");
+    }
+}

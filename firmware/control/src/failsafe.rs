@@ -1,0 +1,69 @@
+//! The age of the command: a Pi that falls silent may not leave the robot driving.
+//!
+//! ```text
+//!              a command                    older than the limit
+//!   untold ----------------> fresh --------------------------------> expired
+//!                             ^ ^------ renewal or new command --------'
+//! ```
+//!
+//! Expired is a state and not a comparison, because the clock goes round. A renewal lifts it: the wheels
+//! take a renewed setpoint up again, since the bridge lets its own lease run out when nobody wants it; what
+//! runs once was aborted and stays so until a new number comes.
+
+use crate::time::reached;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Untold,
+    Fresh { since_us: u32 },
+    Expired,
+}
+
+/// Watches how old the command in force is.
+#[derive(Debug, Clone)]
+pub(crate) struct CommandAge {
+    limit_us: u32,
+    state: State,
+}
+
+impl CommandAge {
+    pub(crate) const fn new(limit_us: u32) -> Self {
+        Self { limit_us, state: State::Untold }
+    }
+
+    /// A command came, or the one in force was renewed.
+    pub(crate) fn renew(&mut self, now_us: u32) {
+        self.state = State::Fresh { since_us: now_us };
+    }
+
+    /// Whether the command has grown too old just now; once for every silence.
+    pub(crate) fn expires(&mut self, now_us: u32) -> bool {
+        let State::Fresh { since_us } = self.state else { return false };
+        // Strictly older than the limit.
+        let expires = reached(now_us, since_us.wrapping_add(self.limit_us).wrapping_add(1));
+        if expires {
+            self.state = State::Expired;
+        }
+        expires
+    }
+
+    /// Whether the board has stopped because of a silence.
+    pub(crate) fn is_expired(&self) -> bool {
+        self.state == State::Expired
+    }
+
+    /// Whether the wheels may turn.
+    pub(crate) fn is_fresh(&self) -> bool {
+        matches!(self.state, State::Fresh { .. })
+    }
+
+    /// When the command will be too old.
+    pub(crate) fn next_due_us(&self) -> Option<u32> {
+        match self.state {
+            State::Fresh { since_us } => {
+                Some(since_us.wrapping_add(self.limit_us).wrapping_add(1))
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Reading the line: eleven bits in, a class and a signed error out (S7, U13, AMB-18..20).
+//!
+//! ```text
+//!   bits 10 9 8 all set, run of five or more    -> mark on the left
+//!   bits  2 1 0 all set, run of five or more    -> mark on the right
+//!
+//!   both marks   FourWay          error: held
+//!   one mark     StationToLeft/Right  error: held
+//!   other tape   |e| <= 2 OnLine, e > 2 LeftOfLine, e < -2 RightOfLine     error: centroid e
+//!   no tape      DropStation if a FourWay was the line's end, else NotOnLine
+//!                error: held, +-10 when the line left on that side
+//! ```
+//!
+//! A bar that is met at an angle leaves the array corner first, so its last trace is not a FourWay but tape
+//! at one edge. The end of the line is therefore remembered from a FourWay on until tape is seen that
+//! touches neither edge, which is what a line that goes on looks like:
+//!
+//! ```text
+//!               FourWay                no tape
+//!   on a line ----------> at its end ----------> ended (DropStation)
+//!       ^                     |                      |
+//!       |  tape, no edge      |                      | any tape
+//!       '---------------------'<---------------------'
+//! ```
+//!
+//! The sensor board takes the class, the steering board the error; both read with the same code.
+
+use lager_wire::{LineBits, LineState};
+
+/// Largest error: the line under the outermost sensor, in half sensor steps.
+pub const MAX_ERROR: i8 = 10;
+
+/// Up to this error, in half sensor steps, the robot counts as on the line.
+pub const ON_LINE_ERROR: i8 = 2;
+
+const LEFT_EDGE: u16 = 0b100_0000_0000;
+const RIGHT_EDGE: u16 = 0b000_0000_0001;
+const LEFT_MARK: u16 = 0b111_1100_0000;
+const RIGHT_MARK: u16 = 0b000_0001_1111;
+const CENTRE: u16 = 0b000_0111_0000;
+
+/// What one reading of the sensors means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reading {
+    /// The class the Pi is told.
+    pub state: LineState,
+    /// The line's place in half sensor steps, -10..=10, positive = the line is to the right of the robot.
+    pub error: i8,
+}
+
+/// Whether one of the three centre sensors (index 4..=6) sees tape.
+#[must_use]
+pub fn centre_on_tape(bits: LineBits) -> bool {
+    bits.0 & CENTRE != 0
+}
+
+/// Classifies readings; holds what a reading alone does not tell.
+#[derive(Debug, Clone, Default)]
+pub struct LineReader {
+    /// The error reported last.
+    error: i8,
+    /// A FourWay may have been the line's end.
+    at_end: bool,
+    /// The line has ended and no tape was seen since.
+    ended: bool,
+}
+
+impl LineReader {
+    /// A reader that has seen nothing and supposes the line in the middle.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { error: 0, at_end: false, ended: false }
+    }
+
+    /// The error reported last, in half sensor steps.
+    #[must_use]
+    pub const fn error(&self) -> i8 {
+        self.error
+    }
+
+    /// Takes in one reading of the sensors.
+    pub fn read(&mut self, bits: LineBits) -> Reading {
+        let bits = LineBits::new(bits.0).0;
+        let state = if bits == 0 { self.without_tape() } else { self.with_tape(bits) };
+        Reading { state, error: self.error }
+    }
+
+    fn without_tape(&mut self) -> LineState {
+        if self.error.abs() > ON_LINE_ERROR {
+            self.error = MAX_ERROR * self.error.signum();
+        }
+        self.ended = self.at_end;
+        if self.ended { LineState::DropStation } else { LineState::NotOnLine }
+    }
+
+    fn with_tape(&mut self, bits: u16) -> LineState {
+        if self.ended {
+            self.ended = false;
+            self.at_end = false;
+        }
+        let left = bits & LEFT_MARK == LEFT_MARK;
+        let right = bits & RIGHT_MARK == RIGHT_MARK;
+        match (left, right) {
+            (true, true) => {
+                self.at_end = true;
+                LineState::FourWay
+            }
+            (true, false) => LineState::StationToLeft,
+            (false, true) => LineState::StationToRight,
+            (false, false) => {
+                if bits & (LEFT_EDGE | RIGHT_EDGE) == 0 {
+                    self.at_end = false;
+                }
+                self.error = centroid(bits);
+                match self.error {
+                    error if error > ON_LINE_ERROR => LineState::LeftOfLine,
+                    error if error < -ON_LINE_ERROR => LineState::RightOfLine,
+                    _ => LineState::OnLine,
+                }
+            }
+        }
+    }
+}
+
+/// Mean place of the set bits in half sensor steps from the middle, halves rounded away from it.
+fn centroid(bits: u16) -> i8 {
+    let mut sum = 0_i8;
+    let mut count = 0_i8;
+    for index in 0..LineBits::SENSORS {
+        if bits & LEFT_EDGE >> index != 0 {
+            sum += 2 * (index as i8 - 5);
+            count += 1;
+        }
+    }
+    let size = (2 * sum.abs() + count) / (2 * count);
+    size * sum.signum()
+}

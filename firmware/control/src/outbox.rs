@@ -1,0 +1,45 @@
+//! Packets that are encoded and wait for room in the UART's queue.
+//!
+//! An encoded packet has its number, so it may not be thrown away when the UART is full: the Pi would count
+//! it as lost. It waits here, in order.
+
+use heapless::Deque;
+use lager_wire::PACKET_LENGTH;
+
+use crate::Board;
+
+/// The most packets that one pass of a loop makes.
+const CAPACITY: usize = 4;
+
+/// Encoded packets on their way to the Pi.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Outbox {
+    packets: Deque<[u8; PACKET_LENGTH], CAPACITY>,
+}
+
+impl Outbox {
+    pub(crate) const fn new() -> Self {
+        Self { packets: Deque::new() }
+    }
+
+    /// Whether everything was handed to the UART.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.packets.is_empty()
+    }
+
+    /// Puts a packet behind the others. The callers make at most four at a time and only into an empty box.
+    pub(crate) fn push(&mut self, packet: [u8; PACKET_LENGTH]) {
+        let stored = self.packets.push_back(packet).is_ok();
+        debug_assert!(stored, "a loop made more packets than the outbox holds");
+    }
+
+    /// Hands over what the UART takes.
+    pub(crate) fn flush(&mut self, board: &mut impl Board) {
+        while let Some(packet) = self.packets.front() {
+            if !board.uart_write(packet) {
+                return;
+            }
+            self.packets.pop_front();
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! The line regulator: PD on integers (W3).
+//!
+//! `u = Kp * e + Kd * (e(t) - e(t - 10 ms))`, in duty steps, positive = turn right. P acts on every word
+//! from the sensor board; D is a difference over ten milliseconds however often words come, so that the
+//! gains mean the same at every baud rate. Words that come at another pace are scaled to it.
+//!
+//! ```text
+//!   samples:   ...  e3   e2   e1   e(now)
+//!   age in ms:      15   10    5     0
+//!                         '--------- D: the newest sample at least 7.5 ms old
+//! ```
+
+/// Gains of the regulator, in duty steps per half sensor step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gains {
+    /// `CONST_PROP`.
+    pub p: u8,
+    /// `CONST_DER`, over 10 ms.
+    pub d: u8,
+}
+
+impl Default for Gains {
+    /// The original's (W3).
+    fn default() -> Self {
+        Self { p: 2, d: 2 }
+    }
+}
+
+/// The time D is a difference over, in microseconds.
+const SPAN_US: u32 = 10_000;
+/// The least age of the sample D is taken against.
+const LEAST_AGE_US: u32 = 7_500;
+/// A pause after which older samples tell nothing.
+const STALE_US: u32 = 50_000;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Sample {
+    at_us: u32,
+    error: i8,
+}
+
+/// The regulator with the samples it remembers, newest first.
+#[derive(Debug, Clone, Default)]
+pub struct Pd {
+    gains: Gains,
+    samples: [Sample; 4],
+    count: u8,
+}
+
+impl Pd {
+    /// A regulator without a past.
+    #[must_use]
+    pub fn new(gains: Gains) -> Self {
+        Self { gains, samples: [Sample::default(); 4], count: 0 }
+    }
+
+    /// The gains in force.
+    #[must_use]
+    pub fn gains(&self) -> Gains {
+        self.gains
+    }
+
+    /// Changes the gains; the past stays.
+    pub fn set_gains(&mut self, gains: Gains) {
+        self.gains = gains;
+    }
+
+    /// Forgets the past, as when following begins.
+    pub fn reset(&mut self) {
+        self.count = 0;
+    }
+
+    /// Takes in the error at `now_us` and gives the correction `u` in duty steps.
+    ///
+    /// `error` is in half sensor steps, positive = the line is to the right.
+    pub fn update(&mut self, error: i8, now_us: u32) -> i16 {
+        let last = self.samples[0].at_us;
+        if self.count > 0 && now_us.wrapping_sub(last) > STALE_US {
+            self.reset();
+        }
+        let p = i16::from(self.gains.p) * i16::from(error);
+        let d = self.derivative(error, now_us);
+        self.remember(Sample { at_us: now_us, error });
+        p + d
+    }
+
+    fn derivative(&self, error: i8, now_us: u32) -> i16 {
+        let past = &self.samples[..usize::from(self.count)];
+        let Some((age, sample)) = past
+            .iter()
+            .map(|sample| (now_us.wrapping_sub(sample.at_us), sample))
+            .find(|(age, _)| *age >= LEAST_AGE_US)
+        else {
+            return 0;
+        };
+        let change = i32::from(error) - i32::from(sample.error);
+        let scaled = change * i32::from(self.gains.d) * SPAN_US as i32;
+        rounded(scaled, age as i32) as i16
+    }
+
+    fn remember(&mut self, sample: Sample) {
+        self.samples.rotate_right(1);
+        self.samples[0] = sample;
+        self.count = (self.count + 1).min(self.samples.len() as u8);
+    }
+}
+
+/// Quotient with halves rounded away from zero, so that left and right stay mirrored.
+fn rounded(dividend: i32, divisor: i32) -> i32 {
+    (dividend.abs() + divisor / 2) / divisor * dividend.signum()
+}

@@ -1,0 +1,311 @@
+//! The sensor board: line and distance in, packets to the Pi and words to the steering board out (S1-S10).
+//!
+//! ```text
+//!   every 5 ms, and not before everything of the last pass has left (S10):
+//!
+//!     read 11 line sensors --> FlipFlop --.-- line packet (raw line packet before it, if set)
+//!                                         '-- read IR --> distance packet
+//!                          --> ExDe word, every pass
+//!                          --> board status, answers to settings, when due
+//! ```
+//!
+//! The two handshakes do not wait for each other: without the steering board the Pi is served, without the
+//! Pi the steering board is. Packets leave by interrupt, ExDe edge by edge with the steps (S4).
+
+use heapless::Deque;
+use lager_exde::{Pins, Timing, Transmitter};
+use lager_wire::link::{BoardEvent, BoardLink};
+use lager_wire::{
+    BoardStatus, Callsign, LineBits, Payload, ResetCause, Setting, SettingKey, SettingReply,
+    SettingStatus,
+};
+
+use crate::calibration::{CHANNELS, Calibration};
+use crate::ir::IrModel;
+use crate::line::LineReader;
+use crate::load::Load;
+use crate::time::{first, reached};
+use crate::{Board, PACKET_GAP_US, SensorBoard, UART_POLL_US, outbox::Outbox};
+
+/// The sensor board's numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SensorConfig {
+    /// From one pass to the next, in microseconds; longer where the UART is slower.
+    pub loop_period_us: u32,
+    /// The IR ranger's model.
+    pub ir_model: IrModel,
+    /// From this reading of each line sensor on there is tape, leftmost first.
+    pub thresholds: [u8; CHANNELS],
+    /// From one board status to the next, in microseconds.
+    pub status_period_us: u32,
+    /// How long a calibration watches the sensors, in microseconds.
+    pub calibration_us: u32,
+    /// Silence inside a packet after which it is given up, in microseconds.
+    pub gap_us: u32,
+    /// Times of ExDe.
+    pub exde: Timing,
+}
+
+impl Default for SensorConfig {
+    fn default() -> Self {
+        Self {
+            loop_period_us: 5_000,
+            ir_model: IrModel::default(),
+            thresholds: [128; CHANNELS],
+            status_period_us: 500_000,
+            calibration_us: 5_000_000,
+            gap_us: PACKET_GAP_US,
+            exde: Timing::STANDARD,
+        }
+    }
+}
+
+/// The longest a step may be put off, in microseconds; well inside the watchdog's 125 ms.
+const LONGEST_SLEEP_US: u32 = 20_000;
+
+/// What the next pass tells the Pi (S3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FlipFlop {
+    Line,
+    Distance,
+}
+
+/// The sensor board's whole behaviour.
+#[derive(Debug, Clone)]
+pub struct SensorUnit {
+    config: SensorConfig,
+    reset: ResetCause,
+    link: BoardLink,
+    outbox: Outbox,
+    replies: Deque<SettingReply, 4>,
+    refused: u8,
+    transmitter: Transmitter,
+    pins: Pins,
+    reader: LineReader,
+    calibration: Calibration,
+    raw_line: bool,
+    flip_flop: FlipFlop,
+    pass_due_us: u32,
+    /// When the pass before began; nothing before the first.
+    last_pass_us: Option<u32>,
+    status_due_us: u32,
+    load: Load,
+}
+
+impl SensorUnit {
+    /// A board that has just started.
+    #[must_use]
+    pub fn new(board: &impl Board, config: SensorConfig) -> Self {
+        let now_us = board.now_us();
+        let reset = board.reset_cause();
+        Self {
+            reset,
+            link: BoardLink::new(Callsign::Sensor, reset, config.gap_us),
+            outbox: Outbox::new(),
+            replies: Deque::new(),
+            refused: 0,
+            transmitter: Transmitter::new(config.exde, now_us),
+            pins: Pins::default(),
+            reader: LineReader::new(),
+            calibration: Calibration::new(config.thresholds),
+            raw_line: false,
+            flip_flop: FlipFlop::Line,
+            pass_due_us: now_us,
+            last_pass_us: None,
+            status_due_us: now_us,
+            load: Load::new(now_us),
+            config,
+        }
+    }
+
+    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which the next
+    /// step is wanted at the latest. Any input wants one at once.
+    pub fn step<B: SensorBoard>(&mut self, board: &mut B) -> u32 {
+        let now_us = board.now_us();
+        board.kick_watchdog();
+        self.listen(board, now_us);
+        if board.exde_return() {
+            self.transmitter.on_return();
+        }
+        self.ask_for_pi(board, now_us);
+        self.set_pins(board, now_us);
+        self.outbox.flush(board);
+        if reached(now_us, self.pass_due_us) && self.has_sent_all(board) {
+            self.pass(board, now_us);
+        }
+        self.load.worked(now_us, board.now_us());
+        self.next_due_us(board.now_us())
+    }
+
+    fn listen<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
+        while let Some(byte) = board.uart_read() {
+            match self.link.push(byte, now_us) {
+                None => {}
+                Some(BoardEvent::Up) => self.status_due_us = now_us,
+                Some(BoardEvent::Packet(packet)) => match packet.payload {
+                    Payload::Setting(setting) => {
+                        let reply = self.set(setting, now_us);
+                        self.answer(reply);
+                    }
+                    _ => self.refused = self.refused.saturating_add(1),
+                },
+            }
+        }
+    }
+
+    fn set(&mut self, setting: Setting, now_us: u32) -> SettingReply {
+        let (value, status) = match (setting.key, setting.value) {
+            (SettingKey::RawLine, 0 | 1) => {
+                self.raw_line = setting.value == 1;
+                (setting.value, SettingStatus::Accepted)
+            }
+            (SettingKey::RawLine, _) => (i16::from(self.raw_line), SettingStatus::OutOfRange),
+            (SettingKey::Calibrate, 1) => {
+                self.calibration.start(setting.seq, self.config.calibration_us, now_us);
+                (1, SettingStatus::Accepted)
+            }
+            (SettingKey::Calibrate, _) => {
+                (i16::from(self.calibration.is_running()), SettingStatus::OutOfRange)
+            }
+            (SettingKey::GainP | SettingKey::GainD, _) => (0, SettingStatus::NotHere),
+        };
+        SettingReply { key: setting.key, seq: setting.seq, value, status }
+    }
+
+    /// The latest answers matter: an older one gives way.
+    fn answer(&mut self, reply: SettingReply) {
+        if self.replies.is_full() {
+            self.replies.pop_front();
+        }
+        let stored = self.replies.push_back(reply).is_ok();
+        debug_assert!(stored, "room was made");
+    }
+
+    fn ask_for_pi<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
+        if self.outbox.is_empty()
+            && let Some(syn) = self.link.poll(now_us)
+        {
+            self.outbox.push(syn);
+            self.outbox.flush(board);
+        }
+    }
+
+    fn set_pins<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
+        let pins = self.transmitter.poll(now_us);
+        if pins != self.pins {
+            self.pins = pins;
+            board.set_exde(pins.data, pins.sync);
+        }
+    }
+
+    fn has_sent_all<B: SensorBoard>(&self, board: &B) -> bool {
+        let word_sent = self.transmitter.is_ready() || !self.transmitter.is_up();
+        word_sent && self.outbox.is_empty() && board.uart_idle()
+    }
+
+    fn pass<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
+        self.note_pass(now_us);
+        let bits = self.read_line(board);
+        let reading = self.reader.read(bits);
+        self.finish_calibration(now_us);
+        match self.flip_flop {
+            FlipFlop::Line => {
+                if self.raw_line {
+                    self.send(Payload::RawLine(bits));
+                }
+                self.send(Payload::Line(reading.state));
+                self.flip_flop = FlipFlop::Distance;
+            }
+            FlipFlop::Distance => {
+                let distance = self.config.ir_model.distance(board.read_ir());
+                self.send(Payload::Distance(distance));
+                self.flip_flop = FlipFlop::Line;
+            }
+        }
+        self.send_rarer_things(now_us);
+        self.outbox.flush(board);
+        // Reading the sensors takes time on the chip, and the word begins when it begins.
+        let begun_us = board.now_us();
+        if self.transmitter.start(bits.0, begun_us) {
+            self.set_pins(board, begun_us);
+        }
+    }
+
+    fn note_pass(&mut self, now_us: u32) {
+        if let Some(last_us) = self.last_pass_us {
+            self.load.passed(now_us.wrapping_sub(last_us));
+        }
+        self.last_pass_us = Some(now_us);
+        let period_us = self.config.loop_period_us;
+        let late_us = now_us.wrapping_sub(self.pass_due_us);
+        let from_us = if late_us < period_us { self.pass_due_us } else { now_us };
+        self.pass_due_us = from_us.wrapping_add(period_us);
+    }
+
+    fn read_line<B: SensorBoard>(&mut self, board: &mut B) -> LineBits {
+        let mut bits = 0;
+        for channel in 0..LineBits::SENSORS {
+            let reading = board.read_line_sensor(channel);
+            let tape = self.calibration.judge(usize::from(channel), reading);
+            bits = bits << 1 | u16::from(tape);
+        }
+        LineBits::new(bits)
+    }
+
+    /// The second answer to a calibration tells how many channels have a new threshold; anything but all
+    /// of them is out of range.
+    fn finish_calibration(&mut self, now_us: u32) {
+        let Some(calibrated) = self.calibration.finish(now_us) else { return };
+        let complete = usize::from(calibrated.channels) == CHANNELS;
+        self.answer(SettingReply {
+            key: SettingKey::Calibrate,
+            seq: calibrated.seq,
+            value: i16::from(calibrated.channels),
+            status: if complete { SettingStatus::Accepted } else { SettingStatus::OutOfRange },
+        });
+    }
+
+    fn send_rarer_things(&mut self, now_us: u32) {
+        if !self.link.is_up() {
+            return;
+        }
+        if let Some(reply) = self.replies.pop_front() {
+            self.send(Payload::SettingReply(reply));
+        }
+        if reached(now_us, self.status_due_us) {
+            self.status_due_us = now_us.wrapping_add(self.config.status_period_us);
+            let (load_percent, longest_loop_100us) = self.load.report(now_us);
+            self.send(Payload::BoardStatus(BoardStatus {
+                reset: self.reset,
+                bad_packets: self.link.bad_packets(),
+                lost_packets: self.link.lost_packets(),
+                refused: self.refused,
+                exde_errors: 0,
+                servo_timeouts: 0,
+                load_percent,
+                longest_loop_100us,
+            }));
+        }
+    }
+
+    fn send(&mut self, payload: Payload) {
+        if let Some(packet) = self.link.encode(payload) {
+            self.outbox.push(packet);
+        }
+    }
+
+    fn next_due_us(&self, now_us: u32) -> u32 {
+        let mut due_us = now_us.wrapping_add(LONGEST_SLEEP_US);
+        let pass_us = if !self.outbox.is_empty() || reached(now_us, self.pass_due_us) {
+            now_us.wrapping_add(UART_POLL_US)
+        } else {
+            self.pass_due_us
+        };
+        let syn_us = self.link.us_to_syn(now_us).map(|us| now_us.wrapping_add(us));
+        for other_us in [Some(pass_us), syn_us, self.transmitter.next_due_us()].into_iter().flatten()
+        {
+            due_us = first(now_us, due_us, other_us);
+        }
+        due_us
+    }
+}

@@ -1,0 +1,482 @@
+//! The steering board: commands in, wheels and arm out (T1-T5).
+//!
+//! ```text
+//!            .------------------------- one step -------------------------.
+//!   UART --> | register --> dispatch --> wheels ---.                      |
+//!   ExDe --> | line error --> PD ------------------+--> motors            | --> UART
+//!   servos ->| arm <-- lock: only in standby       |                      |   reports
+//!            | age of the command > 150 ms --> off-'                      |
+//!            '-------------------------------------------------------------'
+//! ```
+//!
+//! Rules that hold whatever comes:
+//! - The motors stand still from boot until the first valid command, while the command is too old, while the
+//!   arm moves, and while the line to follow is not reported.
+//! - What runs once (turns, arm commands) ends exactly once: done, aborted or refused, under its number.
+//!   Setpoints do not end; they are replaced.
+//! - A refused command is counted and changes nothing: what was under way goes on and is not renewed by it.
+//! - Of an arm command, the servos' states are told before its end is.
+
+use lager_exde::{Receiver, Timing};
+use lager_wire::link::{BoardEvent, BoardLink};
+use lager_wire::{
+    ArmCommand, BoardStatus, Callsign, Command, LineBits, Payload, ResetCause, Setting, SettingKey,
+    SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags,
+};
+
+use crate::arm::{Arm, ArmConfig, Outcome};
+use crate::failsafe::CommandAge;
+use crate::line::LineReader;
+use crate::load::Load;
+use crate::pd::{Gains, Pd};
+use crate::register::{CommandRegister, Receipt};
+use crate::report::{End, Ends, Finish};
+use crate::time::{first, reached};
+use crate::wheels::{Motors, STILL, Wheels};
+use crate::{Board, Motor, PACKET_GAP_US, SteeringBoard, UART_POLL_US, outbox::Outbox};
+
+/// The steering board's numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SteeringConfig {
+    /// Gains at start.
+    pub gains: Gains,
+    /// Age of the command, in microseconds, beyond which the board stops.
+    pub command_age_limit_us: u32,
+    /// From one report to the next, in microseconds; longer where the UART is slower.
+    pub report_period_us: u32,
+    /// From one board status to the next, in microseconds.
+    pub status_period_us: u32,
+    /// Age of the last line word, in microseconds, beyond which there is no line to follow.
+    pub line_age_limit_us: u32,
+    /// Silence inside a packet after which it is given up, in microseconds.
+    pub gap_us: u32,
+    /// Times of ExDe.
+    pub exde: Timing,
+    /// The arm's numbers.
+    pub arm: ArmConfig,
+}
+
+impl Default for SteeringConfig {
+    fn default() -> Self {
+        Self {
+            gains: Gains::default(),
+            command_age_limit_us: 150_000,
+            report_period_us: 5_000,
+            status_period_us: 500_000,
+            line_age_limit_us: 100_000,
+            gap_us: PACKET_GAP_US,
+            exde: Timing::STANDARD,
+            arm: ArmConfig::default(),
+        }
+    }
+}
+
+/// The longest a step may be put off, in microseconds; well inside the watchdog's 125 ms.
+const LONGEST_SLEEP_US: u32 = 20_000;
+
+/// What the line sensors say, as far as the wheels care.
+#[derive(Debug, Clone)]
+struct Line {
+    reader: LineReader,
+    pd: Pd,
+    /// The regulator's output for the last word.
+    correction: i16,
+    /// When the last word came, while it is not too old.
+    fresh_since_us: Option<u32>,
+}
+
+/// An arm command that waits for the arm, or runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct ArmOrder {
+    command: ArmCommand,
+    seq: u8,
+}
+
+/// What the Pi is told besides the regular report, and when.
+#[derive(Debug, Clone)]
+struct Reports {
+    ends: Ends,
+    reply: Option<SettingReply>,
+    status_wanted: bool,
+    status_due_us: u32,
+    data_due_us: u32,
+}
+
+/// The steering board's whole behaviour.
+#[derive(Debug, Clone)]
+pub struct SteeringUnit {
+    config: SteeringConfig,
+    reset: ResetCause,
+    link: BoardLink,
+    outbox: Outbox,
+    register: CommandRegister,
+    age: CommandAge,
+    refused: u8,
+    receiver: Receiver,
+    line: Line,
+    wheels: Wheels,
+    arm: Arm,
+    arm_waiting: Option<ArmOrder>,
+    arm_running: Option<ArmOrder>,
+    motors: Option<Motors>,
+    reports: Reports,
+    load: Load,
+}
+
+impl SteeringUnit {
+    /// A board that has just started; the motors are off.
+    #[must_use]
+    pub fn new(board: &impl Board, config: SteeringConfig) -> Self {
+        let now_us = board.now_us();
+        let reset = board.reset_cause();
+        Self {
+            reset,
+            link: BoardLink::new(Callsign::Steering, reset, config.gap_us),
+            outbox: Outbox::new(),
+            register: CommandRegister::new(),
+            age: CommandAge::new(config.command_age_limit_us),
+            refused: 0,
+            receiver: Receiver::new(config.exde),
+            line: Line {
+                reader: LineReader::new(),
+                pd: Pd::new(config.gains),
+                correction: 0,
+                fresh_since_us: None,
+            },
+            wheels: Wheels::new(),
+            arm: Arm::new(config.arm, now_us),
+            arm_waiting: None,
+            arm_running: None,
+            motors: None,
+            reports: Reports {
+                ends: Ends::new(),
+                reply: None,
+                status_wanted: false,
+                status_due_us: now_us,
+                data_due_us: now_us,
+            },
+            load: Load::new(now_us),
+            config,
+        }
+    }
+
+    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which the next
+    /// step is wanted at the latest. Any input wants one at once.
+    pub fn step<B: SteeringBoard>(&mut self, board: &mut B) -> u32 {
+        let now_us = board.now_us();
+        board.kick_watchdog();
+        self.listen(board, now_us);
+        self.read_line(board, now_us);
+        self.move_arm(board, now_us);
+        self.watch_age(now_us);
+        self.drive(board, now_us);
+        self.report(board, now_us);
+        let done_us = board.now_us();
+        self.load.worked(now_us, done_us);
+        self.load.passed(done_us.wrapping_sub(now_us));
+        self.next_due_us(now_us)
+    }
+
+    fn listen<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        while let Some(byte) = board.uart_read() {
+            match self.link.push(byte, now_us) {
+                None => {}
+                Some(BoardEvent::Up) => self.greet(now_us),
+                Some(BoardEvent::Packet(packet)) => match packet.payload {
+                    Payload::SteerCommand(command) => self.receive(command, now_us),
+                    Payload::Setting(setting) => self.reports.reply = Some(self.set(setting)),
+                    _ => self.count_refused(),
+                },
+            }
+        }
+    }
+
+    /// The Pi has just come, or come again: it is told everything.
+    fn greet(&mut self, now_us: u32) {
+        self.reports.status_wanted = true;
+        self.reports.data_due_us = now_us;
+        self.arm.tell_all();
+    }
+
+    fn receive(&mut self, command: SteerCommand, now_us: u32) {
+        match self.register.receive(command) {
+            Receipt::Renewed => self.age.renew(now_us),
+            Receipt::AlreadyRefused => {}
+            Receipt::New => {
+                if let Some(command) = self.register.take() {
+                    self.dispatch(command, now_us);
+                }
+            }
+        }
+    }
+
+    fn dispatch(&mut self, command: SteerCommand, now_us: u32) {
+        match command.command() {
+            Some(Command::Wheel(wheel)) => {
+                self.accept(now_us);
+                self.wheels.start(wheel, command.seq);
+                self.line.pd.reset();
+            }
+            Some(Command::Arm(arm)) if self.wheels.is_standby() => {
+                self.accept(now_us);
+                self.arm_waiting = Some(ArmOrder { command: arm, seq: command.seq });
+            }
+            Some(Command::Arm(_)) | None => {
+                self.register.refuse();
+                self.count_refused();
+                self.end(command.seq, End::Refused, now_us);
+            }
+        }
+    }
+
+    fn accept(&mut self, now_us: u32) {
+        self.register.accept();
+        self.age.renew(now_us);
+        self.break_off(now_us);
+    }
+
+    /// Ends everything that runs once. The arm's end follows when its servos have been stopped.
+    fn break_off(&mut self, now_us: u32) {
+        if let Some(seq) = self.wheels.abort_turn() {
+            self.end(seq, End::Aborted, now_us);
+        }
+        if let Some(order) = self.arm_waiting.take() {
+            self.end(order.seq, End::Aborted, now_us);
+        }
+        self.arm.abort();
+    }
+
+    fn end(&mut self, seq: u8, end: End, now_us: u32) {
+        self.reports.ends.push(Finish { seq, end });
+        self.reports.data_due_us = now_us;
+    }
+
+    fn count_refused(&mut self) {
+        self.refused = self.refused.saturating_add(1);
+    }
+
+    fn set(&mut self, setting: Setting) -> SettingReply {
+        let gains = self.line.pd.gains();
+        let (in_force, changed) = match setting.key {
+            SettingKey::GainP => {
+                (gains.p, u8::try_from(setting.value).map(|p| (p, Gains { p, ..gains })))
+            }
+            SettingKey::GainD => {
+                (gains.d, u8::try_from(setting.value).map(|d| (d, Gains { d, ..gains })))
+            }
+            SettingKey::RawLine | SettingKey::Calibrate => {
+                return SettingReply {
+                    key: setting.key,
+                    seq: setting.seq,
+                    value: 0,
+                    status: SettingStatus::NotHere,
+                };
+            }
+        };
+        let (value, status) = match changed {
+            Ok((value, gains)) => {
+                self.line.pd.set_gains(gains);
+                (value, SettingStatus::Accepted)
+            }
+            Err(_) => (in_force, SettingStatus::OutOfRange),
+        };
+        SettingReply { key: setting.key, seq: setting.seq, value: i16::from(value), status }
+    }
+
+    fn read_line<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        while let Some((data, at_us)) = board.exde_bit() {
+            if let Some(word) = self.receiver.on_sync(data, at_us) {
+                let bits = LineBits::new(word);
+                let reading = self.line.reader.read(bits);
+                self.line.correction = self.line.pd.update(reading.error, at_us);
+                self.line.fresh_since_us = Some(at_us);
+                self.wheels.on_word(bits);
+            }
+        }
+        if self.receiver.return_sync(now_us) {
+            board.pulse_exde_return();
+        }
+        if let Some(due_us) = self.line_due_us()
+            && reached(now_us, due_us)
+        {
+            self.line.fresh_since_us = None;
+        }
+    }
+
+    fn line_due_us(&self) -> Option<u32> {
+        self.line.fresh_since_us.map(|since| since.wrapping_add(self.config.line_age_limit_us))
+    }
+
+    fn move_arm<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        if let Some(outcome) = self.arm.poll(board, now_us)
+            && let Some(order) = self.arm_running.take()
+        {
+            let end = match outcome {
+                Outcome::Done => End::Done,
+                Outcome::Aborted => End::Aborted,
+            };
+            self.end(order.seq, end, now_us);
+        }
+        if !self.arm.is_busy()
+            && let Some(order) = self.arm_waiting.take()
+            && self.arm.start(order.command, now_us)
+        {
+            self.arm_running = Some(order);
+        }
+    }
+
+    fn watch_age(&mut self, now_us: u32) {
+        if self.age.expires(now_us) {
+            self.break_off(now_us);
+        }
+    }
+
+    fn drive<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        let may_turn = self.age.is_fresh() && !self.arm_is_active();
+        if let Some(seq) = self.wheels.advance(may_turn, now_us) {
+            self.end(seq, End::Done, now_us);
+        }
+        let correction = self.line.fresh_since_us.map(|_| self.line.correction);
+        let motors = if may_turn { self.wheels.motors(correction) } else { STILL };
+        if self.motors != Some(motors) {
+            self.motors = Some(motors);
+            board.set_motors(motors.0, motors.1);
+        }
+    }
+
+    fn arm_is_active(&self) -> bool {
+        self.arm_waiting.is_some() || self.arm.is_busy()
+    }
+
+    fn report<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        self.outbox.flush(board);
+        if self.outbox.is_empty()
+            && let Some(syn) = self.link.poll(now_us)
+        {
+            self.outbox.push(syn);
+            self.outbox.flush(board);
+        }
+        if !self.link.is_up() {
+            return;
+        }
+        if reached(now_us, self.reports.status_due_us) {
+            self.reports.status_wanted = true;
+        }
+        while self.outbox.is_empty()
+            && let Some(payload) = self.next_payload(board, now_us)
+            && let Some(packet) = self.link.encode(payload)
+        {
+            self.outbox.push(packet);
+            self.outbox.flush(board);
+        }
+    }
+
+    /// What is to be told now, most urgent first. Everything but the regular report is told as soon as the
+    /// UART takes it; that one waits until the line is free, so that it is never old when it arrives.
+    fn next_payload<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> Option<Payload> {
+        if let Some(arm_data) = self.arm.take_report() {
+            return Some(Payload::ArmData(arm_data));
+        }
+        if self.reports.ends.tell_next() {
+            return Some(Payload::SteerData(self.steer_data(board, now_us)));
+        }
+        if let Some(reply) = self.reports.reply.take() {
+            return Some(Payload::SettingReply(reply));
+        }
+        if core::mem::take(&mut self.reports.status_wanted) {
+            return Some(Payload::BoardStatus(self.board_status(now_us)));
+        }
+        if reached(now_us, self.reports.data_due_us) && board.uart_idle() {
+            return Some(Payload::SteerData(self.steer_data(board, now_us)));
+        }
+        None
+    }
+
+    fn steer_data<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> SteerData {
+        self.reports.data_due_us = now_us.wrapping_add(self.config.report_period_us);
+        let (left, right) = self.motors.unwrap_or(STILL);
+        let finish = self.reports.ends.told();
+        SteerData {
+            code: self.code(),
+            left_duty: left.duty,
+            right_duty: right.duty,
+            flags: self.flags(left, right, finish.end),
+            line_error: self.line.reader.error(),
+            finished_seq: finish.seq,
+            servo_errors: self.arm.errors(),
+            battery_decivolts: board.battery_decivolts(),
+        }
+    }
+
+    /// What is being executed; 0 before the first command.
+    fn code(&self) -> u8 {
+        if self.register.copy().is_none() {
+            return 0;
+        }
+        match self.arm_running.or(self.arm_waiting) {
+            Some(order) => Command::Arm(order.command).code(),
+            None => Command::Wheel(self.wheels.command()).code(),
+        }
+    }
+
+    fn flags(&self, left: Motor, right: Motor, end: End) -> SteerFlags {
+        let mut flags = SteerFlags::NONE;
+        let busy = self.wheels.is_turning() || self.arm_is_active();
+        for (holds, flag) in [
+            (left.reverse, SteerFlags::LEFT_REVERSE),
+            (right.reverse, SteerFlags::RIGHT_REVERSE),
+            (!self.wheels.is_standby(), SteerFlags::ARM_LOCKED),
+            (self.line.fresh_since_us.is_some(), SteerFlags::EXDE_OK),
+            (self.age.is_expired(), SteerFlags::FAILSAFE),
+            (end == End::Aborted, SteerFlags::ABORTED),
+            (end == End::Refused, SteerFlags::REFUSED),
+            (busy, SteerFlags::BUSY),
+        ] {
+            if holds {
+                flags.insert(flag);
+            }
+        }
+        flags
+    }
+
+    fn board_status(&mut self, now_us: u32) -> BoardStatus {
+        self.reports.status_due_us = now_us.wrapping_add(self.config.status_period_us);
+        let (load_percent, longest_loop_100us) = self.load.report(now_us);
+        BoardStatus {
+            reset: self.reset,
+            bad_packets: self.link.bad_packets(),
+            lost_packets: self.link.lost_packets(),
+            refused: self.refused,
+            exde_errors: u8::try_from(self.receiver.errors()).unwrap_or(u8::MAX),
+            servo_timeouts: self.arm.timeouts(),
+            load_percent,
+            longest_loop_100us,
+        }
+    }
+
+    fn next_due_us(&self, now_us: u32) -> u32 {
+        let mut due_us = now_us.wrapping_add(LONGEST_SLEEP_US);
+        due_us = first(now_us, due_us, self.arm.next_due_us(now_us));
+        let syn_us = self.link.us_to_syn(now_us).map(|us| now_us.wrapping_add(us));
+        for other_us in [
+            syn_us.or_else(|| self.report_due_us(now_us)),
+            self.age.next_due_us(),
+            self.line_due_us(),
+            self.wheels.next_due_us(),
+            self.receiver.next_due_us(),
+        ]
+        .into_iter()
+        .flatten()
+        {
+            due_us = first(now_us, due_us, other_us);
+        }
+        due_us
+    }
+
+    /// When the next report is due; what is overdue waits for the UART and for nothing else.
+    fn report_due_us(&self, now_us: u32) -> Option<u32> {
+        let due_us = first(now_us, self.reports.data_due_us, self.reports.status_due_us);
+        let waits = !self.outbox.is_empty() || reached(now_us, due_us);
+        Some(if waits { now_us.wrapping_add(UART_POLL_US) } else { due_us })
+    }
+}

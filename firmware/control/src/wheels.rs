@@ -1,0 +1,223 @@
+//! What the wheels are to do: the modes of the wheel commands and the duty each means (W1-W5, T5).
+//!
+//! ```text
+//!              2,4,6,9                3,5                    7,8,10,11
+//!   Manual <------------ any ------------------> Follow     any ----> Turn
+//!      |                                           |                   | time up, tape
+//!      '------------------- 1 ---------------------'---> Standby <-----'
+//! ```
+//!
+//! Every wheel command replaces the mode before it; only a turn ends by itself. In all modes but following
+//! the duty is the standard one or 0.
+
+use lager_wire::{LineBits, WheelCommand};
+
+use crate::turn::{Angle, Turn, Way};
+use crate::{Motor, PWM_STANDARD};
+
+/// Duties of both sides, left first.
+pub(crate) type Motors = (Motor, Motor);
+
+/// Both sides standing still.
+pub(crate) const STILL: Motors = (Motor::OFF, Motor::OFF);
+
+/// Which way the robot follows the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Along {
+    Forward,
+    Backward,
+}
+
+#[derive(Debug, Clone)]
+enum Mode {
+    Standby,
+    Manual(WheelCommand),
+    Follow(Along),
+    /// `under_way` is empty until the wheels may turn.
+    Turn { command: WheelCommand, seq: u8, way: Way, angle: Angle, under_way: Option<Turn> },
+}
+
+/// The wheels' mode.
+#[derive(Debug, Clone)]
+pub(crate) struct Wheels {
+    mode: Mode,
+}
+
+impl Wheels {
+    pub(crate) const fn new() -> Self {
+        Self { mode: Mode::Standby }
+    }
+
+    /// Takes up the mode of a command, in place of what was.
+    pub(crate) fn start(&mut self, command: WheelCommand, seq: u8) {
+        let turn = |way, angle| Mode::Turn { command, seq, way, angle, under_way: None };
+        self.mode = match command {
+            WheelCommand::Standby => Mode::Standby,
+            WheelCommand::ManualForward
+            | WheelCommand::ManualBackward
+            | WheelCommand::ManualLeft
+            | WheelCommand::ManualRight => Mode::Manual(command),
+            WheelCommand::ActiveForward => Mode::Follow(Along::Forward),
+            WheelCommand::ActiveBackward => Mode::Follow(Along::Backward),
+            WheelCommand::LeftPerp => turn(Way::Left, Angle::Perpendicular),
+            WheelCommand::LeftDiag => turn(Way::Left, Angle::Diagonal),
+            WheelCommand::RightPerp => turn(Way::Right, Angle::Perpendicular),
+            WheelCommand::RightDiag => turn(Way::Right, Angle::Diagonal),
+        };
+    }
+
+    /// Breaks a turn off; its number, if one was under way.
+    pub(crate) fn abort_turn(&mut self) -> Option<u8> {
+        let Mode::Turn { seq, .. } = self.mode else { return None };
+        self.mode = Mode::Standby;
+        Some(seq)
+    }
+
+    /// Ends a turn that has come to its end; its number then. Starts the time of one that may begin.
+    pub(crate) fn advance(&mut self, may_turn: bool, now_us: u32) -> Option<u8> {
+        let Mode::Turn { seq, way, angle, under_way, .. } = &mut self.mode else { return None };
+        match under_way {
+            Some(turn) if turn.is_over(now_us) => {
+                let seq = *seq;
+                self.mode = Mode::Standby;
+                Some(seq)
+            }
+            Some(_) => None,
+            None => {
+                if may_turn {
+                    *under_way = Some(Turn::new(*way, *angle, now_us));
+                }
+                None
+            }
+        }
+    }
+
+    /// A word from the sensor board.
+    pub(crate) fn on_word(&mut self, bits: LineBits) {
+        if let Mode::Turn { under_way: Some(turn), .. } = &mut self.mode {
+            turn.on_word(bits);
+        }
+    }
+
+    /// The motors in this mode. `correction` is the regulator's, `None` when there is no line to follow.
+    pub(crate) fn motors(&self, correction: Option<i16>) -> Motors {
+        let ahead = Motor::forward(PWM_STANDARD);
+        let back = Motor::backward(PWM_STANDARD);
+        match &self.mode {
+            Mode::Manual(WheelCommand::ManualForward) => (ahead, ahead),
+            Mode::Manual(WheelCommand::ManualBackward) => (back, back),
+            Mode::Manual(WheelCommand::ManualLeft) => (back, ahead),
+            Mode::Manual(WheelCommand::ManualRight) => (ahead, back),
+            Mode::Follow(along) => correction.map_or(STILL, |u| follow(*along, u)),
+            Mode::Turn { under_way: Some(turn), .. } => match turn.way() {
+                Way::Left => (back, ahead),
+                Way::Right => (ahead, back),
+            },
+            Mode::Standby | Mode::Manual(_) | Mode::Turn { .. } => STILL,
+        }
+    }
+
+    pub(crate) fn is_standby(&self) -> bool {
+        matches!(self.mode, Mode::Standby)
+    }
+
+    pub(crate) fn is_turning(&self) -> bool {
+        matches!(self.mode, Mode::Turn { .. })
+    }
+
+    /// The command this mode is.
+    pub(crate) fn command(&self) -> WheelCommand {
+        match self.mode {
+            Mode::Standby => WheelCommand::Standby,
+            Mode::Manual(command) | Mode::Turn { command, .. } => command,
+            Mode::Follow(Along::Forward) => WheelCommand::ActiveForward,
+            Mode::Follow(Along::Backward) => WheelCommand::ActiveBackward,
+        }
+    }
+
+    /// When a turn under way ends at the latest.
+    pub(crate) fn next_due_us(&self) -> Option<u32> {
+        match &self.mode {
+            Mode::Turn { under_way: Some(turn), .. } => Some(turn.ends_us()),
+            _ => None,
+        }
+    }
+}
+
+/// Duties around the standard one (AMB-20). Backwards the sensors trail the axle, so the correction changes
+/// its sign and is halved (AMB-21). That is unproven and cannot be stable by itself: any correction by
+/// trailing sensors lets the axle drift off at about speed / sensor distance, so it is for short ways only.
+fn follow(along: Along, correction: i16) -> Motors {
+    match along {
+        Along::Forward => (
+            Motor::forward(around_standard(correction)),
+            Motor::forward(around_standard(-correction)),
+        ),
+        Along::Backward => (
+            Motor::backward(around_standard(-correction / 2)),
+            Motor::backward(around_standard(correction / 2)),
+        ),
+    }
+}
+
+fn around_standard(correction: i16) -> u8 {
+    (i16::from(PWM_STANDARD) + correction).clamp(0, 255) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_duties_stand_around_the_standard_and_are_clamped() {
+        // Hand-calculated: left = 100 + u, right = 100 - u, both within 0..=255.
+        for (u, left, right) in [
+            (0, 100, 100),
+            (2, 102, 98),
+            (-36, 64, 136),
+            (100, 200, 0),
+            (101, 201, 0),
+            (155, 255, 0),
+            (156, 255, 0),
+            (-7_650, 0, 255),
+        ] {
+            assert_eq!(
+                follow(Along::Forward, u),
+                (Motor::forward(left), Motor::forward(right)),
+                "u = {u}"
+            );
+        }
+    }
+
+    #[test]
+    fn backwards_the_correction_is_halved_and_mirrored() {
+        for (u, left, right) in [(0, 100, 100), (10, 95, 105), (-11, 105, 95), (400, 0, 255)] {
+            assert_eq!(
+                follow(Along::Backward, u),
+                (Motor::backward(left), Motor::backward(right)),
+                "u = {u}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_turn_waits_until_it_may_begin_and_then_has_its_whole_time() {
+        let mut wheels = Wheels::new();
+        wheels.start(WheelCommand::RightDiag, 5);
+        assert_eq!(wheels.advance(false, 0), None);
+        assert_eq!(wheels.motors(None), STILL);
+        assert_eq!(wheels.advance(true, 10_000), None);
+        assert_eq!(wheels.motors(None), (Motor::forward(100), Motor::backward(100)));
+        assert_eq!(wheels.advance(true, 1_509_999), None);
+        assert_eq!(wheels.advance(true, 1_510_000), Some(5));
+        assert!(wheels.is_standby());
+    }
+
+    #[test]
+    fn without_a_line_following_stands_still() {
+        let mut wheels = Wheels::new();
+        wheels.start(WheelCommand::ActiveForward, 1);
+        assert_eq!(wheels.motors(None), STILL);
+        assert_eq!(wheels.motors(Some(4)), (Motor::forward(104), Motor::forward(96)));
+    }
+}

@@ -1,0 +1,317 @@
+//! The line's classes and error, pattern by pattern and over realistic tracks.
+
+use lager_control::line::{LineReader, MAX_ERROR, Reading, centre_on_tape};
+use lager_wire::{LineBits, LineState};
+
+fn mirrored(bits: u16) -> u16 {
+    (0..11).fold(0, |mirror, bit| mirror << 1 | (bits >> bit & 1))
+}
+
+fn mirrored_state(state: LineState) -> LineState {
+    match state {
+        LineState::LeftOfLine => LineState::RightOfLine,
+        LineState::RightOfLine => LineState::LeftOfLine,
+        LineState::StationToLeft => LineState::StationToRight,
+        LineState::StationToRight => LineState::StationToLeft,
+        other => other,
+    }
+}
+
+fn read(bits: u16) -> Reading {
+    LineReader::new().read(LineBits(bits))
+}
+
+#[test]
+fn every_pattern_has_a_class_and_an_error_in_range() {
+    let mut seen = std::collections::HashSet::new();
+    for bits in 0..2048 {
+        let reading = read(bits);
+        assert!(reading.error.abs() <= MAX_ERROR, "{bits:011b}");
+        assert_eq!(reading.state == LineState::NotOnLine, bits == 0, "{bits:011b}");
+        seen.insert(reading.state.code());
+    }
+    assert_eq!(seen.len(), 7, "all but DropStation, which needs a past");
+}
+
+#[test]
+fn mirrored_patterns_mirror() {
+    for bits in 0..2048 {
+        let (one, other) = (read(bits), read(mirrored(bits)));
+        assert_eq!(one.error, -other.error, "{bits:011b}");
+        assert_eq!(one.state, mirrored_state(other.state), "{bits:011b}");
+    }
+}
+
+#[test]
+fn mirrored_pasts_mirror() {
+    // A walk through patterns by a fixed generator, taken by two readers, one of them in a mirror.
+    let (mut one, mut other) = (LineReader::new(), LineReader::new());
+    let mut state = 0x2545_u32;
+    for _ in 0..50_000 {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let bits = match state >> 29 {
+            0 => 0,
+            1 => 0x7FF,
+            _ => (state >> 12) as u16 & 0x7FF,
+        };
+        let (a, b) = (one.read(LineBits(bits)), other.read(LineBits(mirrored(bits))));
+        assert_eq!(a.error, -b.error);
+        assert_eq!(a.state, mirrored_state(b.state));
+    }
+}
+
+#[test]
+fn patterns_have_the_errors_worked_out_by_hand() {
+    for (bits, error, state) in [
+        (0b00000100000, 0, LineState::OnLine),
+        (0b00000110000, 1, LineState::OnLine),
+        (0b00000010000, 2, LineState::OnLine),
+        (0b00000011000, 3, LineState::LeftOfLine),
+        (0b00001110000, 0, LineState::OnLine),
+        (0b01110000000, -6, LineState::RightOfLine),
+        (0b10000000000, -10, LineState::RightOfLine),
+        (0b00000000001, 10, LineState::LeftOfLine),
+        // (0 + 2 + 10) / 3 = 4
+        (0b00000110001, 4, LineState::LeftOfLine),
+        // (-10 + 2) / 2
+        (0b10000010000, -4, LineState::RightOfLine),
+        // (0 + 2 + 4 + 6) / 4 = 3; four are no mark
+        (0b00000111100, 3, LineState::LeftOfLine),
+        // 6 + 8 + 10 + 4 is four sensors at the edge: not yet a mark
+        (0b00000001111, 7, LineState::LeftOfLine),
+        (0b00000011111, 0, LineState::StationToRight),
+        (0b11111000000, 0, LineState::StationToLeft),
+        (0b11111111110, 0, LineState::StationToLeft),
+        (0b01111111111, 0, LineState::StationToRight),
+        (0b01111111110, 0, LineState::OnLine),
+        (0b11111011111, 0, LineState::FourWay),
+        (0b11111111111, 0, LineState::FourWay),
+    ] {
+        assert_eq!(read(bits), Reading { state, error }, "{bits:011b}");
+    }
+}
+
+#[test]
+fn bits_above_the_sensors_mean_nothing() {
+    assert_eq!(read(0xF800), read(0));
+    assert_eq!(read(0xF800 | 0b00000011000), read(0b00000011000));
+}
+
+#[test]
+fn a_mark_holds_the_error() {
+    for mark in [0b11111110000, 0b00000011111, 0b11111111111] {
+        let mut reader = LineReader::new();
+        reader.read(LineBits(0b00000011000));
+        assert_eq!(reader.read(LineBits(mark)).error, 3);
+        assert_eq!(reader.error(), 3);
+    }
+}
+
+#[test]
+fn a_line_that_left_on_a_side_is_remembered_there() {
+    for (last, held) in [
+        (0b00000000011, 10),
+        (0b00000011000, 10),
+        (0b11000000000, -10),
+        (0b00000100000, 0),
+        (0b00000110000, 1),
+        (0b00001000000, -2),
+    ] {
+        let mut reader = LineReader::new();
+        reader.read(LineBits(last));
+        for _ in 0..3 {
+            let reading = reader.read(LineBits(0));
+            assert_eq!(reading, Reading { state: LineState::NotOnLine, error: held }, "{last:011b}");
+        }
+    }
+}
+
+#[test]
+fn the_end_is_latched_until_tape_is_seen() {
+    let mut reader = LineReader::new();
+    let mut state = |bits| reader.read(LineBits(bits)).state;
+    assert_eq!(state(0b00000100000), LineState::OnLine);
+    assert_eq!(state(0), LineState::NotOnLine);
+    assert_eq!(state(0x7FF), LineState::FourWay);
+    assert_eq!(state(0), LineState::DropStation);
+    assert_eq!(state(0), LineState::DropStation);
+    assert_eq!(state(0b00000000001), LineState::LeftOfLine);
+    assert_eq!(state(0), LineState::NotOnLine);
+}
+
+#[test]
+fn the_centre_is_the_three_middle_sensors() {
+    for bit in 0..11 {
+        assert_eq!(centre_on_tape(LineBits(1 << bit)), (4..=6).contains(&bit));
+    }
+}
+
+// ---- tracks ------------------------------------------------------------------------------------
+
+/// Tape as rectangles: middle, half length along its own axis, half width, angle to the driving direction.
+struct Tape {
+    x: f64,
+    y: f64,
+    half_length: f64,
+    angle: f64,
+}
+
+const HALF_WIDTH: f64 = 7.5;
+const PITCH: f64 = 7.0;
+
+impl Tape {
+    fn covers(&self, x: f64, y: f64) -> bool {
+        let (sin, cos) = self.angle.sin_cos();
+        let (dx, dy) = (x - self.x, y - self.y);
+        let along = dx * cos + dy * sin;
+        let across = -dx * sin + dy * cos;
+        along.abs() <= self.half_length && across.abs() <= HALF_WIDTH
+    }
+}
+
+/// The line ahead (x forwards, y to the left), from `from` to `to`.
+fn line(from: f64, to: f64) -> Tape {
+    Tape { x: f64::midpoint(from, to), y: 0.0, half_length: (to - from) / 2.0, angle: 0.0 }
+}
+
+/// A tape across at x = 0, from `right` to `left`, both in mm from the line.
+fn across(right: f64, left: f64) -> Tape {
+    Tape {
+        x: 0.0,
+        y: f64::midpoint(left, right),
+        half_length: (left - right) / 2.0,
+        angle: std::f64::consts::FRAC_PI_2,
+    }
+}
+
+/// Drives the array over the track at an angle in degrees (positive = turned left) and an offset to the
+/// left in mm, and lists every state in order, repetitions left out.
+fn sweep(track: &[Tape], degrees: f64, offset: f64) -> Vec<LineState> {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let mut reader = LineReader::new();
+    let mut states = Vec::new();
+    // The array passes x = 0 at the offset; 73 mm/s and 5 ms a reading are 0.37 mm.
+    let mut s = -70.0;
+    while s < 120.0 {
+        let (x, y) = (s * cos, offset + s * sin);
+        let mut bits = 0;
+        for index in 0..11 {
+            let left = (5.0 - f64::from(index)) * PITCH;
+            let (px, py) = (x - left * sin, y + left * cos);
+            let tape = track.iter().any(|tape| tape.covers(px, py));
+            bits = bits << 1 | u16::from(tape);
+        }
+        let state = reader.read(LineBits(bits)).state;
+        if states.last() != Some(&state) {
+            states.push(state);
+        }
+        s += 0.37;
+    }
+    states
+}
+
+fn angles() -> impl Iterator<Item = f64> {
+    (-10..=10).map(f64::from)
+}
+
+fn offsets() -> impl Iterator<Item = f64> {
+    (-6..=6).map(f64::from)
+}
+
+fn each(track: &[Tape], check: impl Fn(f64, f64, &[LineState])) {
+    for degrees in angles() {
+        for offset in offsets() {
+            check(degrees, offset, &sweep(track, degrees, offset));
+        }
+    }
+}
+
+#[test]
+fn a_crossing_is_a_four_way_and_never_the_end() {
+    let track = [line(-300.0, 300.0), across(-300.0, 300.0)];
+    each(&track, |degrees, offset, states| {
+        assert!(states.contains(&LineState::FourWay), "{degrees} {offset} {states:?}");
+        assert!(!states.contains(&LineState::DropStation), "{degrees} {offset} {states:?}");
+        assert!(!states.contains(&LineState::NotOnLine), "{degrees} {offset} {states:?}");
+    });
+    assert_eq!(
+        sweep(&track, 0.0, 0.0),
+        [LineState::OnLine, LineState::FourWay, LineState::OnLine]
+    );
+}
+
+#[test]
+fn a_bar_at_the_lines_end_is_a_four_way_and_then_the_end() {
+    let track = [line(-300.0, 0.0), across(-150.0, 150.0)];
+    each(&track, |degrees, offset, states| {
+        assert!(states.contains(&LineState::FourWay), "{degrees} {offset} {states:?}");
+        assert_eq!(states.last(), Some(&LineState::DropStation), "{degrees} {offset} {states:?}");
+    });
+    assert_eq!(
+        sweep(&track, 0.0, 0.0),
+        [LineState::OnLine, LineState::FourWay, LineState::DropStation]
+    );
+}
+
+#[test]
+fn a_mark_is_a_station_on_its_side_only() {
+    for (right, left, wanted, other) in [
+        (0.0, 170.0, LineState::StationToLeft, LineState::StationToRight),
+        (-170.0, 0.0, LineState::StationToRight, LineState::StationToLeft),
+        (0.0, 100.0, LineState::StationToLeft, LineState::StationToRight),
+    ] {
+        let track = [line(-300.0, 300.0), across(right, left)];
+        each(&track, |degrees, offset, states| {
+            assert!(states.contains(&wanted), "{degrees} {offset} {states:?}");
+            assert!(!states.contains(&other), "{degrees} {offset} {states:?}");
+            assert!(!states.contains(&LineState::FourWay), "{degrees} {offset} {states:?}");
+            assert!(!states.contains(&LineState::NotOnLine), "{degrees} {offset} {states:?}");
+            assert!(!states.contains(&LineState::DropStation), "{degrees} {offset} {states:?}");
+        });
+    }
+}
+
+#[test]
+fn a_corner_is_a_one_sided_mark_and_then_no_line() {
+    let track = [line(-300.0, 0.0), across(0.0, 300.0)];
+    each(&track, |degrees, offset, states| {
+        assert!(states.contains(&LineState::StationToLeft), "{degrees} {offset} {states:?}");
+        assert_eq!(states.last(), Some(&LineState::NotOnLine), "{degrees} {offset} {states:?}");
+    });
+}
+
+#[test]
+fn a_line_crossed_at_a_slant_goes_from_side_to_side() {
+    // The array's middle passes from 40 mm right of the line to its left, as in a turn on the spot.
+    let track = [line(-300.0, 300.0)];
+    for degrees in [20.0, 35.0, 50.0] {
+        let states = sweep(&track, degrees, 0.0);
+        let wanted =
+            [LineState::RightOfLine, LineState::OnLine, LineState::LeftOfLine, LineState::NotOnLine];
+        let mut rest = states.iter();
+        for state in [LineState::OnLine, LineState::NotOnLine] {
+            assert!(wanted.contains(&state));
+            assert!(rest.any(|seen| *seen == state), "{degrees} {states:?}");
+        }
+        assert!(states.iter().all(|state| wanted.contains(state)), "{degrees} {states:?}");
+    }
+}
+
+#[test]
+fn all_eight_states_come_from_tracks() {
+    let mut seen = std::collections::HashSet::new();
+    for track in [
+        vec![line(-300.0, 300.0), across(-300.0, 300.0)],
+        vec![line(-300.0, 0.0), across(-150.0, 150.0)],
+        vec![line(-300.0, 300.0), across(0.0, 170.0)],
+        vec![line(-300.0, 300.0), across(-170.0, 0.0)],
+        vec![line(-300.0, 0.0)],
+    ] {
+        for offset in [-20.0, 0.0, 20.0] {
+            seen.extend(sweep(&track, 0.0, offset).iter().map(|state| state.code()));
+        }
+    }
+    let mut seen: Vec<u8> = seen.into_iter().collect();
+    seen.sort_unstable();
+    assert_eq!(seen, [0, 1, 2, 3, 4, 5, 6, 7]);
+}

@@ -1,0 +1,88 @@
+//! The regulator against tables worked out by hand.
+
+use lager_control::pd::{Gains, Pd};
+
+/// Rows of (time in ms, error, expected u).
+fn table(gains: Gains, start_us: u32, rows: &[(u32, i8, i16)]) {
+    let mut pd = Pd::new(gains);
+    for (ms, error, expected) in rows {
+        let now = start_us.wrapping_add(ms * 1_000);
+        assert_eq!(pd.update(*error, now), *expected, "at {ms} ms, error {error}, {gains:?}");
+    }
+}
+
+#[test]
+fn the_originals_gains_over_a_word_every_5_ms() {
+    // u = 2 e + 2 (e - e 10 ms ago); the first two words have no past that old.
+    table(
+        Gains::default(),
+        0,
+        &[
+            (0, 3, 6),
+            (5, 4, 8),
+            (10, 4, 8 + 2),
+            (15, 5, 10 + 2),
+            (20, 2, 4 - 4),
+            (25, -1, -2 - 12),
+            (30, -1, -2 - 6),
+            (35, -1, -2),
+            (40, -1, -2),
+        ],
+    );
+}
+
+#[test]
+fn each_gain_works_alone() {
+    table(Gains { p: 7, d: 0 }, 0, &[(0, -10, -70), (5, 10, 70), (10, 10, 70), (15, 0, 0)]);
+    table(Gains { p: 0, d: 5 }, 0, &[(0, 0, 0), (5, 1, 0), (10, 2, 10), (15, 3, 10), (20, 3, 5)]);
+}
+
+#[test]
+fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
+    // A line that wanders one half step every 10 ms has the same D at any pace of words: 2.
+    for pace_ms in [1_u32, 2, 5, 10, 20, 40] {
+        let mut pd = Pd::new(Gains { p: 0, d: 2 });
+        let mut last = 0;
+        for ms in (0..=80).step_by(pace_ms as usize) {
+            let error = (ms / 10) as i8;
+            last = pd.update(error, ms * 1_000);
+        }
+        if pace_ms >= 5 {
+            assert_eq!(last, 2, "a word every {pace_ms} ms");
+        }
+    }
+    // 12 ms apart, a change of 3: 2 * 3 * 10 / 12 = 5.
+    table(Gains { p: 0, d: 2 }, 0, &[(0, 0, 0), (12, 3, 5), (24, 0, -5)]);
+    // 11.5 ms apart is rounded: 2 * 1 * 10 / 11.5 = 1.74 -> 2.
+    let mut pd = Pd::new(Gains { p: 0, d: 2 });
+    pd.update(0, 0);
+    assert_eq!(pd.update(1, 11_500), 2);
+    pd.reset();
+    pd.update(0, 0);
+    assert_eq!(pd.update(-1, 11_500), -2);
+}
+
+#[test]
+fn after_a_pause_the_past_tells_nothing() {
+    table(Gains { p: 0, d: 2 }, 0, &[(0, 0, 0), (10, 4, 8), (61, -4, 0), (71, -2, 4)]);
+}
+
+#[test]
+fn the_clocks_end_changes_nothing() {
+    table(Gains::default(), u32::MAX - 7_000, &[(0, 1, 2), (5, 2, 4), (10, 3, 10), (15, 3, 8)]);
+}
+
+#[test]
+fn the_largest_gains_and_errors_stay_in_range() {
+    let gains = Gains { p: 255, d: 255 };
+    table(gains, 0, &[(0, -10, -2_550), (10, 10, 2_550 + 5_100), (20, -10, -7_650)]);
+}
+
+#[test]
+fn gains_change_without_forgetting_the_past() {
+    let mut pd = Pd::new(Gains::default());
+    pd.update(0, 0);
+    pd.set_gains(Gains { p: 1, d: 10 });
+    assert_eq!(pd.gains(), Gains { p: 1, d: 10 });
+    assert_eq!(pd.update(2, 10_000), 2 + 20);
+}

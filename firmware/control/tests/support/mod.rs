@@ -1,0 +1,463 @@
+//! Two small test boards, a servo model and a Pi, stepped in virtual time.
+//!
+//! The boards are stepped when they asked to be and on input, as the simulator and a sleeping chip do.
+
+#![allow(dead_code)] // Each test file uses its part.
+
+pub mod servos;
+
+use std::collections::VecDeque;
+
+use lager_control::{
+    Board, Motor, SensorBoard, SensorConfig, SensorUnit, SteeringBoard, SteeringConfig, SteeringUnit,
+};
+use lager_wire::link::HostTransmitter;
+use lager_wire::{
+    Decoder, Packet, Payload, ResetCause, Setting, SettingKey, SteerCommand, SteerData, SynAck,
+    Version,
+};
+use servos::Servos;
+
+/// Microseconds of one byte at 500 000 Bd.
+const BYTE_US: u32 = 20;
+
+/// A UART with a queue of 64 bytes towards the Pi.
+pub struct Uart {
+    received: VecDeque<u8>,
+    pub sent: Vec<u8>,
+    busy_until_us: u32,
+    pub byte_us: u32,
+}
+
+impl Uart {
+    fn new() -> Self {
+        Self { received: VecDeque::new(), sent: Vec::new(), busy_until_us: 0, byte_us: BYTE_US }
+    }
+
+    fn left_us(&self, now_us: u32) -> u32 {
+        let left = self.busy_until_us.wrapping_sub(now_us);
+        if left > 1 << 31 { 0 } else { left }
+    }
+
+    fn write(&mut self, bytes: &[u8], now_us: u32) -> bool {
+        let queued = self.left_us(now_us).div_ceil(self.byte_us);
+        if queued + bytes.len() as u32 > 64 {
+            return false;
+        }
+        let from = now_us.wrapping_add(self.left_us(now_us));
+        self.busy_until_us = from.wrapping_add(bytes.len() as u32 * self.byte_us);
+        self.sent.extend_from_slice(bytes);
+        true
+    }
+}
+
+/// The Pi's end: answers SYN, keeps what it hears.
+pub struct Pi {
+    decoder: Decoder,
+    transmitter: HostTransmitter,
+    pub packets: Vec<(u32, Packet)>,
+    pub syns: Vec<(u32, Packet)>,
+    pub answers: bool,
+}
+
+impl Pi {
+    fn new() -> Self {
+        Self {
+            decoder: Decoder::new(Version::One),
+            transmitter: HostTransmitter::new(),
+            packets: Vec::new(),
+            syns: Vec::new(),
+            answers: true,
+        }
+    }
+
+    fn hear(&mut self, uart: &mut Uart, now_us: u32) {
+        for byte in core::mem::take(&mut uart.sent) {
+            let Some(packet) = self.decoder.push(byte) else { continue };
+            match packet.payload {
+                Payload::Handshake(handshake) => {
+                    assert_eq!(handshake.kind, SynAck::Syn);
+                    self.syns.push((now_us, packet));
+                    if self.answers {
+                        uart.received.extend(self.transmitter.ack(Version::One));
+                    }
+                }
+                _ => self.packets.push((now_us, packet)),
+            }
+        }
+        assert_eq!(self.decoder.counters().skipped_bytes, 0, "a board sends whole packets only");
+    }
+
+    fn send(&mut self, payload: Payload, uart: &mut Uart) {
+        uart.received.extend(self.transmitter.encode(payload).expect("the link is up"));
+    }
+
+    /// Every packet of one kind, with its time.
+    pub fn all<T>(&self, pick: impl Fn(Payload) -> Option<T>) -> Vec<(u32, T)> {
+        self.packets
+            .iter()
+            .filter_map(|(at, packet)| pick(packet.payload).map(|payload| (*at, payload)))
+            .collect()
+    }
+}
+
+/// Pins and wires of a steering board.
+pub struct SteeringPins {
+    pub now_us: u32,
+    pub uart: Uart,
+    pub motors: (Motor, Motor),
+    /// Every change of the motors.
+    pub motor_log: Vec<(u32, (Motor, Motor))>,
+    pub bits: VecDeque<(bool, u32)>,
+    pub returns: usize,
+    pub servos: Servos,
+    pub kicks: usize,
+    /// What the processor adds to the clock at every step.
+    pub step_us: u32,
+}
+
+impl Board for SteeringPins {
+    fn now_us(&self) -> u32 {
+        self.now_us
+    }
+    fn uart_read(&mut self) -> Option<u8> {
+        self.uart.received.pop_front()
+    }
+    fn uart_write(&mut self, bytes: &[u8]) -> bool {
+        self.uart.write(bytes, self.now_us)
+    }
+    fn uart_idle(&self) -> bool {
+        self.uart.left_us(self.now_us) == 0
+    }
+    fn reset_cause(&self) -> ResetCause {
+        ResetCause::BrownOut
+    }
+    fn kick_watchdog(&mut self) {
+        self.kicks += 1;
+        self.now_us = self.now_us.wrapping_add(self.step_us);
+    }
+}
+
+impl SteeringBoard for SteeringPins {
+    fn set_motors(&mut self, left: Motor, right: Motor) {
+        self.motors = (left, right);
+        self.motor_log.push((self.now_us, self.motors));
+    }
+    fn exde_bit(&mut self) -> Option<(bool, u32)> {
+        self.bits.pop_front()
+    }
+    fn pulse_exde_return(&mut self) {
+        self.returns += 1;
+    }
+    fn servo_write(&mut self, bytes: &[u8]) -> bool {
+        self.servos.write(bytes, self.now_us)
+    }
+    fn servo_read(&mut self) -> Option<u8> {
+        self.servos.read(self.now_us)
+    }
+    fn battery_decivolts(&mut self) -> u8 {
+        118
+    }
+}
+
+/// A steering board on the bench: it can be sent words and commands, and time passes when told to.
+pub struct Bench {
+    pub pins: SteeringPins,
+    pub unit: SteeringUnit,
+    pub pi: Pi,
+    due_us: u32,
+    /// The command re-sent every 40 ms, as the bridge does.
+    pub renewed: Option<SteerCommand>,
+    renew_us: u32,
+    seq: u8,
+    /// The reading sent every 5 ms, as the sensor board does.
+    pub line: Option<u16>,
+    word_us: u32,
+}
+
+impl Bench {
+    /// A board just switched on, the clock at `now_us`.
+    pub fn boot(now_us: u32, config: SteeringConfig, servos: Servos) -> Self {
+        let pins = SteeringPins {
+            now_us,
+            uart: Uart::new(),
+            motors: (Motor::forward(77), Motor::backward(77)),
+            motor_log: Vec::new(),
+            bits: VecDeque::new(),
+            returns: 0,
+            servos,
+            kicks: 0,
+            step_us: 0,
+        };
+        let unit = SteeringUnit::new(&pins, config);
+        Self {
+            pins,
+            unit,
+            pi: Pi::new(),
+            due_us: now_us,
+            renewed: None,
+            renew_us: now_us,
+            seq: 0,
+            line: None,
+            word_us: now_us,
+        }
+    }
+
+    /// A board that is up, its servos in service, the line under its middle.
+    pub fn ready() -> Self {
+        Self::ready_with(SteeringConfig::default(), Servos::at([512; 8]))
+    }
+
+    pub fn ready_with(config: SteeringConfig, servos: Servos) -> Self {
+        let mut bench = Self::boot(u32::MAX - 1_000_000, config, servos);
+        bench.line = Some(0b000_0011_1000 << 1);
+        bench.run_ms(200);
+        bench.pi.packets.clear();
+        bench.pins.motor_log.clear();
+        bench
+    }
+
+    /// Gives a command a new number, sends it and keeps renewing it. Its number.
+    pub fn command(&mut self, code: u8) -> u8 {
+        self.seq = self.seq.wrapping_add(1);
+        let command = SteerCommand { code, seq: self.seq };
+        self.renewed = Some(command);
+        self.renew_us = self.pins.now_us.wrapping_add(40_000);
+        self.send(Payload::SteerCommand(command));
+        self.seq
+    }
+
+    /// Sends a payload and steps the board.
+    pub fn send(&mut self, payload: Payload) {
+        self.pi.send(payload, &mut self.pins.uart);
+        self.step();
+    }
+
+    pub fn set(&mut self, key: SettingKey, seq: u8, value: i16) {
+        self.send(Payload::Setting(Setting { key, seq, value }));
+    }
+
+    pub fn step(&mut self) {
+        self.due_us = self.unit.step(&mut self.pins);
+        self.pi.hear(&mut self.pins.uart, self.pins.now_us);
+        if !self.pins.uart.received.is_empty() {
+            self.due_us = self.unit.step(&mut self.pins);
+            self.pi.hear(&mut self.pins.uart, self.pins.now_us);
+        }
+    }
+
+    /// Lets time pass; the board is stepped when it wants and on input.
+    pub fn run_us(&mut self, span_us: u32) {
+        let end_us = self.pins.now_us.wrapping_add(span_us);
+        loop {
+            let left_us = end_us.wrapping_sub(self.pins.now_us);
+            let mut ahead_us = left_us.min(ahead(self.pins.now_us, self.due_us).max(1));
+            if let Some(at_us) = self.pins.servos.next_byte_us() {
+                ahead_us = ahead_us.min(ahead(self.pins.now_us, at_us).max(1));
+            }
+            if self.renewed.is_some() {
+                ahead_us = ahead_us.min(ahead(self.pins.now_us, self.renew_us));
+            }
+            if self.line.is_some() {
+                ahead_us = ahead_us.min(ahead(self.pins.now_us, self.word_us));
+            }
+            self.pins.now_us = self.pins.now_us.wrapping_add(ahead_us);
+            if self.pins.now_us == end_us {
+                return;
+            }
+            self.feed();
+            self.step();
+        }
+    }
+
+    pub fn run_ms(&mut self, span_ms: u32) {
+        self.run_us(span_ms * 1_000);
+    }
+
+    /// Runs until `done`, at most `limit_ms`.
+    pub fn run_until(&mut self, limit_ms: u32, done: impl Fn(&Self) -> bool) {
+        for _ in 0..limit_ms {
+            if done(self) {
+                return;
+            }
+            self.run_ms(1);
+        }
+        assert!(done(self), "not within {limit_ms} ms");
+    }
+
+    fn feed(&mut self) {
+        let now_us = self.pins.now_us;
+        if let Some(command) = self.renewed
+            && ahead(now_us, self.renew_us) == 0
+        {
+            self.renew_us = now_us.wrapping_add(40_000);
+            self.pi.send(Payload::SteerCommand(command), &mut self.pins.uart);
+        }
+        if let Some(bits) = self.line
+            && ahead(now_us, self.word_us) == 0
+        {
+            self.word_us = now_us.wrapping_add(5_000);
+            self.word(bits);
+        }
+    }
+
+    /// A word whose last bit comes now.
+    pub fn word(&mut self, bits: u16) {
+        for index in 0..11_u32 {
+            let at_us = self.pins.now_us.wrapping_sub((10 - index) * 100);
+            self.pins.bits.push_back((bits >> (10 - index) & 1 == 1, at_us));
+        }
+    }
+
+    pub fn duties(&self) -> (u8, u8) {
+        (self.pins.motors.0.duty, self.pins.motors.1.duty)
+    }
+
+    /// The latest regular report.
+    pub fn report(&self) -> SteerData {
+        self.reports().last().expect("a report").1
+    }
+
+    pub fn reports(&self) -> Vec<(u32, SteerData)> {
+        self.pi.all(|payload| match payload {
+            Payload::SteerData(data) => Some(data),
+            _ => None,
+        })
+    }
+}
+
+fn ahead(now_us: u32, due_us: u32) -> u32 {
+    let ahead = due_us.wrapping_sub(now_us);
+    if ahead > 1 << 31 { 0 } else { ahead }
+}
+
+/// Pins and wires of a sensor board.
+pub struct SensorPins {
+    pub now_us: u32,
+    pub uart: Uart,
+    /// ADC reading of every line sensor.
+    pub line: [u8; 11],
+    pub ir: u16,
+    pub ir_reads: usize,
+    pub line_reads: usize,
+    pub exde: (bool, bool),
+    /// Every change of data and sync.
+    pub exde_log: Vec<(u32, bool, bool)>,
+    pub returned: bool,
+    pub kicks: usize,
+}
+
+impl Board for SensorPins {
+    fn now_us(&self) -> u32 {
+        self.now_us
+    }
+    fn uart_read(&mut self) -> Option<u8> {
+        self.uart.received.pop_front()
+    }
+    fn uart_write(&mut self, bytes: &[u8]) -> bool {
+        self.uart.write(bytes, self.now_us)
+    }
+    fn uart_idle(&self) -> bool {
+        self.uart.left_us(self.now_us) == 0
+    }
+    fn reset_cause(&self) -> ResetCause {
+        ResetCause::Watchdog
+    }
+    fn kick_watchdog(&mut self) {
+        self.kicks += 1;
+    }
+}
+
+impl SensorBoard for SensorPins {
+    fn read_line_sensor(&mut self, channel: u8) -> u8 {
+        self.line_reads += 1;
+        self.line[usize::from(channel)]
+    }
+    fn read_ir(&mut self) -> u16 {
+        self.ir_reads += 1;
+        self.ir
+    }
+    fn set_exde(&mut self, data: bool, sync: bool) {
+        assert_ne!(self.exde, (data, sync), "the wires are only touched to change them");
+        self.exde = (data, sync);
+        self.exde_log.push((self.now_us, data, sync));
+    }
+    fn exde_return(&mut self) -> bool {
+        core::mem::take(&mut self.returned)
+    }
+}
+
+/// A sensor board on the bench.
+pub struct SensorBench {
+    pub pins: SensorPins,
+    pub unit: SensorUnit,
+    pub pi: Pi,
+    pub due_us: u32,
+}
+
+impl SensorBench {
+    pub fn boot(now_us: u32, config: SensorConfig) -> Self {
+        let pins = SensorPins {
+            now_us,
+            uart: Uart::new(),
+            line: [20; 11],
+            ir: 0,
+            ir_reads: 0,
+            line_reads: 0,
+            exde: (false, false),
+            exde_log: Vec::new(),
+            returned: false,
+            kicks: 0,
+        };
+        let unit = SensorUnit::new(&pins, config);
+        Self { pins, unit, pi: Pi::new(), due_us: now_us }
+    }
+
+    /// A board that is up towards both sides.
+    pub fn ready(config: SensorConfig) -> Self {
+        let mut bench = Self::boot(u32::MAX - 40_000, config);
+        bench.run_ms(10);
+        bench.pins.returned = true;
+        bench.run_ms(60);
+        bench.pi.packets.clear();
+        bench.pins.exde_log.clear();
+        bench
+    }
+
+    pub fn tape(&mut self, bits: u16) {
+        for index in 0..11 {
+            self.pins.line[index] = if bits >> (10 - index) & 1 == 1 { 200 } else { 20 };
+        }
+    }
+
+    pub fn send(&mut self, payload: Payload) {
+        self.pi.send(payload, &mut self.pins.uart);
+        self.step();
+    }
+
+    pub fn set(&mut self, key: SettingKey, seq: u8, value: i16) {
+        self.send(Payload::Setting(Setting { key, seq, value }));
+    }
+
+    pub fn step(&mut self) {
+        self.due_us = self.unit.step(&mut self.pins);
+        self.pi.hear(&mut self.pins.uart, self.pins.now_us);
+        if !self.pins.uart.received.is_empty() {
+            self.due_us = self.unit.step(&mut self.pins);
+            self.pi.hear(&mut self.pins.uart, self.pins.now_us);
+        }
+    }
+
+    pub fn run_ms(&mut self, span_ms: u32) {
+        let end_us = self.pins.now_us.wrapping_add(span_ms * 1_000);
+        loop {
+            let left_us = end_us.wrapping_sub(self.pins.now_us);
+            let ahead_us = left_us.min(ahead(self.pins.now_us, self.due_us).max(1));
+            self.pins.now_us = self.pins.now_us.wrapping_add(ahead_us);
+            if self.pins.now_us == end_us {
+                return;
+            }
+            self.step();
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! The IR ranger at the front, a Sharp GP2Y0A21 (AMB-14): distance in, ADC value out.
+//!
+//! It measures about every 38 ms and holds its output in between. Below 10 cm the output folds
+//! back: the voltage falls again although the object comes nearer.
+//!
+//! ```text
+//!  3.1 V  _
+//!        / \
+//!       /   \__            10-bit ADC at 5 V: 1023 * volts / 5
+//!      /       \_____
+//!  0 --6--10------------80 cm
+//! ```
+
+use crate::body::{IR_AHEAD, Pose};
+use crate::noise::Noise;
+use crate::scene::Block;
+
+/// Time between two measurements in ns (datasheet: 38.3 ms typical).
+pub const CYCLE_NS: u64 = 38_300_000;
+
+/// Output over distance in (cm, volt) from 10 cm on: figure 2 of the datasheet E4-A00201EN,
+/// white paper.
+const FAR_FIELD: [(f64, f64); 10] = [
+    (10.0, 2.305),
+    (15.0, 1.645),
+    (20.0, 1.305),
+    (25.0, 1.079),
+    (30.0, 0.926),
+    (40.0, 0.735),
+    (50.0, 0.604),
+    (60.0, 0.512),
+    (70.0, 0.443),
+    (80.0, 0.415),
+];
+/// The folded part below 10 cm, of the same figure.
+const NEAR_FIELD: [(f64, f64); 9] = [
+    (0.0, 0.0),
+    (0.98, 0.469),
+    (1.65, 0.938),
+    (2.41, 1.442),
+    (3.15, 1.942),
+    (4.18, 2.59),
+    (4.7, 3.007),
+    (5.85, 3.137),
+    (10.0, 2.305),
+];
+/// Output when nothing is in view, in volts.
+const NOTHING: f64 = 0.15;
+/// How far the beam reaches at all, in mm.
+const REACH: f64 = 2_000.0;
+/// Angles of the rays that stand for the beam, in rad.
+const BEAM: [f64; 3] = [-0.04, 0.0, 0.04];
+/// Deviation of a measurement in volts, and the largest gain error of a sensor.
+const NOISE: f64 = 0.008;
+const GAIN_ERROR: f64 = 0.02;
+
+/// The ranger and the output it holds.
+#[derive(Clone, Debug)]
+pub struct IrRanger {
+    gain: f64,
+    volts: f64,
+    next_ns: u64,
+    noise: Noise,
+}
+
+impl IrRanger {
+    /// A ranger whose gain error and noise come from `noise`. Its first measurement is due at
+    /// once.
+    pub fn new(mut noise: Noise) -> Self {
+        Self {
+            gain: 1.0 + noise.spread(GAIN_ERROR),
+            volts: NOTHING,
+            next_ns: 0,
+            noise,
+        }
+    }
+
+    /// Measures if a measurement is due.
+    pub fn step(&mut self, now_ns: u64, pose: &Pose, blocks: &[Block]) {
+        if now_ns < self.next_ns {
+            return;
+        }
+        self.next_ns = now_ns + CYCLE_NS;
+        let clean = match distance(pose, blocks) {
+            Some(millimetres) => volts(millimetres / 10.0) * self.gain,
+            None => NOTHING,
+        };
+        self.volts = clean + self.noise.bell(NOISE);
+    }
+
+    /// The output as a 10-bit conversion at 5 V.
+    pub fn adc(&self) -> u16 {
+        (self.volts / 5.0 * 1023.0).clamp(0.0, 1023.0) as u16
+    }
+}
+
+/// Distance in mm from the ranger to the nearest thing in its beam.
+pub fn distance(pose: &Pose, blocks: &[Block]) -> Option<f64> {
+    let from = pose.point(IR_AHEAD, 0.0);
+    BEAM.iter()
+        .map(|angle| (pose.heading + angle).sin_cos())
+        .flat_map(|(sin, cos)| {
+            blocks
+                .iter()
+                .filter_map(move |block| hit(from, (cos, sin), block))
+        })
+        .min_by(f64::total_cmp)
+        .filter(|distance| *distance < REACH)
+}
+
+/// The output in volts for something `cm` away.
+pub fn volts(cm: f64) -> f64 {
+    let last = FAR_FIELD[FAR_FIELD.len() - 1];
+    if cm < 10.0 {
+        between(&NEAR_FIELD, cm.max(0.0), |cm| cm)
+    } else if cm < last.0 {
+        // The curve is nearly straight over the reciprocal of the distance.
+        between(&FAR_FIELD, cm, |cm| 1.0 / cm)
+    } else {
+        (last.1 * last.0 / cm).max(NOTHING)
+    }
+}
+
+fn between(table: &[(f64, f64)], cm: f64, scale: impl Fn(f64) -> f64) -> f64 {
+    let after = table
+        .partition_point(|point| point.0 <= cm)
+        .clamp(1, table.len() - 1);
+    let (a, b) = (table[after - 1], table[after]);
+    let part = (scale(cm) - scale(a.0)) / (scale(b.0) - scale(a.0));
+    a.1 + (b.1 - a.1) * part
+}
+
+/// Where a ray enters a block: 0 if it starts inside.
+fn hit(from: (f64, f64), direction: (f64, f64), block: &Block) -> Option<f64> {
+    let (mut enter, mut leave) = (0.0_f64, f64::MAX);
+    for (origin, step, low, high) in [
+        (from.0, direction.0, block.low[0], block.high[0]),
+        (from.1, direction.1, block.low[1], block.high[1]),
+    ] {
+        if step.abs() < 1e-9 {
+            if origin < low || origin > high {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((low - origin) / step, (high - origin) / step);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    (enter <= leave).then_some(enter)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::blocks;
+    use crate::{Obstacle, Warehouse};
+
+    fn blocked() -> Vec<Block> {
+        let mut warehouse = Warehouse::builtin("small").unwrap();
+        warehouse.obstacles.push(Obstacle {
+            between: [[1, 0], [2, 0]],
+        });
+        blocks(&warehouse)
+    }
+
+    #[test]
+    fn an_obstacle_ahead_is_seen_at_its_distance() {
+        // The obstacle's face is at x = 710, the ranger 100 mm ahead of the axle.
+        let pose = Pose {
+            x: 200.0,
+            y: 0.0,
+            heading: 0.0,
+        };
+        assert!((distance(&pose, &blocked()).unwrap() - 410.0).abs() < 1e-6);
+        let away = Pose {
+            heading: core::f64::consts::PI,
+            ..pose
+        };
+        assert_eq!(distance(&away, &blocked()), None);
+    }
+
+    #[test]
+    fn the_shelf_behind_a_mark_is_seen() {
+        let pose = Pose {
+            x: 750.0,
+            y: 0.0,
+            heading: core::f64::consts::FRAC_PI_2,
+        };
+        let shelves = blocks(&Warehouse::builtin("small").unwrap());
+        assert!((distance(&pose, &shelves).unwrap() - 110.0).abs() < 0.5);
+    }
+
+    #[test]
+    fn the_curve_meets_the_datasheet_and_folds_back() {
+        for (cm, volt) in FAR_FIELD {
+            assert!((volts(cm) - volt).abs() < 1e-9, "{cm} cm");
+        }
+        assert!((volts(35.0) - 0.82).abs() < 0.02);
+        assert!(volts(3.0) < volts(6.0) && volts(6.0) > volts(10.0));
+        assert!(volts(150.0) < 0.25 && volts(150.0) > NOTHING);
+    }
+
+    #[test]
+    fn the_output_holds_between_measurements() {
+        let mut ranger = IrRanger::new(Noise::new(1, 1));
+        let pose = Pose {
+            x: 200.0,
+            y: 0.0,
+            heading: 0.0,
+        };
+        ranger.step(0, &pose, &blocked());
+        let held = ranger.adc();
+        assert!(
+            (held as f64 - volts(41.0) / 5.0 * 1023.0).abs() < 12.0,
+            "{held}"
+        );
+        let nearer = Pose { x: 400.0, ..pose };
+        ranger.step(CYCLE_NS - 1, &nearer, &blocked());
+        assert_eq!(ranger.adc(), held);
+        ranger.step(CYCLE_NS, &nearer, &blocked());
+        assert!(ranger.adc() > held + 50);
+    }
+}

@@ -1,0 +1,163 @@
+//! Where the things of a warehouse stand, in mm.
+//!
+//! It turns the numbers of a [`Warehouse`] into points and boxes on the floor, in one place, so
+//! that the tape, the ranger and the goods agree about them.
+
+use core::f64::consts::PI;
+
+use crate::body::Pose;
+use crate::goods::SHELF_HEIGHT;
+use crate::warehouse::{Edge, Product, Side, Warehouse};
+
+/// How far goods stand from the middle of their edge, in mm.
+pub const STAND: f64 = 250.0;
+/// Side of the shelf under one piece of goods, in mm.
+pub const SHELF: f64 = 80.0;
+/// Extent of an obstacle along its edge, in mm.
+pub const OBSTACLE_ALONG: f64 = 80.0;
+/// Extent of an obstacle across its edge, in mm.
+pub const OBSTACLE_ACROSS: f64 = 160.0;
+
+/// A box on the floor that the ranger sees, sides along the axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// Smallest x and y.
+    pub low: [f64; 2],
+    /// Largest x and y.
+    pub high: [f64; 2],
+}
+
+impl Block {
+    fn around(middle: (f64, f64), width: f64, height: f64) -> Self {
+        Self {
+            low: [middle.0 - width / 2.0, middle.1 - height / 2.0],
+            high: [middle.0 + width / 2.0, middle.1 + height / 2.0],
+        }
+    }
+}
+
+/// The node's place.
+pub fn node(at: [u8; 2], side: f64) -> (f64, f64) {
+    (f64::from(at[0]) * side, f64::from(at[1]) * side)
+}
+
+/// The middle of an edge.
+pub fn middle(edge: Edge, side: f64) -> (f64, f64) {
+    let (a, b) = (node(edge.from, side), node(edge.to, side));
+    (f64::midpoint(a.0, b.0), f64::midpoint(a.1, b.1))
+}
+
+/// The direction from the middle of a side into its square.
+pub fn inwards(side: Side) -> (f64, f64) {
+    match side {
+        Side::Left => (1.0, 0.0),
+        Side::Up => (0.0, -1.0),
+        Side::Right => (-1.0, 0.0),
+        Side::Down => (0.0, 1.0),
+    }
+}
+
+/// Where a product's goods stand; `side` is the side of a square in mm.
+pub fn stand(product: &Product, side: f64) -> (f64, f64) {
+    let (x, y) = middle(Edge::of(product.square, product.side), side);
+    let (dx, dy) = inwards(product.side);
+    (x + STAND * dx, y + STAND * dy)
+}
+
+/// Where a product's goods stand and how high, as a point.
+pub fn stand_3d(product: &Product, side: f64) -> [f64; 3] {
+    let (x, y) = stand(product, side);
+    [x, y, SHELF_HEIGHT]
+}
+
+/// The start: on the delivery node, looking into the warehouse along x (AMB-50).
+pub fn start(warehouse: &Warehouse) -> Pose {
+    let (x, y) = node(warehouse.delivery, side_mm(warehouse));
+    let heading = if warehouse.starts_towards_plus_x() {
+        0.0
+    } else {
+        PI
+    };
+    Pose { x, y, heading }
+}
+
+/// Side of a square in mm.
+pub fn side_mm(warehouse: &Warehouse) -> f64 {
+    f64::from(warehouse.side_length_cm) * 10.0
+}
+
+/// Everything the IR ranger can see: obstacles and shelves.
+pub fn blocks(warehouse: &Warehouse) -> Vec<Block> {
+    let side = side_mm(warehouse);
+    let obstacles = warehouse.obstacles.iter().filter_map(|obstacle| {
+        let edge = Edge::between(obstacle.between[0], obstacle.between[1])?;
+        let horizontal = edge.from[1] == edge.to[1];
+        let (width, height) = if horizontal {
+            (OBSTACLE_ALONG, OBSTACLE_ACROSS)
+        } else {
+            (OBSTACLE_ACROSS, OBSTACLE_ALONG)
+        };
+        Some(Block::around(middle(edge, side), width, height))
+    });
+    let shelves = warehouse
+        .products
+        .iter()
+        .map(|product| Block::around(stand(product, side), SHELF, SHELF));
+    obstacles.chain(shelves).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goods_stand_inside_their_square() {
+        let product = |side| Product {
+            id: 1,
+            square: [1, 2],
+            side,
+        };
+        assert_eq!(stand(&product(Side::Left), 500.0), (750.0, 1250.0));
+        assert_eq!(stand(&product(Side::Down), 600.0), (900.0, 1450.0));
+        assert_eq!(stand(&product(Side::Up), 600.0), (900.0, 1550.0));
+        assert_eq!(stand(&product(Side::Right), 600.0), (950.0, 1500.0));
+    }
+
+    #[test]
+    fn a_robot_starts_at_the_delivery_corner_and_looks_inwards() {
+        let mut warehouse = Warehouse::builtin("small").unwrap();
+        assert_eq!(
+            start(&warehouse),
+            Pose {
+                x: 0.0,
+                y: 0.0,
+                heading: 0.0
+            }
+        );
+        warehouse.delivery = [2, 2];
+        assert_eq!(
+            start(&warehouse),
+            Pose {
+                x: 1000.0,
+                y: 1000.0,
+                heading: PI
+            }
+        );
+    }
+
+    #[test]
+    fn an_obstacle_stands_across_its_edge() {
+        let mut warehouse = Warehouse::builtin("small").unwrap();
+        warehouse.products.clear();
+        warehouse.obstacles.push(crate::Obstacle {
+            between: [[0, 1], [0, 0]],
+        });
+        assert_eq!(
+            blocks(&warehouse),
+            [Block {
+                low: [-80.0, 210.0],
+                high: [80.0, 290.0]
+            }]
+        );
+    }
+}

@@ -1,0 +1,512 @@
+//! The arm's AX-12 servos and the half-duplex wire they share with the steering board (A1).
+//!
+//! Each servo has the control table of the original's listing (A3) and answers the bytes it is
+//! sent as the real one does: after its return delay, at 1 Mbit/s, and not at all when it is
+//! broadcast to or its return level forbids it. It moves at its goal speed, and pushes harder
+//! the farther it is kept from its goal.
+//!
+//! ```text
+//!  board  | FF FF id .. sum |
+//!  servo                      return delay  | FF FF id .. sum |      10 us a byte
+//! ```
+//! The board's own bytes are not echoed here: whoever owns the wire mutes its receiver while it
+//! sends (AMB-26). Not modelled: heat, shutdown by overload, change of the baud rate; RESET is
+//! refused, because it would leave eight servos with one id.
+
+use core::time::Duration;
+use std::collections::VecDeque;
+
+use lager_ax12::table::{
+    BAUD_1_MBIT, BAUD_RATE, CCW_ANGLE_LIMIT_L, CW_ANGLE_LIMIT_L, DEFAULT_RETURN_DELAY, FULL_SPEED,
+    GOAL_POSITION_L, GOAL_SPEED_L, ID, LENGTH, MAX_POSITION, MAX_TORQUE_L, MODEL_AX12,
+    MODEL_NUMBER_L, MOVING, PRESENT_LOAD_L, PRESENT_POSITION_L, PRESENT_SPEED_L,
+    PRESENT_TEMPERATURE, PRESENT_VOLTAGE, REGISTERED_INSTRUCTION, RETURN_DELAY_TIME, RETURN_LEVEL,
+    TORQUE_ENABLE, TORQUE_LIMIT_L, unsigned,
+};
+use lager_ax12::{BROADCAST_ID, ErrorBits, Frame, Instruction, InstructionDecoder, Packet};
+
+use crate::arm::SERVOS;
+
+/// Time of one byte at 1 Mbit/s.
+const BYTE_NS: u64 = 10_000;
+/// Units of position per second at full speed: 59 revolutions a minute, 1023 units to 300 degrees.
+pub const FULL_SPEED_UNITS: f64 = 59.0 * 6.0 * 1023.0 / 300.0;
+/// Units of position per second and unit of the goal speed: 0.111 revolutions a minute.
+const SPEED_UNIT: f64 = 0.111 * 6.0 * 1023.0 / 300.0;
+/// Distance from the goal at which a blocked servo pushes with all its torque (compliance slope).
+const SLOPE: f64 = 32.0;
+
+/// One servo.
+#[derive(Clone, Debug)]
+pub struct Servo {
+    table: [u8; LENGTH],
+    registered: Option<(u8, Vec<u8>)>,
+    position: f64,
+    /// The lowest position the joint can get to now, when something is in the way.
+    stop: f64,
+}
+
+impl Servo {
+    /// A servo with the factory's values, at `position` and without torque.
+    pub fn new(id: u8, position: u16) -> Self {
+        let mut servo = Self {
+            table: [0; LENGTH],
+            registered: None,
+            position: f64::from(position),
+            stop: 0.0,
+        };
+        for (address, value) in [
+            (MODEL_NUMBER_L, MODEL_AX12),
+            (CCW_ANGLE_LIMIT_L, MAX_POSITION),
+            (MAX_TORQUE_L, 1023),
+            (TORQUE_LIMIT_L, 1023),
+            (GOAL_POSITION_L, position),
+        ] {
+            servo.set_word(address, value);
+        }
+        for (address, value) in [
+            (ID, id),
+            (BAUD_RATE, BAUD_1_MBIT),
+            (RETURN_DELAY_TIME, DEFAULT_RETURN_DELAY),
+            (RETURN_LEVEL, 2),
+            (PRESENT_VOLTAGE, 111),
+            (PRESENT_TEMPERATURE, 38),
+        ] {
+            servo.table[usize::from(address)] = value;
+        }
+        servo.publish(0.0, 0.0);
+        servo
+    }
+
+    /// Present position in units, not rounded.
+    pub fn position(&self) -> f64 {
+        self.position
+    }
+
+    fn word(&self, address: u8) -> u16 {
+        let at = usize::from(address);
+        u16::from_le_bytes([self.table[at], self.table[at + 1]])
+    }
+
+    fn set_word(&mut self, address: u8, value: u16) {
+        let at = usize::from(address);
+        self.table[at..at + 2].copy_from_slice(&value.to_le_bytes());
+    }
+
+    fn step(&mut self, seconds: f64) {
+        if self.table[usize::from(TORQUE_ENABLE)] == 0 {
+            self.publish(0.0, 0.0);
+            return;
+        }
+        let goal = f64::from(self.word(GOAL_POSITION_L));
+        if goal == self.position && self.position >= self.stop {
+            self.publish(0.0, 0.0);
+            return;
+        }
+        let speed = match self.word(GOAL_SPEED_L) & 0x03FF {
+            FULL_SPEED => FULL_SPEED_UNITS,
+            units => (f64::from(units) * SPEED_UNIT).min(FULL_SPEED_UNITS),
+        };
+        let step = (goal - self.position).clamp(-speed * seconds, speed * seconds);
+        let before = self.position;
+        self.position = (before + step).max(self.stop);
+        let missing = goal - self.position;
+        let blocked = goal < self.stop && self.position <= self.stop;
+        let torque = f64::from(self.word(TORQUE_LIMIT_L).min(1023));
+        // A moving joint needs a little torque; a blocked one is pushed by the distance left.
+        let load = if blocked {
+            (missing / SLOPE * 1023.0).clamp(-torque, torque)
+        } else {
+            (missing.signum() * 60.0).clamp(-torque, torque)
+        };
+        self.publish((self.position - before) / seconds, load);
+    }
+
+    /// Writes what was measured into the table.
+    fn publish(&mut self, units_per_s: f64, load: f64) {
+        self.set_word(PRESENT_POSITION_L, self.position.round() as u16);
+        self.set_word(PRESENT_SPEED_L, unsigned((units_per_s / SPEED_UNIT) as i16));
+        self.set_word(PRESENT_LOAD_L, unsigned(load as i16));
+        self.table[usize::from(MOVING)] = u8::from(units_per_s != 0.0);
+    }
+
+    /// Carries out an instruction; the errors and registers of the answer, if there is one.
+    fn obey(
+        &mut self,
+        instruction: Option<Instruction>,
+        parameters: &[u8],
+    ) -> (ErrorBits, Vec<u8>) {
+        let done = |errors| (errors, Vec::new());
+        match (instruction, parameters) {
+            (Some(Instruction::Ping), []) => done(ErrorBits::NONE),
+            (Some(Instruction::Read), &[address, count]) => self.read(address, count),
+            (Some(Instruction::Write), [address, values @ ..]) => {
+                done(self.write(*address, values))
+            }
+            (Some(Instruction::RegWrite), [address, values @ ..]) => {
+                self.registered = Some((*address, values.to_vec()));
+                self.table[usize::from(REGISTERED_INSTRUCTION)] = 1;
+                done(ErrorBits::NONE)
+            }
+            (Some(Instruction::Action), []) => {
+                self.table[usize::from(REGISTERED_INSTRUCTION)] = 0;
+                match self.registered.take() {
+                    Some((address, values)) => done(self.write(address, &values)),
+                    None => done(ErrorBits::INSTRUCTION),
+                }
+            }
+            _ => done(ErrorBits::INSTRUCTION),
+        }
+    }
+
+    fn read(&self, address: u8, count: u8) -> (ErrorBits, Vec<u8>) {
+        let from = usize::from(address);
+        match self.table.get(from..from + usize::from(count)) {
+            Some(registers) if count > 0 => (ErrorBits::NONE, registers.to_vec()),
+            _ => (ErrorBits::RANGE, Vec::new()),
+        }
+    }
+
+    fn write(&mut self, address: u8, values: &[u8]) -> ErrorBits {
+        let from = usize::from(address);
+        let last = from + values.len();
+        let measured = usize::from(PRESENT_POSITION_L)..=usize::from(REGISTERED_INSTRUCTION);
+        let read_only =
+            |at: usize| at < usize::from(ID) || measured.contains(&at) || at == usize::from(MOVING);
+        if values.is_empty() || last > LENGTH || (from..last).any(read_only) {
+            return ErrorBits::RANGE;
+        }
+        let before = self.table;
+        self.table[from..last].copy_from_slice(values);
+        let goal = self.word(GOAL_POSITION_L);
+        let limits = self.word(CW_ANGLE_LIMIT_L)..=self.word(CCW_ANGLE_LIMIT_L);
+        let goal_at = usize::from(GOAL_POSITION_L);
+        if (from..last).contains(&goal_at) {
+            if !limits.contains(&goal) {
+                self.table = before;
+                return ErrorBits::ANGLE_LIMIT;
+            }
+            // Writing a goal switches the torque on, as the real servo does.
+            self.table[usize::from(TORQUE_ENABLE)] = 1;
+        }
+        ErrorBits::NONE
+    }
+
+    fn answers(&self, instruction: Option<Instruction>) -> bool {
+        match self.table[usize::from(RETURN_LEVEL)] {
+            0 => instruction == Some(Instruction::Ping),
+            1 => matches!(instruction, Some(Instruction::Ping | Instruction::Read)),
+            _ => true,
+        }
+    }
+}
+
+/// The servos on their wire.
+#[derive(Clone, Debug)]
+pub struct ServoBus {
+    servos: [Servo; SERVOS],
+    present: [bool; SERVOS],
+    decoder: InstructionDecoder,
+    replies: VecDeque<(u64, u8)>,
+    free_ns: u64,
+    collisions: u64,
+}
+
+impl ServoBus {
+    /// Servos 1 to 8 without torque at the given positions.
+    pub fn new(positions: [u16; SERVOS]) -> Self {
+        Self {
+            servos: core::array::from_fn(|index| Servo::new(index as u8 + 1, positions[index])),
+            present: [true; SERVOS],
+            decoder: InstructionDecoder::new(),
+            replies: VecDeque::new(),
+            free_ns: 0,
+            collisions: 0,
+        }
+    }
+
+    /// The board sends `bytes` from `now` on.
+    pub fn transmit(&mut self, now: Duration, bytes: &[u8]) {
+        let now = nanoseconds(now);
+        if now < self.free_ns && !self.replies.is_empty() {
+            // Both drive the wire: the rest of the answer is lost.
+            self.replies.retain(|(at, _)| *at <= now);
+            self.collisions += 1;
+        }
+        let mut end = now.max(self.free_ns.min(now + BYTE_NS));
+        for &byte in bytes {
+            end += BYTE_NS;
+            let mut packet = self.decoder.push(byte);
+            while let Some(found) = packet {
+                let answer = act(&mut self.servos, &self.present, &found);
+                if let Some((delay, frame)) = answer {
+                    let mut at = end + delay;
+                    for &byte in frame.as_bytes() {
+                        at += BYTE_NS;
+                        self.replies.push_back((at, byte));
+                    }
+                    self.free_ns = at;
+                }
+                packet = self.decoder.pending();
+            }
+        }
+        self.free_ns = self.free_ns.max(end);
+    }
+
+    /// The next byte a servo has sent, once it has arrived.
+    pub fn receive(&mut self, now: Duration) -> Option<u8> {
+        let (at, byte) = *self.replies.front()?;
+        (at <= nanoseconds(now)).then(|| {
+            self.replies.pop_front();
+            byte
+        })
+    }
+
+    /// When the next byte arrives, if one is under way.
+    pub fn next_byte(&self) -> Option<Duration> {
+        self.replies
+            .front()
+            .map(|(at, _)| Duration::from_nanos(*at))
+    }
+
+    /// Moves all servos for `seconds`; the claw cannot close beyond `claw_stop`.
+    pub fn step(&mut self, seconds: f64, claw_stop: f64) {
+        self.servos[SERVOS - 1].stop = claw_stop;
+        for servo in &mut self.servos {
+            servo.step(seconds);
+        }
+    }
+
+    /// Present positions in units.
+    pub fn positions(&self) -> [f64; SERVOS] {
+        core::array::from_fn(|index| self.servos[index].position)
+    }
+
+    /// Puts the servos somewhere; those with torque then hold that position.
+    pub fn set_positions(&mut self, positions: [u16; SERVOS]) {
+        for (servo, position) in self.servos.iter_mut().zip(positions) {
+            servo.position = f64::from(position);
+            servo.set_word(GOAL_POSITION_L, position);
+            servo.publish(0.0, 0.0);
+        }
+    }
+
+    /// Plugs servo `id` (1 to 8) in or out; an absent one never answers.
+    pub fn set_present(&mut self, id: u8, present: bool) {
+        if let Some(place) = self.present.get_mut(usize::from(id).wrapping_sub(1)) {
+            *place = present;
+        }
+    }
+
+    /// How often the board sent while a servo was answering.
+    pub fn collisions(&self) -> u64 {
+        self.collisions
+    }
+}
+
+/// Lets the servos act on a packet; the return delay in ns and the answer, if one answers.
+fn act(
+    servos: &mut [Servo; SERVOS],
+    present: &[bool; SERVOS],
+    packet: &Packet<'_>,
+) -> Option<(u64, Frame)> {
+    let instruction = packet.instruction();
+    let reached = servos
+        .iter_mut()
+        .zip(present)
+        .filter(|(_, present)| **present)
+        .map(|(servo, _)| servo);
+    if packet.id == BROADCAST_ID {
+        for servo in reached {
+            match (instruction, packet.parameters) {
+                (Some(Instruction::SyncWrite), [address, width, rest @ ..]) => {
+                    let id = servo.table[usize::from(ID)];
+                    for values in rest.chunks_exact(usize::from(*width) + 1) {
+                        if values[0] == id {
+                            servo.write(*address, &values[1..]);
+                        }
+                    }
+                }
+                _ => {
+                    servo.obey(instruction, packet.parameters);
+                }
+            }
+        }
+        return None;
+    }
+    let servo = reached
+        .into_iter()
+        .find(|servo| servo.table[usize::from(ID)] == packet.id)?;
+    let (errors, registers) = servo.obey(instruction, packet.parameters);
+    let delay = u64::from(servo.table[usize::from(RETURN_DELAY_TIME)]) * 2_000;
+    let frame = Frame::status(packet.id, errors, &registers).ok()?;
+    servo.answers(instruction).then_some((delay, frame))
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    time.as_nanos() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bus() -> ServoBus {
+        ServoBus::new([512; SERVOS])
+    }
+
+    fn ask(bus: &mut ServoBus, frame: &Frame) -> Vec<u8> {
+        let now = Duration::from_nanos(bus.free_ns);
+        bus.transmit(now, frame.as_bytes());
+        let mut answer = Vec::new();
+        while let Some(byte) = bus.receive(now + Duration::from_millis(5)) {
+            answer.push(byte);
+        }
+        answer
+    }
+
+    fn run(bus: &mut ServoBus, milliseconds: usize, claw_stop: f64) {
+        for _ in 0..milliseconds {
+            bus.step(0.001, claw_stop);
+        }
+    }
+
+    #[test]
+    fn a_ping_is_answered_as_in_the_manual() {
+        // e-Manual, protocol 1.0: FF FF 01 02 01 FB -> FF FF 01 02 00 FC.
+        let answer = ask(&mut bus(), &Frame::ping(1));
+        assert_eq!(answer, [0xFF, 0xFF, 0x01, 0x02, 0x00, 0xFC]);
+    }
+
+    #[test]
+    fn an_answer_comes_after_the_packet_the_delay_and_its_own_bytes() {
+        let mut bus = bus();
+        bus.transmit(Duration::ZERO, Frame::ping(3).as_bytes());
+        let first = Duration::from_micros(60 + 500 + 10);
+        assert_eq!(bus.next_byte(), Some(first));
+        assert_eq!(bus.receive(first - Duration::from_nanos(1)), None);
+        assert_eq!(bus.receive(first), Some(0xFF));
+        assert_eq!(bus.next_byte(), Some(first + Duration::from_micros(10)));
+    }
+
+    #[test]
+    fn a_goal_is_reached_at_the_goal_speed() {
+        let mut bus = bus();
+        // Speed 100 is 11.1 revolutions a minute, 227 units a second.
+        let goal = [0x58, 0x02, 100, 0];
+        let answer = ask(&mut bus, &Frame::write(2, GOAL_POSITION_L, &goal).unwrap());
+        assert_eq!(answer[4], 0);
+        run(&mut bus, 100, 0.0);
+        let position = bus.positions()[1];
+        assert!((position - 534.7).abs() < 0.5, "{position}");
+        run(&mut bus, 400, 0.0);
+        assert_eq!(bus.positions()[1], 600.0);
+        assert_eq!(bus.positions()[0], 512.0);
+        let answer = ask(&mut bus, &Frame::read(2, PRESENT_POSITION_L, 2));
+        assert_eq!(answer[5..7], [0x58, 0x02]);
+    }
+
+    #[test]
+    fn a_blocked_claw_pushes_harder_and_stays() {
+        let mut bus = bus();
+        let load = |bus: &mut ServoBus, goal: u16| {
+            ask(
+                bus,
+                &Frame::write(8, GOAL_POSITION_L, &goal.to_le_bytes()).unwrap(),
+            );
+            run(bus, 300, 462.0);
+            let answer = ask(bus, &Frame::read(8, PRESENT_LOAD_L, 2));
+            lager_ax12::table::signed(u16::from_le_bytes([answer[5], answer[6]]))
+        };
+        let little = load(&mut bus, 459);
+        let much = load(&mut bus, 440);
+        assert_eq!(bus.positions()[7], 462.0);
+        assert!(
+            little < 0 && much < 3 * little && much >= -1023,
+            "{little} {much}"
+        );
+    }
+
+    #[test]
+    fn a_broadcast_moves_all_and_nobody_answers() {
+        let mut bus = bus();
+        let goal = 600_u16.to_le_bytes();
+        let servos: Vec<(u8, &[u8])> = (1..=8).map(|id| (id, &goal[..])).collect();
+        let answer = ask(
+            &mut bus,
+            &Frame::sync_write(GOAL_POSITION_L, &servos).unwrap(),
+        );
+        assert!(answer.is_empty());
+        run(&mut bus, 200, 0.0);
+        assert_eq!(bus.positions(), [600.0; SERVOS]);
+    }
+
+    #[test]
+    fn a_write_held_back_waits_for_its_action() {
+        let mut bus = bus();
+        ask(
+            &mut bus,
+            &Frame::reg_write(4, GOAL_POSITION_L, &[0, 1]).unwrap(),
+        );
+        run(&mut bus, 300, 0.0);
+        assert_eq!(bus.positions()[3], 512.0);
+        ask(&mut bus, &Frame::action(BROADCAST_ID));
+        run(&mut bus, 300, 0.0);
+        assert_eq!(bus.positions()[3], 256.0);
+        assert_eq!(
+            ask(&mut bus, &Frame::action(4))[4],
+            ErrorBits::INSTRUCTION.bits()
+        );
+    }
+
+    #[test]
+    fn what_a_servo_cannot_do_it_says() {
+        let mut bus = bus();
+        let error = |bus: &mut ServoBus, frame: &Frame| ask(bus, frame)[4];
+        let write = |address, values: &[u8]| Frame::write(1, address, values).unwrap();
+        assert_eq!(
+            error(&mut bus, &write(PRESENT_POSITION_L, &[1, 1])),
+            ErrorBits::RANGE.bits()
+        );
+        assert_eq!(
+            error(&mut bus, &write(49, &[1, 1])),
+            ErrorBits::RANGE.bits()
+        );
+        ask(&mut bus, &write(CCW_ANGLE_LIMIT_L, &600_u16.to_le_bytes()));
+        let too_far = write(GOAL_POSITION_L, &601_u16.to_le_bytes());
+        assert_eq!(error(&mut bus, &too_far), ErrorBits::ANGLE_LIMIT.bits());
+        let reset = Frame::instruction(1, Instruction::Reset, &[]).unwrap();
+        assert_eq!(error(&mut bus, &reset), ErrorBits::INSTRUCTION.bits());
+    }
+
+    #[test]
+    fn silence_where_no_servo_should_speak() {
+        let mut bus = bus();
+        assert!(ask(&mut bus, &Frame::ping(9)).is_empty());
+        bus.set_present(5, false);
+        assert!(ask(&mut bus, &Frame::ping(5)).is_empty());
+        ask(&mut bus, &Frame::write(6, RETURN_LEVEL, &[1]).unwrap());
+        assert!(
+            ask(
+                &mut bus,
+                &Frame::write(6, GOAL_POSITION_L, &[0, 2]).unwrap()
+            )
+            .is_empty()
+        );
+        assert!(!ask(&mut bus, &Frame::read(6, ID, 1)).is_empty());
+    }
+
+    #[test]
+    fn sending_into_an_answer_spoils_it() {
+        let mut bus = bus();
+        bus.transmit(Duration::ZERO, Frame::ping(1).as_bytes());
+        bus.transmit(Duration::from_micros(575), Frame::ping(2).as_bytes());
+        assert_eq!(bus.collisions(), 1);
+        let mut answer = Vec::new();
+        while let Some(byte) = bus.receive(Duration::from_millis(9)) {
+            answer.push(byte);
+        }
+        // One byte of the first answer had come; the second is whole.
+        assert_eq!(answer, [0xFF, 0xFF, 0xFF, 0x02, 0x02, 0x00, 0xFB]);
+    }
+}

@@ -1,0 +1,386 @@
+//! The arbiter's other side: what is written to the steering board, and what its reports mean.
+//!
+//! It is apart from the judgement of orders because it knows the board (its version, its flags,
+//! its sequence byte) and nothing of origins and modes.
+
+use core::time::Duration;
+
+use lager_topics::Finish;
+use lager_wire::{ArmCommand, Command, SteerCommand, SteerData, SteerFlags, Version, WheelCommand};
+
+use super::{Arbiter, LEASE, Lease, RESEND, Running, STANDBY, Search, moves};
+
+/// How long the wheels are in standby on the wire before an arm command follows: the board
+/// unlocks its arm in standby only (T4), and one pass of its loop must have seen it.
+const ARM_UNLOCK: Duration = Duration::from_millis(20);
+
+/// The board's limit on a command's age.
+const COMMAND_AGE: Duration = Duration::from_millis(150);
+
+/// How long a one-shot may stay unseen in the reports of a board that was away.
+const SEARCH: Duration = Duration::from_millis(200);
+
+/// Reports without a trace of a one-shot that prove it is gone.
+const MISSES: u8 = 2;
+
+/// When a command the driver did not take is tried again.
+const RETRY: Duration = Duration::from_millis(5);
+
+/// How often standby is written while the bridge shuts down.
+const PARKED_RESEND: Duration = Duration::from_millis(20);
+
+impl Arbiter {
+    /// The steering board's link is up. `rebooted`: the board has lost what it was told.
+    ///
+    /// A setpoint goes on under a new sequence byte. A one-shot that was written is not written
+    /// again: it is looked for in the board's reports and is aborted if it is not there.
+    pub fn board_up(&mut self, now: Duration, version: Version, rebooted: bool) {
+        self.advance(now);
+        self.board = Some(version);
+        self.board_finished = None;
+        self.written = None;
+        self.halted_at = None;
+        self.next_send = now;
+        if !self.acquainted && version == Version::One {
+            // The board may be executing any sequence byte of a bridge nobody remembers: of two
+            // different ones, at least one is new to it.
+            self.acquainted = true;
+            self.prelude = Some(standby(self.next_seq()));
+        }
+        let gone = rebooted || version == Version::Original;
+        match self.running {
+            Some(one_shot) if one_shot.command.is_one_shot() && one_shot.written.is_some() => {
+                if gone {
+                    self.finish_running(Finish::Aborted);
+                } else if matches!(one_shot.lease, Lease::Until(_)) {
+                    self.search(now);
+                }
+            }
+            Some(_) => {
+                self.idle_seq = self.next_seq();
+                self.reseat();
+            }
+            None => self.idle_seq = self.next_seq(),
+        }
+        self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// The steering board's link is down: nothing can be written.
+    pub fn board_down(&mut self) {
+        self.board = None;
+        self.prelude = None;
+        self.retry_at = None;
+    }
+
+    /// Takes a report of the steering board: its last finished sequence byte becomes the end of
+    /// an order. The reports of an original board mean nothing that is documented and are
+    /// ignored.
+    pub fn observe(&mut self, now: Duration, report: &SteerData) {
+        self.advance(now);
+        if self.board != Some(Version::One) {
+            return;
+        }
+        self.board_finished = Some(report.finished_seq);
+        let Some(running) = self.running else {
+            return;
+        };
+        let refused = report.flags.contains(SteerFlags::REFUSED);
+        if report.finished_seq == running.seq
+            && running.written.is_some()
+            && (refused || running.command.is_one_shot())
+        {
+            let finish = if refused {
+                Finish::Refused
+            } else if report.flags.contains(SteerFlags::ABORTED) {
+                Finish::Aborted
+            } else {
+                Finish::Done
+            };
+            self.finish_running(finish);
+            return;
+        }
+        if running.search.is_some() {
+            self.look_for(report);
+            return;
+        }
+        let failsafe = report.flags.contains(SteerFlags::FAILSAFE) && moves(running.command);
+        let old = |written| now.saturating_sub(written) >= COMMAND_AGE;
+        if failsafe && !running.command.is_one_shot() && running.written.is_some_and(old) {
+            // The board gave the command up for its age, but its origin still wants it.
+            self.reseat();
+        }
+    }
+
+    /// Lets time pass: leases end, held arm orders are released, one-shots of an original board
+    /// are taken for done.
+    pub fn advance(&mut self, now: Duration) {
+        if let Some(running) = self.running.as_mut() {
+            running.lease.start(now);
+        }
+        if let Some(grant) = self.grant.as_mut() {
+            grant.lease.start(now);
+            if grant.lease.is_over(now) {
+                // What the operator moved, he moved by logic's leave.
+                self.grant = None;
+                self.lapse();
+            }
+        }
+        if self
+            .running
+            .is_some_and(|running| running.lease.is_over(now))
+        {
+            self.lapse();
+            // The standby below a guest may have lapsed as well.
+            if self
+                .running
+                .is_some_and(|running| running.lease.is_over(now))
+            {
+                self.lapse();
+            }
+        }
+        let Some(running) = self.running.as_mut() else {
+            return;
+        };
+        if running.held_until.is_some_and(|until| until <= now) {
+            running.held_until = None;
+        }
+        let lost = running.search.is_some_and(|search| search.deadline <= now);
+        let done = self.board == Some(Version::Original) && original_is_done(running, now);
+        if done {
+            self.finish_running(Finish::Done);
+        } else if lost {
+            self.finish_running(Finish::Aborted);
+        }
+    }
+
+    /// What to write now, if anything; ask again until there is nothing.
+    ///
+    /// A version-1 board is told a change at once and the command in force every [`RESEND`]; a
+    /// version-0 board, which would carry out a repetition, is told each command once.
+    pub fn poll(&mut self, now: Duration) -> Option<SteerCommand> {
+        self.advance(now);
+        let version = self.board?;
+        if self.retry_at.is_some_and(|at| at > now) {
+            return None;
+        }
+        let retry = self.retry_at.take().is_some();
+        if let Some(prelude) = self.prelude.take() {
+            return Some(prelude);
+        }
+        if !self.may_write() {
+            return None;
+        }
+        let command = self.register();
+        let repeat = (version == Version::One || self.parked) && self.next_send <= now;
+        if self.written == Some(command) && !repeat && !retry {
+            return None;
+        }
+        let moved = self.written.is_some_and(|written| code_moves(written.code));
+        if moved && !code_moves(command.code) {
+            self.halted_at = Some(now);
+        }
+        self.written = Some(command);
+        self.next_send = now + if self.parked { PARKED_RESEND } else { RESEND };
+        if let Some(running) = self.running.as_mut()
+            && running.held_until.is_none()
+        {
+            running.written.get_or_insert(now);
+        }
+        Some(command)
+    }
+
+    /// What [`Arbiter::poll`] gave last could not be written: it is given again shortly.
+    pub fn not_written(&mut self, now: Duration) {
+        self.retry_at = Some(now + RETRY);
+    }
+
+    /// When [`Arbiter::poll`] next has something to say, if no order or report comes before; a
+    /// moment that is past means now.
+    pub fn next_due(&self) -> Option<Duration> {
+        let running = self.running.as_ref();
+        let writes = self.board.is_some() && self.may_write();
+        let unwritten = writes && self.written != Some(self.register());
+        let at_once = unwritten || (self.prelude.is_some() && self.board.is_some());
+        let repeats = self.board == Some(Version::One) || (self.parked && self.board.is_some());
+        let write = if self.retry_at.is_some() {
+            self.retry_at
+        } else if at_once {
+            Some(Duration::ZERO)
+        } else {
+            (repeats && writes).then_some(self.next_send)
+        };
+        [
+            running.and_then(|running| running.lease.end()),
+            running.and_then(|running| running.held_until),
+            running.and_then(|running| running.search.map(|search| search.deadline)),
+            running.and_then(|running| {
+                let done = running.written? + original_duration(running.command)?;
+                (self.board == Some(Version::Original)).then_some(done)
+            }),
+            self.grant.and_then(|grant| grant.lease.end()),
+            write,
+        ]
+        .into_iter()
+        .flatten()
+        .min()
+    }
+
+    /// Puts an order in force.
+    pub(super) fn begin(
+        &mut self,
+        received: Duration,
+        key: super::OrderKey,
+        command: Command,
+        arm_granted: bool,
+    ) {
+        let mut held_until = None;
+        if matches!(command, Command::Arm(_)) {
+            if self.written.is_some_and(|written| code_moves(written.code)) {
+                // The standby between was superseded before it was written.
+                self.idle_seq = self.next_seq();
+                held_until = Some(received + ARM_UNLOCK);
+            } else if let Some(halted_at) = self.halted_at {
+                held_until = Some(halted_at + ARM_UNLOCK).filter(|until| received < *until);
+            }
+        }
+        self.running = Some(Running {
+            key,
+            command,
+            seq: self.next_seq(),
+            arm_granted,
+            lease: Lease::Until(received + LEASE),
+            held_until,
+            written: None,
+            search: None,
+        });
+        self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// The origin of an order taken up from an earlier life of the bridge has spoken.
+    pub(super) fn claim(&mut self, received: Duration) {
+        let Some(running) = self.running else {
+            return;
+        };
+        if running.command.is_one_shot() {
+            if self.board.is_some() {
+                self.search(received);
+            }
+        } else {
+            self.reseat();
+        }
+    }
+
+    /// A sequence byte that is new to the board.
+    pub(super) fn next_seq(&mut self) -> u8 {
+        loop {
+            self.wire_seq = self.wire_seq.wrapping_add(1);
+            if self.wire_seq != 0 && Some(self.wire_seq) != self.board_finished {
+                return self.wire_seq;
+            }
+        }
+    }
+
+    /// Gives the setpoint in force a new sequence byte, so that the board executes it anew.
+    fn reseat(&mut self) {
+        let seq = self.next_seq();
+        if let Some(running) = self.running.as_mut() {
+            running.seq = seq;
+            running.written = None;
+        }
+        self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// Starts looking for the one-shot in force in the board's reports.
+    fn search(&mut self, now: Duration) {
+        if let Some(running) = self.running.as_mut() {
+            running.search = Some(Search {
+                deadline: now + SEARCH,
+                misses: 0,
+            });
+        }
+    }
+
+    /// Compares a report with the one-shot looked for, which is not the last finished one.
+    fn look_for(&mut self, report: &SteerData) {
+        let Some(running) = self.running.as_mut() else {
+            return;
+        };
+        let Some(search) = running.search.as_mut() else {
+            return;
+        };
+        if report.flags.contains(SteerFlags::BUSY) && report.code == running.command.code() {
+            running.search = None;
+            return;
+        }
+        search.misses += 1;
+        if search.misses >= MISSES {
+            self.finish_running(Finish::Aborted);
+        }
+    }
+
+    /// Nobody has renewed the order in force.
+    fn lapse(&mut self) {
+        if self
+            .running
+            .is_some_and(|running| running.command != STANDBY)
+        {
+            self.leases_expired = self.leases_expired.wrapping_add(1);
+        }
+        self.finish_running(Finish::Aborted);
+    }
+
+    /// The command that belongs on the wire.
+    fn register(&self) -> SteerCommand {
+        match self.running {
+            Some(Running {
+                held_until: None,
+                command,
+                seq,
+                ..
+            }) => SteerCommand {
+                code: command.code(),
+                seq,
+            },
+            _ => standby(self.idle_seq),
+        }
+    }
+
+    /// Whether it is known what belongs on the wire.
+    fn may_write(&self) -> bool {
+        self.running.is_none_or(|running| {
+            matches!(running.lease, Lease::Until(_)) && running.search.is_none()
+        })
+    }
+}
+
+fn standby(seq: u8) -> SteerCommand {
+    SteerCommand {
+        code: STANDBY.code(),
+        seq,
+    }
+}
+
+fn code_moves(code: u8) -> bool {
+    Command::from_code(code).is_some_and(moves)
+}
+
+/// Whether an original board must have finished a one-shot by now.
+fn original_is_done(running: &Running, now: Duration) -> bool {
+    match (running.written, original_duration(running.command)) {
+        (Some(written), Some(duration)) => written + duration <= now,
+        _ => false,
+    }
+}
+
+/// How long an original board, which reports nothing, is given for a one-shot: the timed turns
+/// of W4 (a full turn takes 12 s) and a generous time for the arm.
+fn original_duration(command: Command) -> Option<Duration> {
+    let millis = match command {
+        Command::Wheel(WheelCommand::LeftPerp | WheelCommand::RightPerp) => 3_250,
+        Command::Wheel(WheelCommand::LeftDiag | WheelCommand::RightDiag) => 1_750,
+        Command::Wheel(_) => return None,
+        Command::Arm(ArmCommand::Drop) => 5_000,
+        Command::Arm(_) => 500,
+    };
+    Some(Duration::from_millis(millis))
+}

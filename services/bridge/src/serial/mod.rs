@@ -1,0 +1,283 @@
+//! One serial port as the boards need it: raw, 8 data bits, no parity, 1 stop bit, exclusive.
+//!
+//! It is apart so that everything the operating system can say about a port is turned into a
+//! sentence in one place. It never blocks except in [`SerialPort::wait`], never allocates after
+//! opening, and knows nothing of packets.
+//!
+//! A pseudo terminal is as good as a real port: modem lines are ignored, and the driver's
+//! low-latency mode is asked for but not needed.
+
+mod low_latency;
+
+use std::fmt;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use lager_wire::PACKET_LENGTH;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{FlockOperation, Mode, OFlags, flock, fstat, major, open};
+use rustix::io::Errno;
+use rustix::termios::{
+    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl,
+    tcflush, tcgetattr, tcsetattr,
+};
+
+/// Why a port cannot be opened, and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OpenPortError {
+    /// There is no such device.
+    #[error(
+        "there is no serial port {}: plug in the board's USB cable, or name the right port (`ls /dev/serial/by-id` lists those there are)",
+        path.display()
+    )]
+    Missing {
+        /// The port asked for.
+        path: PathBuf,
+    },
+    /// The user may not open it.
+    #[error(
+        "this user may not open the serial port {}: `sudo usermod -aG dialout $USER`, then log in again",
+        path.display()
+    )]
+    NoPermission {
+        /// The port asked for.
+        path: PathBuf,
+    },
+    /// Another process has it.
+    #[error(
+        "the serial port {} is in use by another process: stop that one (`fuser -v {}` names it)",
+        path.display(),
+        path.display()
+    )]
+    Busy {
+        /// The port asked for.
+        path: PathBuf,
+    },
+    /// It is something else than a terminal device.
+    #[error(
+        "{} is not a serial port: name a device such as /dev/ttyUSB0 (`ls /dev/serial/by-id` lists those there are)",
+        path.display()
+    )]
+    NotATerminal {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// The driver does not do this speed.
+    #[error(
+        "the serial port {} does not do {baud} Bd: set the boards and the bridge to a speed its adapter knows",
+        path.display()
+    )]
+    Baud {
+        /// The port asked for.
+        path: PathBuf,
+        /// The speed asked for, in baud.
+        baud: u32,
+    },
+    /// Anything else the operating system says.
+    #[error("the serial port {} cannot be opened: {errno}", path.display())]
+    System {
+        /// The port asked for.
+        path: PathBuf,
+        /// The operating system's words.
+        errno: Errno,
+    },
+}
+
+/// Why an open port is of no use any more: its device has gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the device has gone ({errno})")]
+pub struct PortGone {
+    /// What the operating system said.
+    pub errno: Errno,
+}
+
+/// What a wait brought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waited {
+    /// There are bytes to read, or an end to find out about by reading.
+    Readable,
+    /// The time is over.
+    TimedOut,
+}
+
+/// What became of a packet that was to be sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sent {
+    /// The driver has taken all of it.
+    Whole,
+    /// The driver has taken the beginning; the rest goes before the next packet.
+    Partly,
+    /// The driver's buffer is full: nothing was taken.
+    NotNow,
+}
+
+/// An open port. Reading and writing work through a shared reference, so one thread may read
+/// while another writes (through its own [`PacketWriter`]).
+pub struct SerialPort {
+    fd: OwnedFd,
+    low_latency: bool,
+}
+
+impl fmt::Debug for SerialPort {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SerialPort")
+            .field("low_latency", &self.low_latency)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Major device numbers of the slave ends of pseudo terminals.
+const PTY_SLAVES: std::ops::RangeInclusive<u32> = 136..=143;
+
+impl SerialPort {
+    /// Opens `path` at `baud` and throws away what lay in its buffers.
+    pub fn open(path: &Path, baud: u32) -> Result<Self, OpenPortError> {
+        let fail = |errno| OpenPortError::from_errno(path, errno);
+        // Non-blocking also keeps `open` from waiting for a carrier.
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let fd = open(path, flags, Mode::empty()).map_err(fail)?;
+        let mut termios = tcgetattr(&fd).map_err(fail)?;
+        claim(&fd).map_err(fail)?;
+
+        termios.make_raw();
+        termios.input_modes &= !(InputModes::IXOFF | InputModes::IXANY | InputModes::INPCK);
+        termios.control_modes &= !(ControlModes::CSIZE
+            | ControlModes::PARENB
+            | ControlModes::CSTOPB
+            | ControlModes::CRTSCTS
+            | ControlModes::HUPCL);
+        termios.control_modes |= ControlModes::CS8 | ControlModes::CREAD | ControlModes::CLOCAL;
+        termios.special_codes[SpecialCodeIndex::VMIN] = 1;
+        termios.special_codes[SpecialCodeIndex::VTIME] = 0;
+        let no_such_speed = |_| OpenPortError::Baud {
+            path: path.to_owned(),
+            baud,
+        };
+        termios.set_speed(baud).map_err(no_such_speed)?;
+        tcsetattr(&fd, OptionalActions::Now, &termios).map_err(fail)?;
+        // The driver reports the speed it has really set.
+        let set = tcgetattr(&fd).map_err(fail)?.output_speed();
+        if set.abs_diff(baud) > baud / 50 {
+            return Err(no_such_speed(Errno::INVAL));
+        }
+        let low_latency = low_latency::request(&fd);
+        tcflush(&fd, QueueSelector::IOFlush).map_err(fail)?;
+        Ok(Self { fd, low_latency })
+    }
+
+    /// Whether the driver hands bytes over at once instead of collecting them (some USB adapters
+    /// collect for 16 ms).
+    pub fn is_low_latency(&self) -> bool {
+        self.low_latency
+    }
+
+    /// Waits until there is something to read, at most `timeout` of real time.
+    pub fn wait(&self, timeout: Duration) -> Result<Waited, PortGone> {
+        let timeout = Timespec {
+            tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: timeout.subsec_nanos().into(),
+        };
+        let mut fds = [PollFd::new(&self.fd, PollFlags::IN)];
+        match poll(&mut fds, Some(&timeout)) {
+            Ok(0) | Err(Errno::INTR) => Ok(Waited::TimedOut),
+            Ok(_) => Ok(Waited::Readable),
+            Err(errno) => Err(PortGone { errno }),
+        }
+    }
+
+    /// Reads what is there, up to the buffer's length; 0 = nothing at the moment.
+    ///
+    /// Call it after [`SerialPort::wait`] said `Readable`: an end of the stream is then told from
+    /// an empty buffer.
+    pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PortGone> {
+        match rustix::io::read(&self.fd, buffer) {
+            Ok(0) => Err(PortGone { errno: Errno::PIPE }),
+            Ok(count) => Ok(count),
+            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+            Err(errno) => Err(PortGone { errno }),
+        }
+    }
+
+    /// Throws away what was written and has not left the machine yet.
+    pub fn discard_output(&self) {
+        // A port that cannot do it any more is found out by its reader.
+        let _ = tcflush(&self.fd, QueueSelector::OFlush);
+    }
+}
+
+impl AsFd for SerialPort {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
+}
+
+/// Takes the port for this process alone.
+///
+/// The lock is on the open file and dies with the process. `TIOCEXCL` besides keeps programs away
+/// that ask for no lock, but on a pseudo terminal it outlives a killed process for as long as the
+/// other end is open, which would shut the restarted bridge out.
+fn claim(fd: &OwnedFd) -> Result<(), Errno> {
+    flock(fd, FlockOperation::NonBlockingLockExclusive)?;
+    let is_pty = PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev));
+    if !is_pty {
+        ioctl_tiocexcl(fd)?;
+    }
+    Ok(())
+}
+
+impl OpenPortError {
+    fn from_errno(path: &Path, errno: Errno) -> Self {
+        let path = path.to_owned();
+        match errno {
+            Errno::NOENT | Errno::NXIO | Errno::NODEV | Errno::NOTDIR => Self::Missing { path },
+            Errno::ACCESS | Errno::PERM => Self::NoPermission { path },
+            Errno::BUSY | Errno::AGAIN => Self::Busy { path },
+            Errno::NOTTY | Errno::ISDIR | Errno::INVAL => Self::NotATerminal { path },
+            errno => Self::System { path, errno },
+        }
+    }
+}
+
+/// Writes packets to a port, each with one system call, and keeps packets whole when the driver
+/// takes only a part.
+#[derive(Debug, Default)]
+pub struct PacketWriter {
+    rest: [u8; PACKET_LENGTH],
+    /// How many bytes of `rest` are still to be sent; they are its last ones.
+    rest_length: usize,
+}
+
+impl PacketWriter {
+    /// Sends a packet, after the rest of the one before.
+    pub fn write(
+        &mut self,
+        port: &SerialPort,
+        packet: &[u8; PACKET_LENGTH],
+    ) -> Result<Sent, PortGone> {
+        if self.rest_length > 0 {
+            let rest = &self.rest[PACKET_LENGTH - self.rest_length..];
+            self.rest_length -= put(port, rest)?;
+            if self.rest_length > 0 {
+                return Ok(Sent::NotNow);
+            }
+        }
+        match put(port, packet)? {
+            0 => Ok(Sent::NotNow),
+            PACKET_LENGTH => Ok(Sent::Whole),
+            count => {
+                self.rest = *packet;
+                self.rest_length = PACKET_LENGTH - count;
+                Ok(Sent::Partly)
+            }
+        }
+    }
+}
+
+fn put(port: &SerialPort, bytes: &[u8]) -> Result<usize, PortGone> {
+    match rustix::io::write(port, bytes) {
+        Ok(count) => Ok(count),
+        Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+        Err(errno) => Err(PortGone { errno }),
+    }
+}

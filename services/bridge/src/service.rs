@@ -1,0 +1,577 @@
+//! The main loop: everything that is written to a port is written here, and everything that is
+//! decided is decided by the [`Arbiter`], which this loop feeds.
+//!
+//! One turn: wait, take what the readers have brought, answer requests, drain all orders, let the
+//! arbiter decide, publish its state, write. The order matters: a resume is answered before the
+//! orders are drained, so that a stop that came with it wins; the arbiter's state is published
+//! before the bytes are written, so that no successor can take a carried-out order for a new one.
+//!
+//! **Safe state**: standby. It is written when nobody holds a lease, when a stop is latched, and
+//! several times at shutdown. If this process is killed, the steering board halts by itself
+//! within 150 ms.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use heapless::spsc::{Consumer, Queue};
+use lager_ports::{Bus, Clock, PortError, Publisher, Server, Shutdown, Subscriber, Waiter};
+use lager_topics::{
+    Answer, Ask, AskKind, BridgeRequest, Health, InputKind, LinkHealth, Mode, OperatorInput,
+    Outcome, SteeringCommand, SteeringState,
+};
+use lager_wire::link::HostTransmitter;
+use lager_wire::{
+    Callsign, PACKET_LENGTH, Payload, SettingKey, SteerCommand, SteerData, SteerFlags, Version,
+};
+
+use crate::arbiter::Arbiter;
+use crate::boards::Boards;
+use crate::config::BridgeConfig;
+use crate::frames::{ServoTable, steering_report};
+use crate::reader::{PortEvent, QUEUE, Reader, Shared};
+use crate::serial::{PacketWriter, Sent, SerialPort};
+use crate::settings::{self, Progress, Settings};
+
+/// How often `link/health` is published when nothing changes, in robot time.
+const HEALTH_PERIOD: Duration = Duration::from_millis(100);
+
+/// Longest wait for anything, in real time: a wake can be missed, and the shutdown flag is looked
+/// at that often.
+const LONGEST_WAIT: Duration = Duration::from_millis(20);
+
+/// How long an earlier bridge's state is waited for, in real time.
+const RESUME_WAIT: Duration = Duration::from_millis(500);
+
+/// How long a shutdown waits for the wheels to stand, in robot time.
+const PARKING: Duration = Duration::from_millis(200);
+
+/// How often a shutdown writes standby at least, if there is a board.
+const PARKING_WRITES: u32 = 3;
+
+/// Runs the bridge until `shutdown` is requested.
+///
+/// Ports that cannot be opened are no reason to end: they are tried again for ever, and
+/// `link/health` and the log say so.
+///
+/// # Errors
+/// The bridge's place on the bus cannot be had; the sentence says what to do.
+pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), PortError> {
+    let kept = if config.resume {
+        bus.kept::<LinkHealth>(RESUME_WAIT)?
+    } else {
+        None
+    };
+    let shared = Shared::default();
+    let mut queues: [Queue<PortEvent, QUEUE>; 2] = [Queue::new(), Queue::new()];
+    let [first, second] = &mut queues;
+    let (first_in, first_out) = first.split();
+    let (second_in, second_out) = second.split();
+
+    let server = bus.server::<BridgeRequest>()?;
+    let mut core = Core::new(bus, config, &shared, kept.as_ref(), [first_out, second_out])?;
+    let ringer = core.waiter.ringer()?;
+    shutdown.wake(ringer.clone());
+    let clock = *bus.clock();
+    std::thread::scope(|scope| {
+        for (place, events) in [first_in, second_in].into_iter().enumerate() {
+            let port = (config.ports[place].as_path(), config.baud);
+            let (ringer, shared) = (ringer.clone(), &shared);
+            std::thread::Builder::new()
+                .name(["sensor-port", "steering-port"][place].to_owned())
+                .spawn_scoped(scope, move || {
+                    Reader::new(place, port, bus, events, ringer, shared).run();
+                })
+                .map_err(|error| PortError::Transport {
+                    topic: "link/health".to_owned(),
+                    detail: format!("no thread for a serial port: {error}"),
+                })
+                .inspect_err(|_| shared.stop.store(true, Ordering::Release))?;
+        }
+        core.publish_health(clock.now());
+        while !shutdown.is_requested() {
+            core.turn(&server);
+        }
+        core.park(&server);
+        shared.stop.store(true, Ordering::Release);
+        Ok(())
+    })
+}
+
+/// One serial port as the main loop sees it.
+struct Port<'a> {
+    events: Consumer<'a, PortEvent>,
+    device: Option<Arc<SerialPort>>,
+    writer: PacketWriter,
+    transmitter: HostTransmitter,
+}
+
+/// Everything of the main loop but the answering of requests, which must be able to turn the loop
+/// while a board's answer is waited for.
+struct Core<'a> {
+    clock: Clock,
+    config: &'a BridgeConfig,
+    shared: &'a Shared,
+    waiter: Waiter,
+    orders: Subscriber<SteeringCommand>,
+    inputs: Subscriber<OperatorInput>,
+    state: Publisher<SteeringState>,
+    health: Publisher<LinkHealth>,
+    ports: [Port<'a>; 2],
+    boards: Boards,
+    arbiter: Arbiter,
+    settings: Settings,
+    servos: ServoTable,
+    /// The last report of a version-1 steering board in this life of its link.
+    report: Option<SteerData>,
+    /// Standbys written, and whether a report after the first shows the wheels at rest.
+    parking: Option<(u32, bool)>,
+    /// The arbiter's revisions that `link/health` and `steering/state` last showed.
+    health_revision: u32,
+    state_revision: u32,
+    health_due: Duration,
+    lost_before: u64,
+    bus_complaints: u32,
+}
+
+impl<'a> Core<'a> {
+    fn new(
+        bus: &Bus,
+        config: &'a BridgeConfig,
+        shared: &'a Shared,
+        kept: Option<&Health>,
+        events: [Consumer<'a, PortEvent>; 2],
+    ) -> Result<Self, PortError> {
+        let port = |events| Port {
+            events,
+            device: None,
+            writer: PacketWriter::default(),
+            transmitter: HostTransmitter::new(),
+        };
+        let arbiter = kept.map_or_else(Arbiter::new, Arbiter::resume);
+        let mut settings = Settings::default();
+        if config.raw_line {
+            settings.keep(SettingKey::RawLine, 1);
+        }
+        if let Some(kept) = kept {
+            tracing::info!(
+                mode = ?arbiter.mode(),
+                stopped = arbiter.is_stopped(),
+                order = kept.current_id,
+                "the state of an earlier bridge is taken up"
+            );
+        }
+        Ok(Self {
+            clock: *bus.clock(),
+            config,
+            shared,
+            waiter: bus.waiter(config.waiting)?,
+            orders: bus.subscriber()?,
+            inputs: bus.subscriber()?,
+            state: bus.publisher()?,
+            health: bus.publisher()?,
+            ports: events.map(port),
+            boards: Boards::new(kept, shared),
+            health_revision: arbiter.revision(),
+            state_revision: arbiter.revision(),
+            arbiter,
+            settings,
+            servos: ServoTable::default(),
+            report: None,
+            parking: None,
+            health_due: Duration::ZERO,
+            lost_before: kept.map_or(0, |kept| kept.bus_lost),
+            bus_complaints: 0,
+        })
+    }
+
+    /// One turn of the loop.
+    fn turn(&mut self, server: &Server<BridgeRequest>) {
+        self.wait();
+        self.take_events();
+        if let Err(error) = server.serve(|ask| self.answer(ask)) {
+            self.complain(&error);
+        }
+        self.take_orders();
+        self.flush();
+    }
+
+    /// Waits for something to do.
+    fn wait(&self) {
+        let due = [self.arbiter.next_due(), self.settings_due()]
+            .into_iter()
+            .flatten()
+            .fold(self.health_due, Duration::min);
+        let left = due.saturating_sub(self.clock.now());
+        self.waiter.wait(self.clock.real(left).min(LONGEST_WAIT));
+    }
+
+    /// When a setting is due, if its board could take it.
+    fn settings_due(&self) -> Option<Duration> {
+        let either = [Callsign::Sensor, Callsign::Steering]
+            .into_iter()
+            .any(|board| self.boards.place(board).is_some());
+        self.settings.next_due().filter(|_| either)
+    }
+
+    /// Takes what the readers have brought.
+    fn take_events(&mut self) {
+        for place in 0..self.ports.len() {
+            while let Some(event) = self.ports[place].events.dequeue() {
+                self.take(place, event);
+            }
+        }
+    }
+
+    fn take(&mut self, place: usize, event: PortEvent) {
+        match event {
+            PortEvent::Opened(device) => {
+                let port = &mut self.ports[place];
+                port.device = Some(device);
+                port.writer = PacketWriter::default();
+                port.transmitter = HostTransmitter::new();
+            }
+            PortEvent::Lost => {
+                self.board_down(place);
+                self.boards.gone(place);
+                self.ports[place].device = None;
+                self.publish_health(self.clock.now());
+            }
+            PortEvent::SendSyn => {
+                let syn = self.ports[place].transmitter.syn();
+                self.write(place, &syn);
+            }
+            PortEvent::SendAck { version, up } => {
+                let ack = self.ports[place].transmitter.ack(version);
+                self.write(place, &ack);
+                if let Some(up) = up {
+                    self.board_up(place, &up);
+                }
+            }
+            PortEvent::Adopt(up) => {
+                self.ports[place].transmitter.adopt(up.up.version);
+                self.board_up(place, &up);
+            }
+            PortEvent::Silent => {
+                // What still waits in the driver would be old when it is sent.
+                if let Some(device) = &self.ports[place].device {
+                    device.discard_output();
+                }
+                self.ports[place].writer = PacketWriter::default();
+                tracing::warn!(
+                    "the board on {} has fallen silent",
+                    self.config.ports[place].display()
+                );
+                self.board_down(place);
+                self.publish_health(self.clock.now());
+            }
+            PortEvent::Steer { data, at_ns } => self.take_report(place, data, at_ns),
+            PortEvent::Arm(data) => self.servos.hear(&data),
+            PortEvent::Status(status) => self.boards.status(place, &status),
+            PortEvent::Setting(reply) => self.settings.answer(&reply),
+        }
+    }
+
+    fn board_up(&mut self, place: usize, board: &crate::reader::BoardUp) {
+        let now = self.clock.now();
+        let up = board.up;
+        // A steering board that was on this port is not there any more.
+        if up.callsign != Callsign::Steering {
+            self.board_down(place);
+        }
+        self.boards.up(place, self.config.baud, board);
+        self.settings.board_up(now, up.callsign);
+        if up.callsign == Callsign::Steering {
+            self.report = None;
+            self.servos = ServoTable::default();
+            self.arbiter.board_up(now, up.version, up.rebooted);
+        }
+        tracing::info!(
+            port = %self.config.ports[place].display(),
+            version = ?up.version,
+            epoch = board.link_epoch,
+            reset = ?up.reset,
+            "the {} board {}",
+            if up.callsign == Callsign::Steering { "steering" } else { "sensor" },
+            if up.rebooted { "has restarted" } else { "is up" },
+        );
+        self.publish_health(now);
+    }
+
+    fn board_down(&mut self, place: usize) {
+        if self.boards.down(place) == Some(Callsign::Steering) {
+            self.arbiter.board_down();
+            self.report = None;
+        }
+    }
+
+    fn take_report(&mut self, place: usize, data: SteerData, at_ns: u64) {
+        if self.boards.place(Callsign::Steering) != Some(place) {
+            return;
+        }
+        if self.boards.version(Callsign::Steering) == Some(Version::One) {
+            self.arbiter.observe(self.clock.now(), &data);
+            self.report = Some(data);
+            let at_rest = data.left_duty == 0 && data.right_duty == 0;
+            if let Some((writes @ 1.., rest)) = &mut self.parking {
+                *rest = at_rest && *writes > 0;
+            }
+        }
+        self.publish_state(at_ns);
+    }
+
+    /// Drains orders and buttons completely.
+    fn take_orders(&mut self) {
+        let now = self.clock.now();
+        let now_ns = Clock::monotonic_ns();
+        loop {
+            match self.orders.receive() {
+                Ok(Some(order)) => {
+                    // A lease counts from its origin's word, not from when it is read here.
+                    let age_ns = now_ns.saturating_sub(order.stamp().publish_time_ns);
+                    let age = Duration::from_nanos(age_ns).mul_f64(self.clock.speed());
+                    let was_stopped = self.arbiter.is_stopped();
+                    self.arbiter.order(now.saturating_sub(age), &order);
+                    if self.arbiter.is_stopped() && !was_stopped {
+                        tracing::warn!("stopped; a resume releases it");
+                    }
+                }
+                Ok(None) => break,
+                Err(error) => {
+                    self.complain(&error);
+                    break;
+                }
+            }
+        }
+        loop {
+            match self.inputs.receive() {
+                Ok(Some(input)) => {
+                    // The other inputs are logic's.
+                    if input.kind.get() == Some(InputKind::SwitchPressed) {
+                        let mode = match self.arbiter.mode() {
+                            Mode::Manual => Mode::Autonomous,
+                            Mode::Autonomous => Mode::Manual,
+                        };
+                        tracing::info!(?mode, "the switch was pressed");
+                        self.arbiter.set_mode(mode);
+                    }
+                }
+                Ok(None) => break,
+                Err(error) => {
+                    self.complain(&error);
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Lets the arbiter decide, publishes what has changed, and writes what is due.
+    fn flush(&mut self) {
+        let now = self.clock.now();
+        self.arbiter.advance(now);
+        let revision = self.arbiter.revision();
+        if revision != self.health_revision || self.health_due <= now {
+            self.publish_health(now);
+        }
+        if revision != self.state_revision {
+            self.publish_state(Clock::monotonic_ns());
+        }
+        if let Some(place) = self.boards.place(Callsign::Steering) {
+            while let Some(command) = self.arbiter.poll(now) {
+                self.write_command(now, place, command);
+            }
+        }
+        for board in [Callsign::Sensor, Callsign::Steering] {
+            let Some(place) = self.boards.place(board) else {
+                continue;
+            };
+            while let Some(setting) = self.settings.poll(now, board) {
+                let transmitter = &mut self.ports[place].transmitter;
+                if let Some(packet) = transmitter.encode(Payload::Setting(setting)) {
+                    self.write(place, &packet);
+                }
+            }
+        }
+    }
+
+    fn write_command(&mut self, now: Duration, place: usize, command: SteerCommand) {
+        let transmitter = &mut self.ports[place].transmitter;
+        let written = transmitter
+            .encode(Payload::SteerCommand(command))
+            .is_some_and(|packet| self.write(place, &packet));
+        if !written {
+            self.arbiter.not_written(now);
+        } else if let Some((writes, _)) = &mut self.parking {
+            *writes += 1;
+        }
+    }
+
+    /// Writes one packet; whether the driver has taken it.
+    fn write(&mut self, place: usize, packet: &[u8; PACKET_LENGTH]) -> bool {
+        let port = &mut self.ports[place];
+        let Some(device) = &port.device else {
+            return false;
+        };
+        // A port that has gone is found out by its reader.
+        matches!(
+            port.writer.write(device, packet),
+            Ok(Sent::Whole | Sent::Partly)
+        )
+    }
+
+    fn publish_health(&mut self, now: Duration) {
+        self.boards.measure(self.shared);
+        let lost = self.orders.lost() + self.inputs.lost();
+        let sent = self.health.loan().and_then(|mut loan| {
+            self.boards.fill(&mut loan);
+            self.arbiter.fill(now, &mut loan);
+            loan.bus_lost = self.lost_before + lost;
+            loan.send()
+        });
+        match sent {
+            Ok(()) => self.health_revision = self.arbiter.revision(),
+            Err(error) => self.complain(&error),
+        }
+        self.health_due = now + HEALTH_PERIOD;
+    }
+
+    /// Publishes what the steering board does. Without a report that means something it is what
+    /// the board was told.
+    fn publish_state(&mut self, at_ns: u64) {
+        let told = SteerData {
+            code: self
+                .arbiter
+                .current()
+                .map_or(0, |(_, command)| command.code()),
+            left_duty: 0,
+            right_duty: 0,
+            flags: SteerFlags::NONE,
+            line_error: 0,
+            finished_seq: 0,
+            servo_errors: 0,
+            battery_decivolts: 0,
+        };
+        let data = self.report.unwrap_or(told);
+        let epoch = self.boards.epoch(Callsign::Steering);
+        let sent = self.state.loan().and_then(|mut loan| {
+            *loan = steering_report(epoch, &data, &self.servos, &self.arbiter);
+            loan.source_time_ns(at_ns);
+            loan.send()
+        });
+        match sent {
+            Ok(()) => self.state_revision = self.arbiter.revision(),
+            Err(error) => self.complain(&error),
+        }
+    }
+
+    /// Answers one request.
+    fn answer(&mut self, ask: &Ask) -> Answer {
+        let outcome = match (ask.kind.get(), ask.mode.get()) {
+            (Some(AskKind::SetMode), Some(mode)) => {
+                tracing::info!(?mode, "the mode is set");
+                self.arbiter.set_mode(mode);
+                Outcome::Done
+            }
+            (Some(AskKind::Resume), _) => {
+                tracing::info!("resumed");
+                self.arbiter.resume_from_stop();
+                Outcome::Done
+            }
+            (Some(AskKind::SetGains), _) => self.set(
+                Callsign::Steering,
+                &[
+                    (SettingKey::GainP, ask.gain_p.into()),
+                    (SettingKey::GainD, ask.gain_d.into()),
+                ],
+            ),
+            (Some(AskKind::Calibrate), _) => {
+                self.set(Callsign::Sensor, &[(SettingKey::Calibrate, 1)])
+            }
+            (Some(AskKind::ResetBoards), _) => {
+                tracing::warn!(
+                    "the boards cannot be restarted from here: the protocol has no packet for it; \
+                     press the button on the board or switch its power off and on"
+                );
+                Outcome::Refused
+            }
+            (Some(AskKind::SetMode), None) | (None, _) => Outcome::Refused,
+        };
+        // What is answered is in force, and seen to be.
+        self.flush();
+        let gain = |key| {
+            let value = self.settings.in_force(key).unwrap_or(0);
+            u8::try_from(value).unwrap_or(0)
+        };
+        Answer {
+            outcome: outcome.into(),
+            mode: self.arbiter.mode().into(),
+            stopped: self.arbiter.is_stopped().into(),
+            gain_p: gain(SettingKey::GainP),
+            gain_d: gain(SettingKey::GainD),
+            ..Answer::default()
+        }
+    }
+
+    /// Sends settings to a board and turns the loop until it has answered.
+    fn set(&mut self, board: Callsign, wishes: &[(SettingKey, i16)]) -> Outcome {
+        match self.boards.version(board) {
+            None => return Outcome::NoBoard,
+            // An original board knows no settings.
+            Some(Version::Original) => return Outcome::Refused,
+            Some(Version::One) => (),
+        }
+        let start = self.clock.now();
+        for (key, value) in wishes {
+            self.settings.want(start, *key, *value);
+        }
+        self.flush();
+        let progress = |settings: &Settings| {
+            let of = |(key, _): &(SettingKey, i16)| settings.progress(*key);
+            wishes
+                .iter()
+                .map(of)
+                .max_by_key(|progress| match progress {
+                    Progress::Accepted => 0,
+                    Progress::Refused => 1,
+                    Progress::Unanswered => 2,
+                    Progress::Pending => 3,
+                })
+        };
+        while progress(&self.settings) == Some(Progress::Pending)
+            && self.clock.now() < start + settings::LONGEST
+        {
+            self.wait();
+            self.take_events();
+            self.take_orders();
+            self.flush();
+        }
+        match progress(&self.settings) {
+            Some(Progress::Accepted) => Outcome::Done,
+            Some(Progress::Refused) => Outcome::Refused,
+            _ => Outcome::NoBoard,
+        }
+    }
+
+    /// Brings the robot to rest before the bridge ends.
+    fn park(&mut self, server: &Server<BridgeRequest>) {
+        self.arbiter.park();
+        self.parking = Some((0, false));
+        let end = self.clock.now() + PARKING;
+        self.flush();
+        while self.clock.now() < end && self.boards.place(Callsign::Steering).is_some() {
+            if let Some((PARKING_WRITES.., true)) = self.parking {
+                break;
+            }
+            self.turn(server);
+        }
+        self.publish_health(self.clock.now());
+    }
+
+    /// Says what goes wrong on the bus, but not for ever.
+    fn complain(&mut self, error: &dyn std::error::Error) {
+        self.bus_complaints = self.bus_complaints.wrapping_add(1);
+        if self.bus_complaints.is_power_of_two() {
+            tracing::error!(times = self.bus_complaints, "{error}");
+        }
+    }
+}

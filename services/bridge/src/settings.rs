@@ -1,0 +1,298 @@
+//! Settings on their way to the boards: sent until the board answers, and sent again to a board
+//! that has restarted and forgotten them.
+//!
+//! It is pure and apart from the main loop because it has time in it: tries, answers that fit no
+//! question, boards that come back. It knows nothing of ports and requests.
+
+use core::time::Duration;
+
+use lager_wire::{Callsign, Setting, SettingKey, SettingReply, SettingStatus};
+
+/// Time for a board to answer before it is asked again.
+const RETRY: Duration = Duration::from_millis(60);
+
+/// How often a board is asked.
+const TRIES: u8 = 4;
+
+/// Longest time from [`Settings::want`] to an end, if the board's link is up.
+pub const LONGEST: Duration = Duration::from_millis(60 * 4);
+
+/// How far a wish has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Nothing was wished, or it is on its way.
+    Pending,
+    /// The board has taken it.
+    Accepted,
+    /// The board has refused it and keeps the value it had.
+    Refused,
+    /// The board has not answered.
+    Unanswered,
+}
+
+/// One setting.
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    key: SettingKey,
+    wanted: i16,
+    /// The value the board has taken, to be told again after its restart.
+    kept: Option<i16>,
+    /// The value the board last said is in force.
+    in_force: Option<i16>,
+    seq: u8,
+    tries: u8,
+    next_try: Option<Duration>,
+    progress: Progress,
+}
+
+/// All settings of both boards.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    slots: [Slot; 4],
+    last_seq: u8,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let slot = |key| Slot {
+            key,
+            wanted: 0,
+            kept: None,
+            in_force: None,
+            seq: 0,
+            tries: 0,
+            next_try: None,
+            progress: Progress::Pending,
+        };
+        Self {
+            slots: [
+                slot(SettingKey::GainP),
+                slot(SettingKey::GainD),
+                slot(SettingKey::RawLine),
+                slot(SettingKey::Calibrate),
+            ],
+            last_seq: 0,
+        }
+    }
+}
+
+/// The board a setting belongs to.
+pub fn home(key: SettingKey) -> Callsign {
+    match key {
+        SettingKey::GainP | SettingKey::GainD => Callsign::Steering,
+        SettingKey::RawLine | SettingKey::Calibrate => Callsign::Sensor,
+    }
+}
+
+impl Settings {
+    /// Wishes a value, over any earlier wish for the same key.
+    pub fn want(&mut self, now: Duration, key: SettingKey, value: i16) {
+        self.start(now, key, value);
+    }
+
+    /// Makes a value one that a board is told whenever it comes up, from its next coming on.
+    pub fn keep(&mut self, key: SettingKey, value: i16) {
+        self.slot(key).kept = Some(value);
+    }
+
+    /// A board has come up: it is told again what it had taken. What was under way is over.
+    pub fn board_up(&mut self, now: Duration, board: Callsign) {
+        for index in 0..self.slots.len() {
+            let slot = &mut self.slots[index];
+            if home(slot.key) != board {
+                continue;
+            }
+            if slot.next_try.take().is_some() {
+                slot.progress = Progress::Unanswered;
+            }
+            if let Some(value) = slot.kept {
+                let key = slot.key;
+                self.start(now, key, value);
+            }
+        }
+    }
+
+    /// What to send to `board` now; ask again until there is nothing.
+    pub fn poll(&mut self, now: Duration, board: Callsign) -> Option<Setting> {
+        for slot in self.slots.iter_mut().filter(|slot| home(slot.key) == board) {
+            if slot.next_try.is_none_or(|due| due > now) {
+                continue;
+            }
+            if slot.tries == TRIES {
+                slot.next_try = None;
+                slot.progress = Progress::Unanswered;
+                continue;
+            }
+            slot.tries += 1;
+            slot.next_try = Some(now + RETRY);
+            return Some(Setting {
+                key: slot.key,
+                seq: slot.seq,
+                value: slot.wanted,
+            });
+        }
+        None
+    }
+
+    /// When [`Settings::poll`] next has something to do.
+    pub fn next_due(&self) -> Option<Duration> {
+        self.slots.iter().filter_map(|slot| slot.next_try).min()
+    }
+
+    /// A board has answered. An answer that fits no question under way changes nothing.
+    pub fn answer(&mut self, reply: &SettingReply) {
+        let slot = self.slot(reply.key);
+        if slot.next_try.is_none() || slot.seq != reply.seq {
+            return;
+        }
+        slot.next_try = None;
+        slot.in_force = Some(reply.value);
+        if reply.status == SettingStatus::Accepted {
+            slot.progress = Progress::Accepted;
+            // A calibration is done once, not again after a restart somewhere on the way.
+            if slot.key != SettingKey::Calibrate {
+                slot.kept = Some(slot.wanted);
+            }
+        } else {
+            slot.progress = Progress::Refused;
+        }
+    }
+
+    /// How far the last wish for a key has come.
+    pub fn progress(&self, key: SettingKey) -> Progress {
+        self.find(key).progress
+    }
+
+    /// The value a board last said is in force.
+    pub fn in_force(&self, key: SettingKey) -> Option<i16> {
+        self.find(key).in_force
+    }
+
+    fn start(&mut self, now: Duration, key: SettingKey, value: i16) {
+        self.last_seq = self.last_seq.wrapping_add(1);
+        let seq = self.last_seq;
+        let slot = self.slot(key);
+        slot.wanted = value;
+        slot.seq = seq;
+        slot.tries = 0;
+        slot.next_try = Some(now);
+        slot.progress = Progress::Pending;
+    }
+
+    fn find(&self, key: SettingKey) -> &Slot {
+        &self.slots[index(key)]
+    }
+
+    fn slot(&mut self, key: SettingKey) -> &mut Slot {
+        &mut self.slots[index(key)]
+    }
+}
+
+/// Place of a key's slot.
+fn index(key: SettingKey) -> usize {
+    match key {
+        SettingKey::GainP => 0,
+        SettingKey::GainD => 1,
+        SettingKey::RawLine => 2,
+        SettingKey::Calibrate => 3,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(millis: u64) -> Duration {
+        Duration::from_millis(millis)
+    }
+
+    fn reply(to: &Setting, status: SettingStatus) -> SettingReply {
+        SettingReply {
+            key: to.key,
+            seq: to.seq,
+            value: to.value,
+            status,
+        }
+    }
+
+    #[test]
+    fn a_setting_is_sent_until_it_is_answered() {
+        let mut settings = Settings::default();
+        settings.want(ms(0), SettingKey::GainP, 5);
+        let first = settings.poll(ms(0), Callsign::Steering).unwrap();
+        assert_eq!((first.key, first.value), (SettingKey::GainP, 5));
+        assert_eq!(settings.poll(ms(59), Callsign::Steering), None);
+        assert_eq!(settings.poll(ms(60), Callsign::Sensor), None);
+        assert_eq!(settings.poll(ms(60), Callsign::Steering), Some(first));
+        settings.answer(&reply(&first, SettingStatus::Accepted));
+        assert_eq!(settings.progress(SettingKey::GainP), Progress::Accepted);
+        assert_eq!(settings.in_force(SettingKey::GainP), Some(5));
+        assert_eq!(settings.next_due(), None);
+        assert_eq!(settings.poll(ms(500), Callsign::Steering), None);
+    }
+
+    #[test]
+    fn a_silent_board_is_given_up_after_four_tries() {
+        let mut settings = Settings::default();
+        settings.want(ms(0), SettingKey::Calibrate, 1);
+        let sent = (0..=300)
+            .filter(|now| settings.poll(ms(*now), Callsign::Sensor).is_some())
+            .count();
+        assert_eq!(sent, 4);
+        assert_eq!(
+            settings.progress(SettingKey::Calibrate),
+            Progress::Unanswered
+        );
+    }
+
+    #[test]
+    fn an_answer_to_an_earlier_question_is_passed_over() {
+        let mut settings = Settings::default();
+        settings.want(ms(0), SettingKey::GainP, 5);
+        let old = settings.poll(ms(0), Callsign::Steering).unwrap();
+        settings.want(ms(1), SettingKey::GainP, 6);
+        settings.answer(&reply(&old, SettingStatus::Accepted));
+        assert_eq!(settings.progress(SettingKey::GainP), Progress::Pending);
+        assert_eq!(
+            settings
+                .poll(ms(1), Callsign::Steering)
+                .map(|setting| setting.value),
+            Some(6)
+        );
+    }
+
+    #[test]
+    fn a_refused_value_leaves_the_one_before_to_be_told_after_a_restart() {
+        let mut settings = Settings::default();
+        settings.want(ms(0), SettingKey::GainD, 3);
+        let sent = settings.poll(ms(0), Callsign::Steering).unwrap();
+        settings.answer(&reply(&sent, SettingStatus::Accepted));
+        settings.want(ms(10), SettingKey::GainD, 300);
+        let sent = settings.poll(ms(10), Callsign::Steering).unwrap();
+        settings.answer(&SettingReply {
+            value: 3,
+            ..reply(&sent, SettingStatus::OutOfRange)
+        });
+        assert_eq!(settings.progress(SettingKey::GainD), Progress::Refused);
+        assert_eq!(settings.in_force(SettingKey::GainD), Some(3));
+
+        settings.board_up(ms(20), Callsign::Sensor);
+        assert_eq!(settings.poll(ms(20), Callsign::Steering), None);
+        settings.board_up(ms(30), Callsign::Steering);
+        let again = settings.poll(ms(30), Callsign::Steering).unwrap();
+        assert_eq!((again.key, again.value), (SettingKey::GainD, 3));
+    }
+
+    #[test]
+    fn a_restart_in_the_middle_of_a_calibration_ends_it() {
+        let mut settings = Settings::default();
+        settings.want(ms(0), SettingKey::Calibrate, 1);
+        assert!(settings.poll(ms(0), Callsign::Sensor).is_some());
+        settings.board_up(ms(10), Callsign::Sensor);
+        assert_eq!(
+            settings.progress(SettingKey::Calibrate),
+            Progress::Unanswered
+        );
+        assert_eq!(settings.poll(ms(100), Callsign::Sensor), None);
+    }
+}

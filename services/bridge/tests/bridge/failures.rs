@@ -1,0 +1,247 @@
+//! What goes wrong on a robot: restarts, cables, noise, ports the wrong way round.
+
+use lager_topics::{Finish, LinkHealth, Mode, Role};
+use lager_wire::{LineState, ResetCause};
+
+use crate::harness::{
+    Bridge, FOLLOW, FORWARD, LEFT_PERP, Robot, SensorBoard, SteeringBoard, logic, operator,
+    wait_until,
+};
+
+#[test]
+fn a_reset_sensor_board_is_not_counted_as_loss() {
+    let mut robot = Robot::up();
+    robot
+        .hands
+        .wait_for_line("the first lines come", |line| line.link_epoch == 1);
+    robot.sensor.with(|board| {
+        board.state = LineState::FourWay;
+        board.restart(ResetCause::Watchdog);
+    });
+    robot.hands.wait_for_line("lines of the new epoch come", |line| {
+        line.link_epoch == 2 && line.state.get() == Some(LineState::FourWay)
+    });
+    let health = robot
+        .hands
+        .wait_for_health("health shows the new epoch", |health| {
+            health.sensor.epoch == 2 && health.sensor.packets > 5
+        });
+    assert_eq!(health.sensor.reboots, 1);
+    assert_eq!(health.sensor.lost, 0);
+    assert_eq!(health.sensor.reset_cause.get(), Some(ResetCause::Watchdog));
+    assert_eq!(health.steering.epoch, 1, "the other link is untouched");
+}
+
+#[test]
+fn a_reset_steering_board_drives_on_but_does_not_repeat_a_turn() {
+    let mut robot = Robot::autonomous();
+    let steering = &robot.steering;
+    robot.hands.give_until(logic(1, LEFT_PERP), "it turns", |_| {
+        steering.with(|board| board.count(LEFT_PERP)) == 1
+    });
+    steering.with(|board| board.restart(ResetCause::BrownOut));
+    robot.hands.give_until(logic(1, LEFT_PERP), "the turn is aborted", |hands| {
+        hands.state.look().is_some_and(|state| {
+            state.finished_id == 1 && state.finish.get() == Some(Finish::Aborted)
+        })
+    });
+    assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 1);
+
+    robot.hands.give_until(logic(2, FOLLOW), "it drives", |_| {
+        steering.with(|board| board.moves())
+    });
+    steering.with(|board| board.restart(ResetCause::Panic));
+    robot.hands.give_until(logic(2, FOLLOW), "it drives again", |_| {
+        steering.with(|board| board.moves())
+    });
+    let health = robot
+        .hands
+        .wait_for_health("both restarts are counted", |health| health.steering.reboots == 2);
+    assert_eq!(health.steering.reset_cause.get(), Some(ResetCause::Panic));
+}
+
+#[test]
+fn ports_may_be_swapped() {
+    let mut robot = Robot::with(SteeringBoard::new(), SensorBoard::new());
+    robot.start();
+    let health = robot.wait_until_up();
+    assert_eq!((health.sensor.port, health.steering.port), (1, 0));
+    robot
+        .hands
+        .wait_for_line("lines come", |line| line.link_epoch == 1);
+    let steering = &robot.sensor;
+    robot.hands.give_until(operator(1, FORWARD), "the wheels turn", |_| {
+        steering.with(|board| board.moves())
+    });
+}
+
+#[test]
+fn an_unplugged_port_is_opened_again_when_it_is_back() {
+    let mut robot = Robot::up();
+    let epoch = robot.hands.health.look().unwrap().steering.epoch;
+    for round in 1..=3 {
+        robot.steering.unplug();
+        let health = robot
+            .hands
+            .wait_for_health("the board is gone", |health| health.steering.up == 0);
+        assert_eq!(health.steering.port, 0xFF);
+        assert_eq!(health.sensor.up, 1);
+        robot.steering.plug();
+        let health = robot
+            .hands
+            .wait_for_health("the board is back", |health| health.steering.up == 1);
+        assert_eq!(health.steering.epoch, epoch + round);
+        assert_eq!(health.steering.lost, 0);
+        assert_eq!(health.steering.reboots, 0, "it was not the board that restarted");
+        let steering = &robot.steering;
+        robot.hands.give_until(operator(round, FORWARD), "the wheels turn", |_| {
+            steering.with(|board| board.moves())
+        });
+        wait_until("the wheels stand", || !steering.with(|board| board.moves()));
+    }
+    // The sensor's stream went on all the time.
+    assert_eq!(robot.hands.health.look().unwrap().sensor.epoch, 1);
+}
+
+#[test]
+fn boards_that_change_places_while_unplugged_are_found() {
+    let sensor = SensorBoard::new();
+    let mut robot = Robot::with(sensor, SteeringBoard::new());
+    robot.start();
+    robot.wait_until_up();
+    robot.sensor.unplug();
+    robot.steering.unplug();
+    robot.hands.wait_for_health("both are gone", |health| {
+        health.sensor.up == 0 && health.steering.up == 0
+    });
+    // The cables come back the other way round: each board under the other's path.
+    let folder = robot.isolation.folder();
+    let (one, other) = (folder.join("sensor"), folder.join("steering"));
+    robot.sensor.plug();
+    robot.steering.plug();
+    let aside = folder.join("aside");
+    std::fs::rename(&one, &aside).unwrap();
+    std::fs::rename(&other, &one).unwrap();
+    std::fs::rename(&aside, &other).unwrap();
+    // Whatever the bridge had opened in between is gone again.
+    robot.hands.wait_for_health("both are back", |health| {
+        health.sensor.up == 1 && health.steering.up == 1
+    });
+    let before = robot.hands.line.count;
+    wait_until("lines come", || {
+        robot.hands.line.look();
+        robot.hands.line.count > before + 20
+    });
+}
+
+#[test]
+fn a_bridge_may_start_before_its_ports_are_there() {
+    let mut robot = Robot::with(SensorBoard::new(), SteeringBoard::new());
+    robot.sensor.unplug();
+    robot.steering.unplug();
+    robot.start();
+    robot
+        .hands
+        .wait_for_health("the bridge runs", |health| health.sensor.up == 0);
+    robot.steering.plug();
+    robot
+        .hands
+        .wait_for_health("one is up", |health| health.steering.up == 1);
+    robot.sensor.plug();
+    robot.wait_until_up();
+}
+
+#[test]
+fn a_silent_board_is_asked_until_it_answers() {
+    let mut robot = Robot::up();
+    robot.steering.freeze(true);
+    robot
+        .hands
+        .wait_for_health("the board is silent", |health| health.steering.up == 0);
+    robot.steering.freeze(false);
+    robot
+        .hands
+        .wait_for_health("the board is back", |health| health.steering.up == 1);
+    assert_eq!(robot.steering.with(|board| board.restarts), 0);
+}
+
+#[test]
+fn a_megabyte_of_noise_hides_no_good_packet_behind_it() {
+    let mut robot = Robot::up();
+    let mut random = 0x9E37_79B9_7F4A_7C15_u64;
+    let noise = move || {
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        random as u8
+    };
+    robot.sensor.send_noise(noise, 1 << 20);
+    robot.sensor.with(|board| board.state = LineState::DropStation);
+    robot.hands.wait_for_line("a good packet comes", |line| {
+        line.state.get() == Some(LineState::DropStation)
+    });
+    let health = robot
+        .hands
+        .wait_for_health("the noise is counted", |health| {
+            health.sensor.skipped_bytes > 1_000_000 || health.sensor.epoch > 1
+        });
+    assert_eq!(health.sensor.up, 1);
+    assert_eq!(health.steering.epoch, 1);
+    let steering = &robot.steering;
+    robot.hands.give_until(operator(1, FORWARD), "the wheels turn", |_| {
+        steering.with(|board| board.moves())
+    });
+}
+
+#[test]
+fn a_restarted_bridge_goes_on_beside_running_boards() {
+    let mut robot = Robot::autonomous();
+    let supervisor = robot.isolation.open(Role::Supervisor);
+    let mut keeper = supervisor.keeper::<LinkHealth>().unwrap();
+    robot.hands.give_until(logic(1, LEFT_PERP), "the turn is done", |hands| {
+        hands
+            .state
+            .look()
+            .is_some_and(|state| state.finished_id == 1 && state.finish.get() == Some(Finish::Done))
+    });
+    robot.hands.stop();
+    let before = robot.hands.wait_for_health("the stop is latched", |health| health.stopped == 1);
+    wait_until("the keeper has it", || {
+        keeper.remember().unwrap();
+        keeper.value().is_some_and(|(health, _)| health.stopped == 1)
+    });
+
+    robot.bridge.take().unwrap().stop();
+    keeper.remember().unwrap();
+    keeper.hand_over().unwrap();
+    robot.bridge_config.resume = true;
+    robot.bridge = Some(Bridge::start(&robot.isolation, robot.bridge_config.clone()));
+    let after = robot.hands.wait_for_health("both links have a new epoch", |health| {
+        health.sensor.epoch == before.sensor.epoch + 1
+            && health.steering.epoch == before.steering.epoch + 1
+            && health.sensor.up == 1
+            && health.steering.up == 1
+    });
+    assert_eq!(after.mode.get(), Some(Mode::Autonomous));
+    assert_eq!(after.stopped, 1);
+    assert_eq!((after.sensor.reboots, after.steering.reboots), (0, 0));
+    assert_eq!((after.sensor.lost, after.steering.lost), (0, 0));
+    assert_eq!(robot.sensor.with(|board| (board.restarts, board.ups)), (0, 2));
+    assert_eq!(robot.steering.with(|board| (board.restarts, board.ups)), (0, 2));
+
+    // The finished turn stays finished, and the latch holds.
+    let steering = &robot.steering;
+    let commands = steering.with(|board| board.commands);
+    robot.hands.give_until(logic(1, LEFT_PERP), "it is renewed", |_| {
+        steering.with(|board| board.commands > commands + 5)
+    });
+    assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 1);
+    robot.hands.resume();
+    robot.hands.give_until(logic(2, LEFT_PERP), "the next turn is done", |hands| {
+        hands
+            .state
+            .look()
+            .is_some_and(|state| state.finished_id == 2 && state.finish.get() == Some(Finish::Done))
+    });
+    assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 2);
+}

@@ -1,0 +1,366 @@
+//! A robot for tests: an isolated bus, two pseudo terminals with scripted boards behind them, and
+//! the bridge in a thread of this process.
+//!
+//! Every robot has its own bus prefix and folder, and removes both when it is dropped. Nothing
+//! here waits without an end: [`wait_until`] panics after [`PATIENCE`].
+#![allow(dead_code, reason = "each test program uses a part of it")]
+
+mod board;
+mod original;
+mod pty;
+mod steering;
+
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use lager_bridge::BridgeConfig;
+use lager_ports::{Bus, BusConfig, Client, PortError, Publisher, Shutdown, Subscriber};
+use lager_topics::{
+    Answer, Ask, AskKind, BridgeRequest, DistanceFrame, Health, LineFrame, LinkHealth, Mode,
+    OrderKind, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder,
+    SteeringReport, SteeringState, Topic,
+};
+use lager_wire::{Command, WheelCommand};
+
+pub use board::{Board, Peer, SensorBoard};
+pub use original::{OriginalSensor, OriginalSteering};
+pub use pty::Pty;
+pub use steering::SteeringBoard;
+
+/// How long anything may take before a test fails.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+
+thread_local! {
+    static EXEMPT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// This thread belongs to the test and not to the bridge: what it allocates is not counted.
+pub fn exempt() {
+    EXEMPT.set(true);
+}
+
+/// Whether this thread belongs to the test.
+pub fn is_exempt() -> bool {
+    EXEMPT.try_with(Cell::get).unwrap_or(true)
+}
+
+/// Waits until `condition` holds.
+pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < PATIENCE, "waited in vain until {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// An isolated bus.
+pub struct Isolation {
+    pub config: BusConfig,
+    folder: PathBuf,
+}
+
+impl Isolation {
+    pub fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let name = format!(
+            "lbr{}n{}",
+            std::process::id(),
+            NEXT.fetch_add(1, Ordering::Relaxed)
+        );
+        Self::named(&name)
+    }
+
+    /// The isolation of that name, which another process may have made.
+    pub fn named(name: &str) -> Self {
+        let folder = PathBuf::from("/tmp").join(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        Self {
+            config: BusConfig {
+                prefix: Some(name.to_owned()),
+                root: Some(folder.clone()),
+                ..BusConfig::default()
+            },
+            folder,
+        }
+    }
+
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    pub fn open(&self, role: Role) -> Bus {
+        Bus::open(&self.config, role).unwrap()
+    }
+}
+
+impl Drop for Isolation {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// The bridge in a thread.
+pub struct Bridge {
+    shutdown: Shutdown,
+    thread: Option<JoinHandle<Result<(), PortError>>>,
+}
+
+impl Bridge {
+    pub fn start(isolation: &Isolation, config: BridgeConfig) -> Self {
+        let bus = isolation.open(Role::Bridge);
+        let shutdown = Shutdown::new();
+        let wish = shutdown.clone();
+        let thread = std::thread::Builder::new()
+            .name("bridge".to_owned())
+            .spawn(move || lager_bridge::run(&bus, &config, &wish))
+            .unwrap();
+        Self {
+            shutdown,
+            thread: Some(thread),
+        }
+    }
+
+    /// A clean stop.
+    pub fn stop(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
+        self.shutdown.request();
+        let start = Instant::now();
+        while !thread.is_finished() && start.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if std::thread::panicking() {
+            return;
+        }
+        assert!(thread.is_finished(), "the bridge does not end");
+        thread.join().unwrap().unwrap();
+    }
+}
+
+impl Drop for Bridge {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// What a person and the navigator have on the bus.
+pub struct Hands {
+    orders: Publisher<SteeringCommand>,
+    requests: Client<BridgeRequest>,
+    pub line: Seen<SensorLine>,
+    pub distance: Seen<SensorDistance>,
+    pub state: Seen<SteeringState>,
+    pub health: Seen<LinkHealth>,
+}
+
+/// A subscriber with the last value.
+pub struct Seen<T: Topic> {
+    subscriber: Subscriber<T>,
+    pub last: Option<T::Payload>,
+    pub count: usize,
+}
+
+impl<T: Topic> Seen<T> {
+    fn new(bus: &Bus) -> Self {
+        Self {
+            subscriber: bus.subscriber().unwrap(),
+            last: None,
+            count: 0,
+        }
+    }
+
+    /// Takes what has come; the last value so far.
+    pub fn look(&mut self) -> Option<T::Payload> {
+        for payload in self.drain() {
+            self.last = Some(payload);
+        }
+        self.last
+    }
+
+    /// Everything that has come since the last look.
+    pub fn drain(&mut self) -> Vec<T::Payload> {
+        let mut all = Vec::new();
+        while let Ok(Some(sample)) = self.subscriber.receive() {
+            self.count += 1;
+            all.push(*sample);
+        }
+        all
+    }
+
+    pub fn lost(&self) -> u64 {
+        self.subscriber.lost()
+    }
+}
+
+impl Hands {
+    pub fn new(bus: &Bus) -> Self {
+        Self {
+            orders: bus.publisher().unwrap(),
+            requests: bus.client().unwrap(),
+            line: Seen::new(bus),
+            distance: Seen::new(bus),
+            state: Seen::new(bus),
+            health: Seen::new(bus),
+        }
+    }
+
+    pub fn give(&self, order: SteeringOrder) {
+        self.orders.send(0, order).unwrap();
+    }
+
+    /// Renews `order` every 40 ms until `condition` holds.
+    pub fn give_until(
+        &mut self,
+        order: SteeringOrder,
+        what: &str,
+        mut condition: impl FnMut(&mut Self) -> bool,
+    ) {
+        let start = Instant::now();
+        let mut renewed = None::<Instant>;
+        while !condition(self) {
+            assert!(start.elapsed() < PATIENCE, "waited in vain until {what}");
+            if renewed.is_none_or(|at| at.elapsed() >= Duration::from_millis(40)) {
+                renewed = Some(Instant::now());
+                self.give(order);
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    pub fn ask(&self, ask: Ask) -> Answer {
+        self.requests.call(ask, PATIENCE).unwrap()
+    }
+
+    pub fn set_mode(&self, mode: Mode) -> Answer {
+        self.ask(Ask {
+            kind: AskKind::SetMode.into(),
+            mode: mode.into(),
+            ..Ask::default()
+        })
+    }
+
+    pub fn resume(&self) -> Answer {
+        self.ask(Ask {
+            kind: AskKind::Resume.into(),
+            ..Ask::default()
+        })
+    }
+
+    pub fn stop(&self) {
+        self.give(SteeringOrder {
+            origin: Origin::Operator.into(),
+            kind: OrderKind::Stop.into(),
+            ..SteeringOrder::default()
+        });
+    }
+
+    pub fn wait_for_health(&mut self, what: &str, condition: impl Fn(&Health) -> bool) -> Health {
+        wait_until(what, || self.health.look().is_some_and(|health| condition(&health)));
+        self.health.last.unwrap()
+    }
+
+    pub fn wait_for_state(&mut self, what: &str, condition: impl Fn(&SteeringReport) -> bool) {
+        wait_until(what, || self.state.look().is_some_and(|state| condition(&state)));
+    }
+
+    pub fn wait_for_line(&mut self, what: &str, condition: impl Fn(&LineFrame) -> bool) {
+        wait_until(what, || self.line.look().is_some_and(|line| condition(&line)));
+    }
+
+    pub fn wait_for_distance(&mut self, what: &str, condition: impl Fn(&DistanceFrame) -> bool) {
+        wait_until(what, || {
+            self.distance.look().is_some_and(|distance| condition(&distance))
+        });
+    }
+}
+
+/// Isolation, boards, bridge and hands. Fields drop from top to bottom: the bridge ends first.
+pub struct Robot<A: Peer = SensorBoard, B: Peer = SteeringBoard> {
+    pub bridge: Option<Bridge>,
+    pub hands: Hands,
+    pub sensor: Board<A>,
+    pub steering: Board<B>,
+    pub bridge_config: BridgeConfig,
+    pub isolation: Isolation,
+}
+
+impl Robot {
+    /// Two version-1 boards and a bridge, all up.
+    pub fn up() -> Self {
+        let mut robot = Self::with(SensorBoard::new(), SteeringBoard::new());
+        robot.start();
+        robot.wait_until_up();
+        robot
+    }
+
+    /// As [`Robot::up`], in autonomous mode.
+    pub fn autonomous() -> Self {
+        let robot = Self::up();
+        robot.hands.set_mode(Mode::Autonomous);
+        robot
+    }
+}
+
+impl<A: Peer, B: Peer> Robot<A, B> {
+    /// Boards that run, and no bridge yet.
+    pub fn with(sensor: A, steering: B) -> Self {
+        let isolation = Isolation::new();
+        let sensor = Board::plugged(sensor, isolation.folder().join("sensor"));
+        let steering = Board::plugged(steering, isolation.folder().join("steering"));
+        let bridge_config = BridgeConfig {
+            ports: [sensor.path().to_owned(), steering.path().to_owned()],
+            ..BridgeConfig::default()
+        };
+        let hands = Hands::new(&isolation.open(Role::Operator));
+        Self {
+            bridge: None,
+            hands,
+            sensor,
+            steering,
+            bridge_config,
+            isolation,
+        }
+    }
+
+    pub fn start(&mut self) {
+        self.bridge = Some(Bridge::start(&self.isolation, self.bridge_config.clone()));
+    }
+
+    pub fn wait_until_up(&mut self) -> Health {
+        self.hands.wait_for_health("both boards are up", |health| {
+            health.sensor.up == 1 && health.steering.up == 1
+        })
+    }
+}
+
+/// An order of the operator.
+pub fn operator(id: u32, command: Command) -> SteeringOrder {
+    SteeringOrder {
+        id,
+        origin: Origin::Operator.into(),
+        kind: OrderKind::Drive.into(),
+        code: command.code(),
+        arm_granted: 0,
+    }
+}
+
+/// An order of the navigator.
+pub fn logic(id: u32, command: Command) -> SteeringOrder {
+    SteeringOrder {
+        origin: Origin::Logic.into(),
+        ..operator(id, command)
+    }
+}
+
+pub const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
+pub const FORWARD: Command = Command::Wheel(WheelCommand::ManualForward);
+pub const FOLLOW: Command = Command::Wheel(WheelCommand::ActiveForward);
+pub const LEFT_PERP: Command = Command::Wheel(WheelCommand::LeftPerp);

@@ -1,0 +1,8 @@
+//! The bridge at its boundaries: serial ports on pseudo terminals, and the whole service between
+//! scripted boards and an isolated bus.
+
+mod failures;
+mod harness;
+mod original;
+mod serial;
+mod steering;

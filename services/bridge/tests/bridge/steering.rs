@@ -1,0 +1,342 @@
+//! The way of an order: bus, arbiter, packet, board, and back as a report.
+
+use lager_topics::{AskKind, Finish, Input, InputKind, Mode, OperatorInput, Origin, Outcome, Role};
+use lager_wire::{ArmCommand, Command, LineState, SteerFlags};
+
+use crate::harness::{
+    FOLLOW, FORWARD, LEFT_PERP, Robot, STANDBY, SensorBoard, SteeringBoard, logic, operator,
+    wait_until,
+};
+use lager_topics::Ask;
+
+#[test]
+fn both_boards_come_up_and_health_says_so() {
+    let mut robot = Robot::up();
+    let health = robot.hands.wait_for_health("the boards' own counters are there", |health| {
+        health.steering.board_refused == 1 && health.sensor.board_load_percent == 42
+    });
+    assert_eq!((health.sensor.version, health.steering.version), (1, 1));
+    assert_eq!((health.sensor.port, health.steering.port), (0, 1));
+    assert_eq!((health.sensor.epoch, health.steering.epoch), (1, 1));
+    assert_eq!((health.sensor.baud, health.steering.baud), (500_000, 500_000));
+    assert_eq!(health.mode.get(), Some(Mode::Manual));
+    assert_eq!(health.stopped, 0);
+    assert_eq!(health.steering.board_exde_errors, 2);
+    assert_eq!(health.steering.board_servo_timeouts, 3);
+}
+
+#[test]
+fn what_the_sensor_board_sees_is_published() {
+    let mut robot = Robot::up();
+    robot.sensor.with(|board| {
+        board.state = LineState::StationToRight;
+        board.distance = 37;
+    });
+    robot.hands.wait_for_line("the mark is seen", |line| {
+        line.state.get() == Some(LineState::StationToRight) && line.link_epoch == 1
+    });
+    robot
+        .hands
+        .wait_for_distance("the distance is seen", |frame| frame.distance_cm == 37);
+    // Line and distance share one id count, and none is missing.
+    let mut last = None;
+    wait_until("fifty lines have come", || {
+        for line in robot.hands.line.drain() {
+            if let Some(last) = last {
+                assert_eq!(line.packet_id, (last + 2u8) % 16);
+            }
+            last = Some(line.packet_id);
+        }
+        robot.hands.line.count > 50
+    });
+    assert_eq!(robot.hands.line.lost(), 0);
+    assert_eq!(robot.hands.health.look().unwrap().sensor.lost, 0);
+}
+
+#[test]
+fn raw_readings_come_with_the_line_when_asked_for() {
+    let mut robot = Robot::with(SensorBoard::new(), SteeringBoard::new());
+    robot.bridge_config.raw_line = true;
+    robot.start();
+    robot
+        .hands
+        .wait_for_line("bits come", |line| line.bits == 0b000_0111_0000);
+    // A restarted board has forgotten the wish and is told again.
+    robot.sensor.with(|board| {
+        board.bits = 0b111_1100_0000;
+        board.restart(lager_wire::ResetCause::External);
+    });
+    robot
+        .hands
+        .wait_for_line("bits come again", |line| line.bits == 0b111_1100_0000);
+}
+
+#[test]
+fn an_order_drives_the_robot_for_as_long_as_it_is_renewed() {
+    let mut robot = Robot::up();
+    let steering = &robot.steering;
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "the wheels turn", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.left_duty == 100 && state.current_id == 1 && state.line_error == -3
+            })
+        });
+    wait_until("the lease ends", || !steering.with(|board| board.moves()));
+    assert!(
+        steering.with(|board| !board.failsafe),
+        "the bridge halted the robot, not the board"
+    );
+    robot.hands.wait_for_state("the end is told", |state| {
+        state.finished_id == 1 && state.finish.get() == Some(Finish::Aborted)
+    });
+    assert_eq!(robot.hands.health.look().unwrap().leases_expired, 1);
+}
+
+#[test]
+fn logic_drives_in_autonomous_mode_and_the_operator_does_not() {
+    let mut robot = Robot::autonomous();
+    robot.hands.give_until(logic(1, FOLLOW), "the wheels turn", |hands| {
+        hands.state.look().is_some_and(|state| state.left_duty == 100)
+    });
+    let refused = robot.hands.health.look().unwrap().orders_refused;
+    robot.hands.give(operator(1, FORWARD));
+    robot
+        .hands
+        .wait_for_health("the operator's order is counted", |health| {
+            health.orders_refused > refused
+        });
+    assert_eq!(robot.steering.with(|board| board.count(FORWARD)), 0);
+}
+
+#[test]
+fn a_stop_latches_until_a_resume() {
+    let mut robot = Robot::autonomous();
+    let order = logic(1, FOLLOW);
+    robot.hands.give_until(order, "the wheels turn", |hands| {
+        hands.state.look().is_some_and(|state| state.left_duty == 100)
+    });
+    robot.hands.stop();
+    robot
+        .hands
+        .wait_for_health("the stop is latched", |health| health.stopped == 1);
+    let executed = robot.steering.with(|board| board.executed.len());
+    let commands = robot.steering.with(|board| board.commands);
+    let steering = &robot.steering;
+    // Logic goes on, with this order and with new ones.
+    for id in 1..4 {
+        robot.hands.give_until(logic(id, FOLLOW), "standby is renewed", |_| {
+            steering.with(|board| board.commands > commands + 5 * id as usize)
+        });
+    }
+    assert_eq!(robot.steering.with(|board| board.code), STANDBY.code());
+    assert!(
+        robot.steering.with(|board| {
+            board.executed[executed..]
+                .iter()
+                .all(|code| *code == STANDBY.code())
+        })
+    );
+    let answer = robot.hands.resume();
+    assert_eq!(answer.outcome.get(), Some(Outcome::Done));
+    assert_eq!(answer.stopped, 0);
+    robot.hands.give_until(logic(3, FOLLOW), "the wheels turn again", |hands| {
+        hands.state.look().is_some_and(|state| state.left_duty == 100)
+    });
+}
+
+#[test]
+fn two_equal_turns_are_two_and_a_refresh_is_none() {
+    let mut robot = Robot::autonomous();
+    for id in 1..=2 {
+        robot.hands.give_until(logic(id, LEFT_PERP), "the turn is done", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.finished_id == id
+                    && state.finish.get() == Some(Finish::Done)
+                    && state.finished_origin.get() == Some(Origin::Logic)
+            })
+        });
+        let steering = &robot.steering;
+        let commands = steering.with(|board| board.commands);
+        robot.hands.give_until(logic(id, LEFT_PERP), "it is refreshed", |_| {
+            steering.with(|board| board.commands > commands + 5)
+        });
+        assert_eq!(
+            robot.steering.with(|board| board.count(LEFT_PERP)),
+            id as usize
+        );
+    }
+}
+
+#[test]
+fn the_servos_of_an_arm_step_are_known_when_it_ends() {
+    let mut robot = Robot::up();
+    let up = operator(5, Command::Arm(ArmCommand::Up));
+    robot.hands.give_until(up, "the step is done", |hands| {
+        hands.state.drain().iter().any(|state| {
+            let done = state.finished_id == 5 && state.finish.get() == Some(Finish::Done);
+            if done {
+                assert_eq!((state.servo_position[2], state.servo_load[2]), (700, -12));
+                assert_eq!(state.servo_position[0], lager_topics::SERVO_UNKNOWN);
+            }
+            done
+        })
+    });
+}
+
+#[test]
+fn an_undefined_code_is_refused_and_counted() {
+    let mut robot = Robot::up();
+    let mut order = operator(1, FORWARD);
+    order.code = 0x0C;
+    robot.hands.give(order);
+    robot
+        .hands
+        .wait_for_health("it is counted", |health| health.orders_refused == 1);
+    robot.hands.wait_for_state("its origin is told", |state| {
+        state.finished_id == 1 && state.finish.get() == Some(Finish::Refused)
+    });
+    assert_eq!(robot.steering.with(|board| board.code), STANDBY.code());
+}
+
+#[test]
+fn gains_are_set_and_refused_by_the_board() {
+    let robot = Robot::up();
+    let ask = |gain_p, gain_d| Ask {
+        kind: AskKind::SetGains.into(),
+        gain_p,
+        gain_d,
+        ..Ask::default()
+    };
+    let answer = robot.hands.ask(ask(5, 7));
+    assert_eq!(answer.outcome.get(), Some(Outcome::Done));
+    assert_eq!((answer.gain_p, answer.gain_d), (5, 7));
+    assert_eq!(robot.steering.with(|board| board.gains), [5, 7]);
+
+    let answer = robot.hands.ask(ask(6, 200));
+    assert_eq!(answer.outcome.get(), Some(Outcome::Refused));
+    assert_eq!((answer.gain_p, answer.gain_d), (6, 7));
+
+    robot
+        .steering
+        .with(|board| board.restart(lager_wire::ResetCause::BrownOut));
+    wait_until("the gains are told again", || {
+        robot.steering.with(|board| board.gains) == [6, 7]
+    });
+}
+
+#[test]
+fn a_calibration_is_answered_by_the_sensor_board_or_given_up() {
+    let robot = Robot::up();
+    let ask = Ask {
+        kind: AskKind::Calibrate.into(),
+        ..Ask::default()
+    };
+    assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::Done));
+    assert_eq!(robot.sensor.with(|board| board.calibrations), 1);
+    robot.sensor.with(|board| board.deaf = true);
+    assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::NoBoard));
+}
+
+#[test]
+fn the_robot_can_be_steered_while_a_board_is_asked() {
+    let mut robot = Robot::up();
+    robot.sensor.with(|board| board.deaf = true);
+    let bus = robot.isolation.open(Role::Operator);
+    std::thread::scope(|scope| {
+        let asked = scope.spawn(move || {
+            let ask = Ask {
+                kind: AskKind::Calibrate.into(),
+                ..Ask::default()
+            };
+            crate::harness::Hands::new(&bus).ask(ask)
+        });
+        robot.hands.give_until(operator(1, FORWARD), "the answer has come", |_| {
+            asked.is_finished()
+        });
+    });
+    assert!(!robot.steering.with(|board| board.failsafe));
+    assert!(robot.steering.with(|board| board.count(FORWARD)) == 1);
+}
+
+#[test]
+fn boards_cannot_be_reset_and_unknown_requests_are_refused() {
+    let robot = Robot::up();
+    for kind in [AskKind::ResetBoards.into(), lager_topics::Tag::from_raw(77)] {
+        let answer = robot.hands.ask(Ask {
+            kind,
+            ..Ask::default()
+        });
+        assert_eq!(answer.outcome.get(), Some(Outcome::Refused));
+    }
+    assert_eq!(robot.sensor.with(|board| board.restarts), 0);
+}
+
+#[test]
+fn settings_without_a_board_are_answered_so() {
+    let mut robot = Robot::with(SensorBoard::new(), SteeringBoard::new());
+    robot.steering.unplug();
+    robot.start();
+    robot
+        .hands
+        .wait_for_health("the sensor board is up", |health| health.sensor.up == 1);
+    let answer = robot.hands.ask(Ask {
+        kind: AskKind::SetGains.into(),
+        ..Ask::default()
+    });
+    assert_eq!(answer.outcome.get(), Some(Outcome::NoBoard));
+}
+
+#[test]
+fn the_switch_button_changes_the_mode() {
+    let mut robot = Robot::up();
+    let buttons = robot
+        .isolation
+        .open(Role::Operator)
+        .publisher::<OperatorInput>()
+        .unwrap();
+    for mode in [Mode::Autonomous, Mode::Manual] {
+        let kind = InputKind::SwitchPressed.into();
+        buttons.send(0, Input { kind, ..Input::default() }).unwrap();
+        robot
+            .hands
+            .wait_for_health("the mode has changed", |health| health.mode.get() == Some(mode));
+    }
+}
+
+#[test]
+fn a_clean_stop_leaves_the_robot_in_standby() {
+    let mut robot = Robot::up();
+    robot.hands.give_until(operator(1, FORWARD), "the wheels turn", |hands| {
+        hands.state.look().is_some_and(|state| state.left_duty == 100)
+    });
+    robot.hands.give(operator(1, FORWARD));
+    robot.bridge.take().unwrap().stop();
+    let (moves, failsafe, last) = robot.steering.with(|board| {
+        (board.moves(), board.failsafe, *board.executed.last().unwrap())
+    });
+    assert!(!moves && !failsafe);
+    assert_eq!(last, STANDBY.code());
+    let health = robot.hands.health.look().unwrap();
+    assert_eq!(health.current_code, 0);
+}
+
+#[test]
+fn a_setpoint_the_board_gave_up_is_taken_up_again() {
+    let mut robot = Robot::up();
+    let steering = &robot.steering;
+    let order = operator(1, FORWARD);
+    robot.hands.give_until(order, "the wheels turn", |_| {
+        steering.with(|board| board.moves())
+    });
+    // As if all commands of 150 ms had been lost.
+    steering.with(|board| {
+        board.failsafe = true;
+        board.code = STANDBY.code();
+    });
+    robot.hands.give_until(order, "the wheels turn again", |hands| {
+        hands.state.look().is_some_and(|state| {
+            state.left_duty == 100 && !SteerFlags(state.flags).contains(SteerFlags::FAILSAFE)
+        })
+    });
+}

@@ -1,0 +1,92 @@
+//! What a turn that has ended amounts to.
+//!
+//! The steering board turns by time and ends early when the tape comes under its centre sensors
+//! (AMB-22), so "done" alone does not say where the robot looks: a cross bar, a spot of dirt or an
+//! interruption can end a turn anywhere. The angle from dead reckoning tells whole quarters from
+//! fragments, and what is left over counts for the next quarter of the same turn.
+//!
+//! ```text
+//!   0        60          80   90            165   180
+//!   | fragment | by line  | one quarter      | two quarters (the tape at 90 was not there)
+//! ```
+
+use lager_wire::LineState;
+
+use crate::heading::Spin;
+
+/// Below this a turn has not found the tape it was to find: the tape behind is seen up to 15
+/// degrees, the tape ahead from 75.
+const FRAGMENT_DEG: f32 = 60.0;
+/// From here the rest is small enough for the line control, whatever the sensors see.
+const QUARTER_DEG: f32 = 80.0;
+/// From here the turn has gone on to the next tape.
+const HALF_DEG: f32 = 165.0;
+
+/// What to do about a turn that has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turned {
+    /// The heading is still the old one: turn again the same way.
+    Fragment,
+    /// This many quarters are done.
+    Quarters(u8),
+}
+
+/// Judges a turn the board carried out. `turned_deg` is positive in the direction of the turn.
+pub fn done(turned_deg: f32) -> Turned {
+    match turned_deg {
+        angle if angle < FRAGMENT_DEG => Turned::Fragment,
+        angle if angle < HALF_DEG => Turned::Quarters(1),
+        _ => Turned::Quarters(2),
+    }
+}
+
+/// Judges a turn that was cut short, once the robot stands and `seen` is under its sensors.
+///
+/// Turning again from the new tape would lead past it to the next one, so the tape counts when
+/// it is in the middle or already on the far side.
+pub fn interrupted(turned_deg: f32, spin: Spin, seen: LineState) -> Turned {
+    let beyond = match spin {
+        Spin::Left => LineState::LeftOfLine,
+        Spin::Right => LineState::RightOfLine,
+    };
+    let on_it = seen == LineState::OnLine || seen == beyond;
+    if turned_deg >= QUARTER_DEG || (turned_deg >= FRAGMENT_DEG && on_it) {
+        done(turned_deg)
+    } else {
+        Turned::Fragment
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_that_ended_on_the_cross_bar_is_no_quarter() {
+        assert_eq!(done(20.0), Turned::Fragment);
+        assert_eq!(done(84.0), Turned::Quarters(1));
+        assert_eq!(done(110.0), Turned::Quarters(1));
+        assert_eq!(done(174.0), Turned::Quarters(2));
+    }
+
+    #[test]
+    fn an_interrupted_turn_counts_when_the_new_tape_is_reached() {
+        use LineState::{LeftOfLine, NotOnLine, OnLine, RightOfLine};
+        let table = [
+            // Still on the old tape, whatever it looks like.
+            (10.0, OnLine, Turned::Fragment),
+            (40.0, NotOnLine, Turned::Fragment),
+            // Turning right, the new tape comes in from the right: the robot is left of it.
+            (78.0, LeftOfLine, Turned::Fragment),
+            (78.0, OnLine, Turned::Quarters(1)),
+            (78.0, RightOfLine, Turned::Quarters(1)),
+            (85.0, LeftOfLine, Turned::Quarters(1)),
+            (88.0, NotOnLine, Turned::Quarters(1)),
+        ];
+        for (angle, seen, expected) in table {
+            assert_eq!(interrupted(angle, Spin::Right, seen), expected, "{angle} {seen:?}");
+        }
+        assert_eq!(interrupted(78.0, Spin::Left, LeftOfLine), Turned::Quarters(1));
+        assert_eq!(interrupted(78.0, Spin::Left, RightOfLine), Turned::Fragment);
+    }
+}

@@ -1,0 +1,447 @@
+//! A stand-in for everything below logic: a robot on the same grid, moved by the orders, and a
+//! bridge with leases. Geometry decides what the sensors see; the constants are the document's.
+//!
+//! It is small on purpose: 5 ms steps, tape with sharp edges, wheels with lag and a wrong gain.
+
+use std::time::Duration;
+
+use lager_topics::{
+    Finish, Heading, Origin, Side, SteeringOrder, SteeringReport, WarehouseMap,
+};
+use lager_wire::{ArmCommand, Command, LineState, SteerFlags, WheelCommand};
+
+/// One step of the world.
+pub(crate) const STEP: Duration = Duration::from_millis(5);
+const LEASE: Duration = Duration::from_millis(120);
+const QUARTER: Duration = Duration::from_millis(3000);
+const DROP: Duration = Duration::from_millis(1500);
+const HALF_TAPE: f64 = 7.5;
+const AHEAD: f64 = 160.0;
+const CRUISE: f64 = 73.3;
+const TRACK: f64 = 280.0;
+const LAG: f64 = 0.06;
+
+type Point = (f64, f64);
+
+/// Tape on the floor.
+#[derive(Clone, Debug)]
+pub(crate) struct Floor {
+    side: f64,
+    columns: f64,
+    rows: f64,
+    /// Station marks, the way out and its cross bar.
+    strips: Vec<(Point, Point)>,
+    /// Middle of the cross bar.
+    pub(crate) bar: Point,
+}
+
+/// How the way out leads away from the warehouse.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Exit {
+    /// Straight, in mm.
+    Straight(f64),
+    /// Straight, then a quarter of a circle of this radius to the left, then straight.
+    Curved(f64, f64),
+}
+
+impl Floor {
+    pub(crate) fn new(map: &WarehouseMap, exit: Exit) -> Self {
+        let side = f64::from(map.side_length_cm) * 10.0;
+        let mut strips = Vec::new();
+        for product in map.products() {
+            let (x, y) = (f64::from(product.x) * side, f64::from(product.y) * side);
+            let half = side / 2.0;
+            strips.push(match product.side.get().unwrap() {
+                Side::Left => ((x, y + half), (x + 170.0, y + half)),
+                Side::Up => ((x + half, y + side), (x + half, y + side - 170.0)),
+                Side::Right => ((x + side, y + half), (x + side - 170.0, y + half)),
+                Side::Down => ((x + half, y), (x + half, y + 170.0)),
+            });
+        }
+        let mut at = (
+            f64::from(map.delivery_x) * side,
+            f64::from(map.delivery_y) * side,
+        );
+        let mut angle: f64 = if map.delivery_x == 0 { 180.0 } else { 0.0 };
+        let mut forward = |length: f64, angle: f64| {
+            let to = (
+                at.0 + length * angle.to_radians().cos(),
+                at.1 + length * angle.to_radians().sin(),
+            );
+            strips.push((at, to));
+            at = to;
+        };
+        match exit {
+            Exit::Straight(length) => forward(length, angle),
+            Exit::Curved(length, radius) => {
+                forward(length, angle);
+                for _ in 0..18 {
+                    angle += 2.5;
+                    forward(radius * 5f64.to_radians(), angle);
+                    angle += 2.5;
+                }
+                forward(length, angle);
+            }
+        }
+        let bar = at;
+        let across = (angle + 90.0).to_radians();
+        let end = |sign: f64| {
+            (
+                bar.0 + sign * 150.0 * across.cos(),
+                bar.1 + sign * 150.0 * across.sin(),
+            )
+        };
+        strips.push((end(1.0), end(-1.0)));
+        Self {
+            side,
+            columns: f64::from(map.width),
+            rows: f64::from(map.height),
+            strips,
+            bar,
+        }
+    }
+
+    fn is_tape(&self, (x, y): Point) -> bool {
+        let near_line = |value: f64, count: f64| {
+            let line = (value / self.side).round().clamp(0.0, count);
+            (value - line * self.side).abs() <= HALF_TAPE
+        };
+        let within = |value: f64, count: f64| {
+            (-HALF_TAPE..=count * self.side + HALF_TAPE).contains(&value)
+        };
+        let inside = within(x, self.columns) && within(y, self.rows);
+        (inside && (near_line(x, self.columns) || near_line(y, self.rows)))
+            || self.strips.iter().any(|strip| is_on(*strip, (x, y)))
+    }
+}
+
+fn is_on((from, to): (Point, Point), (x, y): Point) -> bool {
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let length = dx.hypot(dy);
+    let (px, py) = (x - from.0, y - from.1);
+    let along = (px * dx + py * dy) / length;
+    let across = (px * dy - py * dx) / length;
+    // Round joints, so that a polyline has no gaps.
+    (-1.0..=length + 1.0).contains(&along) && across.abs() <= HALF_TAPE
+}
+
+/// What happens to a line frame on its way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Trouble {
+    /// Milliseconds between line frames.
+    pub(crate) frame_ms: u64,
+    /// Frames lost, out of 1000.
+    pub(crate) lost: u64,
+    /// Frames that show something else, out of 1000.
+    pub(crate) noise: u64,
+    /// Wrong gain of the left and the right motor.
+    pub(crate) gains: (f64, f64),
+}
+
+impl Trouble {
+    pub(crate) const NONE: Self = Self {
+        frame_ms: 10,
+        lost: 0,
+        noise: 0,
+        gains: (1.0, 1.0),
+    };
+}
+
+/// An order at work.
+#[derive(Clone, Copy, Debug)]
+struct Work {
+    id: u32,
+    command: Command,
+    lease: Duration,
+    since: Duration,
+    /// Turns: words in a row without tape under the centre.
+    clear: u32,
+}
+
+/// The robot with its two boards and the bridge.
+#[derive(Clone, Debug)]
+pub(crate) struct Body {
+    pub(crate) floor: Floor,
+    trouble: Trouble,
+    random: u64,
+    pub(crate) now: Duration,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// Degrees, counter-clockwise from +x.
+    pub(crate) angle: f64,
+    wheels: (f64, f64),
+    duties: (f64, f64),
+    work: Option<Work>,
+    finished: (u32, Finish),
+    replaced: u32,
+    errors: [f64; 3],
+    after_bar: bool,
+    pub(crate) autonomous: bool,
+    pub(crate) stopped: bool,
+    /// The next one-shot orders to refuse.
+    pub(crate) refuse: u32,
+    /// A duty the operator drives with in manual mode.
+    pub(crate) manual_duty: f64,
+    /// Turns and drops begun, by code.
+    pub(crate) begun: Vec<u8>,
+    pub(crate) frames_sent: u64,
+}
+
+impl Body {
+    pub(crate) fn new(map: &WarehouseMap, exit: Exit, trouble: Trouble, seed: u64) -> Self {
+        let floor = Floor::new(map, exit);
+        Self {
+            x: f64::from(map.delivery_x) * floor.side,
+            y: f64::from(map.delivery_y) * floor.side,
+            angle: if map.delivery_x == 0 { 0.0 } else { 180.0 },
+            floor,
+            trouble,
+            random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
+            now: Duration::ZERO,
+            wheels: (0.0, 0.0),
+            duties: (0.0, 0.0),
+            work: None,
+            finished: (0, Finish::None),
+            replaced: 0,
+            errors: [0.0; 3],
+            after_bar: false,
+            autonomous: true,
+            stopped: false,
+            refuse: 0,
+            manual_duty: 0.0,
+            begun: Vec::new(),
+            frames_sent: 0,
+        }
+    }
+
+    fn random(&mut self, below: u64) -> u64 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        (self.random >> 11) % below
+    }
+
+    /// The bridge takes an order.
+    pub(crate) fn order(&mut self, order: &SteeringOrder) {
+        if !self.autonomous || self.stopped || order.id == self.finished.0 {
+            return;
+        }
+        let command = Command::from_code(order.code).unwrap();
+        if let Some(work) = &mut self.work
+            && work.id == order.id
+        {
+            assert_eq!(work.command, command, "one id, two commands");
+            work.lease = self.now + LEASE;
+            return;
+        }
+        assert!(
+            order.id > self.replaced && order.id > self.finished.0,
+            "id {} is not new",
+            order.id
+        );
+        if let Some(work) = self.work.take() {
+            assert!(!work.command.is_one_shot(), "a one-shot order was not waited for");
+            self.replaced = work.id;
+        }
+        if command.is_one_shot() {
+            self.begun.push(order.code);
+            if self.refuse > 0 {
+                self.refuse -= 1;
+                self.finished = (order.id, Finish::Refused);
+                return;
+            }
+        }
+        self.work = Some(Work {
+            id: order.id,
+            command,
+            lease: self.now + LEASE,
+            since: self.now,
+            clear: 0,
+        });
+    }
+
+    /// Ends the order at work.
+    pub(crate) fn end_work(&mut self, finish: Finish) {
+        if let Some(work) = self.work.take() {
+            self.finished = (work.id, finish);
+        }
+    }
+
+    fn bits(&self) -> [bool; 11] {
+        let (sin, cos) = self.angle.to_radians().sin_cos();
+        core::array::from_fn(|index| {
+            let right = (index as f64 - 5.0) * 7.0;
+            let point = (
+                self.x + AHEAD * cos + right * sin,
+                self.y + AHEAD * sin - right * cos,
+            );
+            self.floor.is_tape(point)
+        })
+    }
+
+    /// One step of 5 ms. Yields the line frame that reaches logic now, if one does.
+    pub(crate) fn step(&mut self) -> Option<LineState> {
+        self.now += STEP;
+        let bits = self.bits();
+        let state = self.classify(&bits);
+        self.control(&bits);
+        self.roll();
+        if !(self.now.as_millis() as u64 / 5).is_multiple_of(self.trouble.frame_ms / 5) {
+            return None;
+        }
+        if self.random(1000) < self.trouble.lost {
+            return None;
+        }
+        self.frames_sent += 1;
+        if self.random(1000) < self.trouble.noise {
+            let codes = [
+                LineState::StationToLeft,
+                LineState::StationToRight,
+                LineState::FourWay,
+                LineState::NotOnLine,
+                LineState::DropStation,
+                LineState::LeftOfLine,
+            ];
+            return Some(codes[self.random(6) as usize]);
+        }
+        Some(state)
+    }
+
+    fn classify(&mut self, bits: &[bool; 11]) -> LineState {
+        let run = |from_left: bool| {
+            let mut count = 0;
+            for index in 0..11 {
+                let at = if from_left { index } else { 10 - index };
+                if !bits[at] {
+                    break;
+                }
+                count += 1;
+            }
+            count >= 5
+        };
+        let seen: Vec<f64> = (0..11)
+            .filter(|index| bits[*index])
+            .map(|index| (index as f64 - 5.0) * 2.0)
+            .collect();
+        let (left, right) = (run(true), run(false));
+        if seen.is_empty() {
+            self.errors[0] = if self.errors[0] >= 0.0 { 10.0 } else { -10.0 };
+            return if self.after_bar {
+                LineState::DropStation
+            } else {
+                LineState::NotOnLine
+            };
+        }
+        self.after_bar = left && right;
+        match (left, right) {
+            (true, true) => LineState::FourWay,
+            (true, false) => LineState::StationToLeft,
+            (false, true) => LineState::StationToRight,
+            (false, false) => {
+                let error = seen.iter().sum::<f64>() / seen.len() as f64;
+                self.errors[0] = error;
+                match error {
+                    error if error.abs() <= 2.0 => LineState::OnLine,
+                    error if error > 0.0 => LineState::LeftOfLine,
+                    _ => LineState::RightOfLine,
+                }
+            }
+        }
+    }
+
+    fn control(&mut self, bits: &[bool; 11]) {
+        if let Some(work) = self.work
+            && (work.lease < self.now || self.stopped || !self.autonomous)
+        {
+            self.end_work(Finish::Aborted);
+        }
+        let change = self.errors[0] - self.errors[2];
+        let adjust = 2.0 * self.errors[0] + 2.0 * change;
+        self.errors.copy_within(0..2, 1);
+        let Some(work) = &mut self.work else {
+            self.duties = (self.manual_duty, self.manual_duty);
+            return;
+        };
+        let age = self.now - work.since;
+        self.duties = match work.command {
+            Command::Wheel(WheelCommand::ActiveForward) => (100.0 + adjust, 100.0 - adjust),
+            Command::Wheel(WheelCommand::ManualForward) => (100.0, 100.0),
+            Command::Wheel(WheelCommand::ManualBackward) => (-100.0, -100.0),
+            Command::Wheel(turn @ (WheelCommand::LeftPerp | WheelCommand::RightPerp)) => {
+                let on_tape = bits[4] || bits[5] || bits[6];
+                let was_clear = work.clear >= 2;
+                work.clear = if on_tape { 0 } else { work.clear + 1 };
+                if (on_tape && was_clear) || age >= QUARTER {
+                    self.end_work(Finish::Done);
+                    (0.0, 0.0)
+                } else if turn == WheelCommand::LeftPerp {
+                    (-100.0, 100.0)
+                } else {
+                    (100.0, -100.0)
+                }
+            }
+            Command::Arm(ArmCommand::Drop) => {
+                if age >= DROP {
+                    self.end_work(Finish::Done);
+                }
+                (0.0, 0.0)
+            }
+            _ => (0.0, 0.0),
+        };
+    }
+
+    fn roll(&mut self) {
+        let seconds = STEP.as_secs_f64();
+        let speed = CRUISE / 100.0;
+        let aims = (
+            self.duties.0.clamp(-255.0, 255.0) * speed * self.trouble.gains.0,
+            self.duties.1.clamp(-255.0, 255.0) * speed * self.trouble.gains.1,
+        );
+        self.wheels.0 += (aims.0 - self.wheels.0) * seconds / LAG;
+        self.wheels.1 += (aims.1 - self.wheels.1) * seconds / LAG;
+        let forward = (self.wheels.0 + self.wheels.1) / 2.0 * seconds;
+        let (sin, cos) = self.angle.to_radians().sin_cos();
+        self.x += forward * cos;
+        self.y += forward * sin;
+        self.angle += ((self.wheels.1 - self.wheels.0) / TRACK * seconds).to_degrees();
+    }
+
+    /// The steering board's report as the bridge publishes it.
+    pub(crate) fn report(&self) -> SteeringReport {
+        let mut flags = SteerFlags(0);
+        if self.duties.0 < 0.0 {
+            flags.insert(SteerFlags::LEFT_REVERSE);
+        }
+        if self.duties.1 < 0.0 {
+            flags.insert(SteerFlags::RIGHT_REVERSE);
+        }
+        SteeringReport {
+            finished_id: self.finished.0,
+            finish: self.finished.1.into(),
+            finished_origin: Origin::Logic.into(),
+            current_id: self.work.map_or(0, |work| work.id),
+            current_origin: Origin::Logic.into(),
+            left_duty: self.duties.0.abs() as u8,
+            right_duty: self.duties.1.abs() as u8,
+            flags: flags.0,
+            ..SteeringReport::default()
+        }
+    }
+
+    /// How far the axle is from a place, in mm.
+    pub(crate) fn distance_to(&self, (x, y): Point) -> f64 {
+        (self.x - x).hypot(self.y - y)
+    }
+
+    /// How far the robot looks from a heading, in degrees.
+    pub(crate) fn degrees_off(&self, heading: Heading) -> f64 {
+        let wanted = match heading {
+            Heading::Right => 0.0,
+            Heading::Up => 90.0,
+            Heading::Left => 180.0,
+            Heading::Down => 270.0,
+        };
+        let off = (self.angle - wanted).rem_euclid(360.0);
+        off.min(360.0 - off)
+    }
+}

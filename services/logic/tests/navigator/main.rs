@@ -1,0 +1,6 @@
+//! The navigator on whole missions in virtual time, against a small double of the robot.
+
+mod double;
+mod missions;
+mod restarts;
+mod trial;

@@ -1,0 +1,157 @@
+//! The navigator is killed, and its successor has only the last status.
+
+use std::time::Duration;
+
+use lager_logic::{LogicConfig, Navigator};
+use lager_topics::{EventKind, NavigatorStatus, Phase, Side};
+use proptest::prelude::*;
+
+use crate::double::{Exit, STEP, Trouble};
+use crate::trial::{SIDES, Trial, corners, warehouse};
+
+const EXIT: Exit = Exit::Straight(450.0);
+
+fn mission(size: (u8, u8), delivery: (u8, u8), product: (u8, u8, Side)) -> Trial {
+    let map = warehouse(size, delivery, 45, &[product]);
+    let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
+    trial.order(1, 1);
+    trial
+}
+
+/// Ends the mission and checks that it came to what it was to come to.
+fn finish(mut trial: Trial, killed_at: Duration) {
+    trial.thoughts.push(format!("(killed at {killed_at:?})"));
+    trial.deliver(1);
+    // An event announced just before the kill may be announced again, never left out.
+    assert!(trial.count(EventKind::GettingItem) >= 1, "{}", trial.story());
+    assert!(trial.count(EventKind::InPosition) >= 1, "{}", trial.story());
+    assert!(trial.count(EventKind::ItemDelivered) >= 1, "{}", trial.story());
+}
+
+/// Kills at every step of the mission, with outages of all lengths in turn.
+fn killed_everywhere(mut trial: Trial) {
+    let outages = [20, 90, 130, 250, 700, 1500].map(Duration::from_millis);
+    let mut kills = 0;
+    while !(trial.status.delivered == 1 && trial.is_home()) {
+        trial.step();
+        let mut fork = trial.clone();
+        fork.kill(outages[kills % outages.len()]);
+        finish(fork, trial.body.now);
+        kills += 1;
+        assert!(trial.body.now < Duration::from_secs(120), "{}", trial.story());
+    }
+    assert!(kills > 4000, "only {kills} steps");
+}
+
+#[test]
+fn a_mission_with_a_right_turn_survives_a_kill_at_every_step() {
+    killed_everywhere(mission((1, 1), (0, 0), (0, 0, Side::Up)));
+}
+
+#[test]
+fn a_mission_with_a_left_turn_survives_a_kill_at_every_step() {
+    killed_everywhere(mission((1, 1), (0, 1), (0, 0, Side::Right)));
+}
+
+#[test]
+fn a_status_goes_through_a_navigator_unchanged() {
+    let mut trial = mission((2, 1), (2, 0), (0, 0, Side::Left));
+    while trial.status.delivered == 0 {
+        trial.run_for(STEP * 7);
+        // Without a mode there is nobody to have moved the robot meanwhile.
+        let status = NavigatorStatus {
+            stopped: 1,
+            mode: lager_topics::Mode::Manual.into(),
+            distance_cm: 255,
+            ..trial.navigator.status()
+        };
+        let again = Navigator::resume(LogicConfig::default(), &status).status();
+        assert_eq!(NavigatorStatus { stopped: 1, ..again }, status);
+    }
+}
+
+#[test]
+fn a_waiting_order_survives() {
+    let products = [(0, 0, Side::Up), (0, 0, Side::Right)];
+    let map = warehouse((1, 1), (0, 0), 45, &products);
+    let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
+    trial.order(1, 1);
+    trial.run_for(Duration::from_secs(3));
+    trial.order(2, 2);
+    trial.kill(Duration::from_millis(400));
+    trial.deliver(2);
+    let delivered = |id| {
+        trial
+            .events
+            .iter()
+            .any(|(kind, order, _)| *kind == EventKind::ItemDelivered && *order == id)
+    };
+    assert!(delivered(1) && delivered(2), "{}", trial.story());
+}
+
+#[test]
+fn a_granted_arm_stays_granted() {
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Down));
+    assert!(trial.run_until(Duration::from_secs(60), |trial| trial.phase() == Phase::Picking));
+    trial.kill(Duration::from_millis(300));
+    let order = trial.navigator.current_order().unwrap();
+    assert_eq!((order.code, order.arm_granted), (1, 1));
+}
+
+#[test]
+fn order_ids_go_on_after_the_old_ones() {
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
+    trial.run_for(Duration::from_secs(6));
+    let before = trial.status.command_id;
+    trial.kill(Duration::from_millis(300));
+    trial.run_for(Duration::from_millis(100));
+    assert!(trial.status.command_id >= before, "{} < {before}", trial.status.command_id);
+}
+
+#[test]
+fn without_the_map_nothing_is_ordered() {
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
+    trial.run_for(Duration::from_secs(6));
+    let navigator = Navigator::resume(LogicConfig::default(), &trial.status);
+    assert_eq!(navigator.current_order(), None);
+}
+
+#[test]
+fn a_status_that_makes_no_sense_yields_a_fresh_navigator() {
+    let nonsense = NavigatorStatus {
+        x: -4,
+        delivered: 9,
+        ..NavigatorStatus::default()
+    };
+    let status = Navigator::resume(LogicConfig::default(), &nonsense).status();
+    assert_eq!((status.phase.get(), status.delivered), (Some(Phase::WaitingForMap), 0));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_mission_survives_many_kills_under_trouble(
+        (width, height) in (1u8..4, 1u8..4),
+        corner in 0usize..4,
+        square in (0u8..4, 0u8..4),
+        side in 0usize..4,
+        gains in (0.98f64..1.02, 0.98f64..1.02),
+        kills in prop::collection::vec((2_000u64..25_000, 20u64..1200), 1..6),
+        seed in 1u64..1000,
+    ) {
+        let product = (square.0 % width, square.1 % height, SIDES[side]);
+        let delivery = corners((width, height))[corner];
+        let trouble = Trouble { frame_ms: 10, lost: 20, noise: 2, gains };
+        let map = warehouse((width, height), delivery, 50, &[product]);
+        let mut trial = Trial::new(map, Exit::Straight(600.0), trouble, seed);
+        trial.order(1, 1);
+        for (after, outage) in kills {
+            trial.run_for(Duration::from_millis(after));
+            trial.kill(Duration::from_millis(outage));
+            trial.thoughts.push("(killed)".to_owned());
+        }
+        trial.deliver(1);
+        prop_assert!(trial.count(EventKind::ItemDelivered) >= 1);
+    }
+}

@@ -1,0 +1,273 @@
+//! A navigator on the double, with the shell's duties (renewal, status before order) and an
+//! operator who picks; and what a mission must have come to.
+
+use std::time::Duration;
+
+use lager_logic::map::{Map, Node};
+use lager_logic::{Input, LogicConfig, Navigator, Output};
+use lager_topics::{
+    EventKind, MapProduct, Mode, NavigatorStatus, Order, Phase, Side, WarehouseMap,
+};
+
+use crate::double::{Body, Exit, STEP, Trouble};
+
+const RENEWAL: Duration = Duration::from_millis(40);
+const STATUS_PERIOD: Duration = Duration::from_millis(50);
+const PICKING: Duration = Duration::from_millis(600);
+
+/// How far off the axle may be at a place where it stands, in mm.
+const PLACE_MM: f64 = 25.0;
+/// How far off the robot may look there, in degrees.
+const LOOK_DEG: f64 = 15.0;
+
+/// A warehouse with these products, numbered from 1.
+pub(crate) fn warehouse(
+    size: (u8, u8),
+    delivery: (u8, u8),
+    side_cm: u16,
+    products: &[(u8, u8, Side)],
+) -> WarehouseMap {
+    let mut map = WarehouseMap {
+        width: size.0,
+        height: size.1,
+        delivery_x: delivery.0,
+        delivery_y: delivery.1,
+        side_length_cm: side_cm,
+        product_count: products.len() as u16,
+        ..WarehouseMap::default()
+    };
+    for (index, (x, y, side)) in products.iter().enumerate() {
+        map.products[index] = MapProduct {
+            id: index as i32 + 1,
+            x: *x,
+            y: *y,
+            side: (*side).into(),
+            ..MapProduct::default()
+        };
+    }
+    map
+}
+
+/// The four sides.
+pub(crate) const SIDES: [Side; 4] = [Side::Left, Side::Up, Side::Right, Side::Down];
+
+/// The corners a delivery can be at.
+pub(crate) fn corners(size: (u8, u8)) -> [(u8, u8); 4] {
+    [(0, 0), (0, size.1), (size.0, 0), (size.0, size.1)]
+}
+
+/// One robot, its navigator and what has happened.
+#[derive(Clone, Debug)]
+pub(crate) struct Trial {
+    pub(crate) published: WarehouseMap,
+    pub(crate) body: Body,
+    pub(crate) navigator: Navigator,
+    pub(crate) status: NavigatorStatus,
+    status_at: Duration,
+    sent: (u32, Duration),
+    pub(crate) events: Vec<(EventKind, u32, Node)>,
+    pub(crate) thoughts: Vec<String>,
+    picking_since: Option<Duration>,
+    pub(crate) dead: bool,
+}
+
+impl Trial {
+    pub(crate) fn new(published: WarehouseMap, exit: Exit, trouble: Trouble, seed: u64) -> Self {
+        let body = Body::new(&published, exit, trouble, seed);
+        let navigator = Navigator::new(LogicConfig::default());
+        let mut trial = Self {
+            published,
+            body,
+            status: navigator.status(),
+            navigator,
+            status_at: Duration::ZERO,
+            sent: (0, Duration::ZERO),
+            events: Vec::new(),
+            thoughts: Vec::new(),
+            picking_since: None,
+            dead: false,
+        };
+        trial.introduce();
+        trial
+    }
+
+    /// What a navigator is told by retained topics when it starts.
+    fn introduce(&mut self) {
+        let published = self.published;
+        self.tell(Input::Map(&published));
+        self.tell_mode();
+    }
+
+    pub(crate) fn tell_mode(&mut self) {
+        let mode = if self.body.autonomous {
+            Mode::Autonomous
+        } else {
+            Mode::Manual
+        };
+        let stopped = self.body.stopped;
+        self.tell(Input::Mode { mode, stopped });
+    }
+
+    pub(crate) fn order(&mut self, id: u32, product: i32) {
+        self.tell(Input::Order(&Order { id, product }));
+    }
+
+    /// One input, and what the shell does after it.
+    pub(crate) fn tell(&mut self, input: Input<'_>) {
+        let now = self.body.now;
+        let Output {
+            events, thought, ..
+        } = self.navigator.handle(now, input);
+        for event in &events {
+            let kind = event.kind.get().unwrap();
+            self.events.push((kind, event.order_id, Node::new(event.x, event.y)));
+            self.check_event(kind);
+        }
+        self.thoughts
+            .extend(thought.map(|thought| thought.text.as_str().to_owned()));
+        let status = self.navigator.status();
+        if Navigator::is_news(&self.status, &status) || now >= self.status_at + STATUS_PERIOD {
+            self.status = status;
+            self.status_at = now;
+        }
+        if let Some(order) = self.navigator.current_order()
+            && (order.id != self.sent.0 || now >= self.sent.1 + RENEWAL)
+        {
+            self.body.order(&order);
+            self.sent = (order.id, now);
+        }
+    }
+
+    /// 5 ms of robot time.
+    pub(crate) fn step(&mut self) {
+        let frame = self.body.step();
+        if self.dead {
+            return;
+        }
+        if let Some(state) = frame {
+            self.tell(Input::Line(state));
+        }
+        let report = self.body.report();
+        self.tell(Input::Steering(&report));
+        self.pick();
+    }
+
+    /// The operator signals some time after the robot has come to the goods, again and again.
+    fn pick(&mut self) {
+        if self.status.phase != Phase::Picking {
+            self.picking_since = None;
+            return;
+        }
+        let since = *self.picking_since.get_or_insert(self.body.now);
+        if self.body.now >= since + PICKING {
+            let order_id = self.status.order_id;
+            self.tell(Input::PickupDone { order_id });
+        }
+    }
+
+    /// Kills the navigator, lets the robot do what it does without for `outage`, and starts the
+    /// next one from the last status.
+    pub(crate) fn kill(&mut self, outage: Duration) {
+        self.dead = true;
+        self.run_for(outage);
+        self.dead = false;
+        self.navigator = Navigator::resume(LogicConfig::default(), &self.status);
+        self.introduce();
+    }
+
+    pub(crate) fn run_for(&mut self, span: Duration) {
+        let end = self.body.now + span;
+        while self.body.now < end {
+            self.step();
+        }
+    }
+
+    /// Runs until `done` or until `limit` has passed; says whether it came to `done`.
+    pub(crate) fn run_until(&mut self, limit: Duration, done: impl Fn(&Self) -> bool) -> bool {
+        let end = self.body.now + limit;
+        while self.body.now < end {
+            if done(self) {
+                return true;
+            }
+            self.step();
+        }
+        done(self)
+    }
+
+    pub(crate) fn phase(&self) -> Phase {
+        self.navigator.status().phase.get().unwrap()
+    }
+
+    pub(crate) fn is_home(&self) -> bool {
+        self.phase() == Phase::WaitingForOrder && self.navigator.status().pending == 0
+    }
+
+    /// Runs until `count` products are delivered and the robot is back; panics with its thoughts
+    /// if that does not come about or the robot is not where it believes to be.
+    pub(crate) fn deliver(&mut self, count: u32) {
+        let limit = Duration::from_secs(400) * count.max(1);
+        let done = self.run_until(limit, |trial| {
+            (trial.status.delivered == count && trial.is_home()) || trial.phase() == Phase::Stuck
+        });
+        assert!(done && self.phase() != Phase::Stuck, "{}", self.story());
+        self.run_for(STEP * 100);
+        let map = self.map();
+        self.assert_at(self.place(map.delivery()));
+        self.assert_looks(map.exit(), 180.0);
+    }
+
+    pub(crate) fn map(&self) -> Map {
+        Map::new(&self.published).unwrap()
+    }
+
+    fn place(&self, node: Node) -> (f64, f64) {
+        let side = f64::from(self.published.side_length_cm) * 10.0;
+        (f64::from(node.x) * side, f64::from(node.y) * side)
+    }
+
+    fn check_event(&self, kind: EventKind) {
+        match kind {
+            EventKind::InPosition => {
+                let map = self.map();
+                let product = self.navigator.status().product;
+                let station = map.station(product).unwrap();
+                let [first, second] = station.ends.map(|end| self.place(end));
+                self.assert_at(((first.0 + second.0) / 2.0, (first.1 + second.1) / 2.0));
+                self.assert_looks(station.into, 0.0);
+            }
+            EventKind::ItemDelivered => {
+                let distance = self.body.distance_to(self.body.floor.bar);
+                assert!((120.0..180.0).contains(&distance), "{distance} {}", self.story());
+            }
+            _ => {}
+        }
+    }
+
+    fn assert_at(&self, place: (f64, f64)) {
+        let off = self.body.distance_to(place);
+        assert!(off < PLACE_MM, "{off:.0} mm off {place:?}: {}", self.story());
+    }
+
+    fn assert_looks(&self, heading: lager_topics::Heading, turned: f64) {
+        let off = (self.body.degrees_off(heading) - turned).abs();
+        assert!(off < LOOK_DEG, "{off:.0} degrees off {heading:?}: {}", self.story());
+    }
+
+    /// What the robot thought, for a failed test.
+    pub(crate) fn story(&self) -> String {
+        format!(
+            "at {:?} ({:.0}, {:.0}) looking {:.0}: {:#?}\n{:#?}",
+            self.body.now,
+            self.body.x,
+            self.body.y,
+            self.body.angle,
+            self.thoughts,
+            self.navigator.status(),
+        )
+    }
+
+    /// How often an event was announced.
+    pub(crate) fn count(&self, wanted: EventKind) -> usize {
+        self.events.iter().filter(|(kind, ..)| *kind == wanted).count()
+    }
+}

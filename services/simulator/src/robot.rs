@@ -1,0 +1,429 @@
+//! The robot: world, both boards and their wires, driven by events in virtual time.
+//!
+//! ```text
+//!    Pi ==write/read==> serial line ==> sensor board ---- ExDe ----> steering board <== serial line <== Pi
+//!                                            |                         |       |
+//!                                       line, IR                    motors  servos
+//!                                            '---------- World --------'-------'
+//! ```
+//! Between two events nothing changes that a board could notice, so time jumps from event to
+//! event: a step a board asked for, a byte that has arrived, the end of a transmission, an edge
+//! on ExDe. At the same instant the sensor board comes first. A run depends on the warehouse, the
+//! options and the bytes written and when, not on how the caller cuts the time.
+//!
+//! It never reads a clock and decides nothing the boards decide.
+
+use core::time::Duration;
+
+use lager_control::arm::ArmConfig;
+use lager_control::{SensorConfig, SensorUnit, SteeringConfig, SteeringUnit};
+use lager_ax12::table::MAX_POSITION;
+use lager_plant::arm::SERVOS;
+use lager_plant::noise::Noise;
+use lager_plant::{Pose, Warehouse, WarehouseError, World, WorldState};
+use lager_wire::ResetCause;
+
+use crate::boards::{Chip, ExDe, SensorPins, SteeringPins};
+use crate::uart::Uart;
+
+/// A board is out of reset this long after its cause: the chip's start-up time with the fuses
+/// for slowly rising power.
+const START_UP_NS: u64 = 65_000_000;
+/// A board's loop takes at least this long, whatever it asks for.
+const SHORTEST_LOOP_NS: u64 = 10_000;
+/// The watchdog's time: the motors go off, then the board starts anew.
+const WATCHDOG_NS: u64 = 125_000_000;
+/// The middle of a servo's range.
+const REST: u16 = 512;
+/// The stream of noise that spreads the boards' first loops.
+const START_STREAM: u64 = 100;
+
+/// The two serial lines, named for the boards at their ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Wire {
+    /// To the sensor board.
+    Sensor,
+    /// To the steering board.
+    Steering,
+}
+
+/// How a robot is built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobotOptions {
+    /// Chooses every imperfection: the same seed is the same robot.
+    pub seed: u64,
+    /// Baud rate of both serial lines.
+    pub baud: u32,
+    /// What the boards say why they started.
+    pub cause: ResetCause,
+    /// The sensor board's constants.
+    pub sensor: SensorConfig,
+    /// The steering board's constants.
+    pub steering: SteeringConfig,
+}
+
+impl Default for RobotOptions {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            baud: 500_000,
+            cause: ResetCause::PowerOn,
+            sensor: SensorConfig::default(),
+            steering: SteeringConfig::default(),
+        }
+    }
+}
+
+/// How the robot really is; its own boards do not know it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// Everything that is worth keeping.
+    pub world: WorldState,
+    /// Duties at the left and the right motor driver, negative backwards.
+    pub duties: [i16; 2],
+    /// The product in the claw.
+    pub carrying: Option<i32>,
+}
+
+#[derive(Clone, Debug)]
+struct Station<Unit> {
+    unit: Option<Unit>,
+    chip: Chip,
+    due_ns: u64,
+    hung: bool,
+}
+
+/// A robot in its warehouse.
+#[derive(Debug)]
+pub struct Robot {
+    world: World,
+    sensor: Station<SensorUnit>,
+    steering: Station<SteeringUnit>,
+    exde: ExDe,
+    options: RobotOptions,
+    now_ns: u64,
+}
+
+impl<Unit> Station<Unit> {
+    fn new(options: &RobotOptions, starts_ns: u64) -> Self {
+        Self {
+            unit: None,
+            chip: Chip {
+                uart: Uart::new(options.baud),
+                cause: options.cause,
+                boot_ns: starts_ns,
+                kicked_ns: starts_ns,
+                now_ns: 0,
+            },
+            due_ns: starts_ns,
+            hung: false,
+        }
+    }
+
+    fn next_event(&self, now: u64) -> u64 {
+        if self.hung {
+            self.chip.kicked_ns + WATCHDOG_NS
+        } else if self.unit.is_none() {
+            self.due_ns
+        } else {
+            self.due_ns.min(self.chip.uart.next_event(now))
+        }
+    }
+
+    /// Holds the board in reset and lets it start again.
+    fn reset(&mut self, now: u64, cause: ResetCause) {
+        self.unit = None;
+        self.hung = false;
+        self.chip.cause = cause;
+        self.chip.now_ns = now;
+        // The board's clock counts whole microseconds from its start.
+        self.chip.boot_ns = (now + START_UP_NS).next_multiple_of(1_000);
+        self.chip.kicked_ns = self.chip.boot_ns;
+        self.due_ns = self.chip.boot_ns;
+        self.chip.uart.restart_board(now);
+    }
+
+    /// The board's own clock; it runs while the board does.
+    fn clock_us(&self, now: u64) -> u32 {
+        (now.saturating_sub(self.chip.boot_ns) / 1_000) as u32
+    }
+
+    /// Whether the board's loop has something to do; `input` is what else its interrupts saw.
+    fn wants(&self, now: u64, input: bool) -> bool {
+        let arrived = self.chip.uart.next_event(self.chip.now_ns) <= now;
+        !self.hung && (now >= self.due_ns || self.unit.is_some() && (input || arrived))
+    }
+
+    /// Notes when the unit wants its next step.
+    fn plan(&mut self, wanted_us: u32) {
+        let ahead = wanted_us.wrapping_sub(self.clock_us(self.chip.now_ns)) as i32;
+        let ahead_ns = u64::from(ahead.max(0).unsigned_abs()) * 1_000;
+        let clock_ns = self.chip.boot_ns + (self.chip.now_ns - self.chip.boot_ns) / 1_000 * 1_000;
+        self.due_ns = (clock_ns + ahead_ns).max(self.chip.now_ns + SHORTEST_LOOP_NS);
+    }
+}
+
+impl Robot {
+    /// A robot at the start of a warehouse, its boards about to start.
+    ///
+    /// # Errors
+    /// The warehouse cannot be built.
+    pub fn new(warehouse: &Warehouse, options: RobotOptions) -> Result<Self, WarehouseError> {
+        let mut spread = Noise::new(options.seed, START_STREAM);
+        let mut starts_ns = || START_UP_NS + spread.bits() % 5_000 * 1_000;
+        let pose = resting_arm(&options.steering.arm);
+        Ok(Self {
+            world: World::new(warehouse, options.seed, pose)?,
+            sensor: Station::new(&options, starts_ns()),
+            steering: Station::new(&options, starts_ns()),
+            exde: ExDe::default(),
+            options,
+            now_ns: 0,
+        })
+    }
+
+    /// Goes on from a kept world. The boards start anew, at the kept time.
+    pub fn resume(&mut self, state: &WorldState) {
+        self.world.restore(state);
+        self.now_ns = state.time.as_nanos() as u64;
+        self.reset_board(Wire::Sensor, ResetCause::External);
+        self.reset_board(Wire::Steering, ResetCause::External);
+    }
+
+    /// Robot time since the start of the world.
+    pub fn now(&self) -> Duration {
+        Duration::from_nanos(self.now_ns)
+    }
+
+    /// Advances to `now`; what lies behind is ignored.
+    pub fn advance_to(&mut self, now: Duration) {
+        let target = now.as_nanos() as u64;
+        while let Some(next) = Some(self.next_ns()).filter(|next| *next <= target) {
+            self.handle(next);
+        }
+        self.settle(target);
+    }
+
+    /// Advances until a packet has wholly arrived at the Pi, at most to `limit`; the time
+    /// reached. Cheaper than asking after every event.
+    pub fn advance_to_output(&mut self, limit: Duration) -> Duration {
+        let limit = limit.as_nanos() as u64;
+        loop {
+            let ends = [
+                self.sensor.chip.uart.next_end(self.now_ns),
+                self.steering.chip.uart.next_end(self.now_ns),
+            ];
+            let end = ends.into_iter().flatten().min().unwrap_or(u64::MAX);
+            let next = self.next_ns();
+            if end.min(next) > limit {
+                self.settle(limit);
+                return self.now();
+            }
+            if end < next {
+                self.settle(end);
+                return self.now();
+            }
+            self.handle(next);
+            if end == next {
+                return self.now();
+            }
+        }
+    }
+
+    /// When something happens next.
+    pub fn next_event(&self) -> Duration {
+        Duration::from_nanos(self.next_ns())
+    }
+
+    /// The Pi writes to a board; the bytes leave at the baud rate from now on.
+    pub fn write(&mut self, wire: Wire, bytes: &[u8]) {
+        let now = self.now_ns;
+        self.uart(wire).write(now, bytes);
+    }
+
+    /// Appends what has arrived at the Pi by now.
+    pub fn read(&mut self, wire: Wire, into: &mut Vec<u8>) {
+        let now = self.now_ns;
+        self.uart(wire).read(now, into);
+    }
+
+    /// How the robot really is.
+    pub fn truth(&self) -> Truth {
+        Truth {
+            world: WorldState {
+                time: self.now(),
+                ..self.world.state()
+            },
+            duties: self.world.duties(),
+            carrying: self.world.goods().held(),
+        }
+    }
+
+    /// Counts changes of any goods' state.
+    pub fn goods_changes(&self) -> u64 {
+        self.world.goods().changes()
+    }
+
+    /// Resets a board now. The steering board's motors go off at once.
+    pub fn reset_board(&mut self, wire: Wire, cause: ResetCause) {
+        let now = self.now_ns;
+        match wire {
+            Wire::Sensor => {
+                self.sensor.reset(now, cause);
+                self.exde.release_sender();
+            }
+            Wire::Steering => {
+                self.steering.reset(now, cause);
+                self.exde.release_receiver();
+                self.world.set_motors(0, 0);
+            }
+        }
+    }
+
+    /// Lets a board's program hang; its watchdog will reset it.
+    pub fn hang_board(&mut self, wire: Wire) {
+        match wire {
+            Wire::Sensor => self.sensor.hung = self.sensor.unit.is_some(),
+            Wire::Steering => self.steering.hung = self.steering.unit.is_some(),
+        }
+    }
+
+    /// Cuts a serial cable, or mends it.
+    pub fn cut(&mut self, wire: Wire, cut: bool) {
+        let now = self.now_ns;
+        self.uart(wire).set_cut(cut, now);
+    }
+
+    /// Noise on the way to the board.
+    pub fn disturb_board(&mut self, wire: Wire, bytes: &[u8]) {
+        self.write(wire, bytes);
+    }
+
+    /// Noise on the way to the Pi; it arrives now.
+    pub fn disturb_pi(&mut self, wire: Wire, bytes: &[u8]) {
+        let now = self.now_ns;
+        self.uart(wire).disturb_pi(now, bytes);
+    }
+
+    /// Puts the robot somewhere, at rest.
+    pub fn place(&mut self, pose: Pose) {
+        self.world.place(pose);
+    }
+
+    /// The world, for what tests and tools want to know of it.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The world, for faults that tests put into it.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// Bytes lost on a serial line for want of a reader, of room or of a cable.
+    pub fn dropped(&self, wire: Wire) -> u64 {
+        match wire {
+            Wire::Sensor => self.sensor.chip.uart.dropped(),
+            Wire::Steering => self.steering.chip.uart.dropped(),
+        }
+    }
+
+    fn uart(&mut self, wire: Wire) -> &mut Uart {
+        match wire {
+            Wire::Sensor => &mut self.sensor.chip.uart,
+            Wire::Steering => &mut self.steering.chip.uart,
+        }
+    }
+
+    fn next_ns(&self) -> u64 {
+        let servo = match (self.steering.unit.is_some(), self.world.next_servo_byte()) {
+            (true, Some(at)) => at.as_nanos() as u64,
+            _ => u64::MAX,
+        };
+        let servo = if servo > self.now_ns { servo } else { u64::MAX };
+        self.sensor
+            .next_event(self.now_ns)
+            .min(self.steering.next_event(self.now_ns))
+            .min(servo)
+    }
+
+    /// Moves the time without an event.
+    fn settle(&mut self, now: u64) {
+        if now > self.now_ns {
+            self.now_ns = now;
+            self.world.advance_to(Duration::from_nanos(now));
+        }
+    }
+
+    /// Everything that happens at `now`.
+    fn handle(&mut self, now: u64) {
+        self.settle(now);
+        for wire in [Wire::Sensor, Wire::Steering] {
+            self.bite(wire, now);
+        }
+        if self.sensor.wants(now, self.exde.returned) {
+            self.step_sensor(now);
+        }
+        let servo = self.world.next_servo_byte().is_some_and(|at| at.as_nanos() as u64 <= now);
+        if self.steering.wants(now, self.exde.rose || servo) {
+            self.step_steering(now);
+        }
+    }
+
+    /// Resets a board whose watchdog has run out.
+    fn bite(&mut self, wire: Wire, now: u64) {
+        let (hung, kicked) = match wire {
+            Wire::Sensor => (self.sensor.hung, self.sensor.chip.kicked_ns),
+            Wire::Steering => (self.steering.hung, self.steering.chip.kicked_ns),
+        };
+        if hung && now >= kicked + WATCHDOG_NS {
+            self.reset_board(wire, ResetCause::Watchdog);
+        }
+    }
+
+    fn step_sensor(&mut self, now: u64) {
+        let receiver_us = self.steering.unit.is_some().then(|| self.steering.clock_us(now));
+        let Station { unit, chip, .. } = &mut self.sensor;
+        chip.now_ns = now;
+        let mut pins = SensorPins {
+            chip,
+            world: &mut self.world,
+            exde: &mut self.exde,
+            receiver_us,
+        };
+        let unit = unit.get_or_insert_with(|| SensorUnit::new(&pins, self.options.sensor));
+        let wanted_us = unit.step(&mut pins);
+        self.sensor.plan(wanted_us);
+    }
+
+    fn step_steering(&mut self, now: u64) {
+        self.exde.rose = false;
+        let Station { unit, chip, .. } = &mut self.steering;
+        chip.now_ns = now;
+        let mut pins = SteeringPins {
+            chip,
+            world: &mut self.world,
+            exde: &mut self.exde,
+        };
+        let unit = unit.get_or_insert_with(|| SteeringUnit::new(&pins, self.options.steering));
+        let wanted_us = unit.step(&mut pins);
+        self.steering.plan(wanted_us);
+    }
+}
+
+/// Where the servos stand before anybody has moved them: the pose the arm is carried in, the
+/// claw open.
+fn resting_arm(arm: &ArmConfig) -> [u16; SERVOS] {
+    let carry = arm.carry;
+    let facing = |position: u16| MAX_POSITION - position;
+    [
+        carry.base,
+        carry.shoulder,
+        facing(carry.shoulder),
+        carry.elbow,
+        facing(carry.elbow),
+        carry.wrist,
+        REST,
+        arm.gripper_open,
+    ]
+}

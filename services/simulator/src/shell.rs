@@ -1,0 +1,190 @@
+//! The simulated robot as a process.
+//!
+//! ```text
+//!         sleep until input, or until something happens, at least 0.5 ms
+//!              |
+//!   ports --bytes--> robot.advance_to(clock) --bytes--> ports
+//!                                  '--> truth/pose, 50 times a second and when goods change state
+//! ```
+//! Robot time is the bus's clock, so it runs at the speed of everybody else's. The loop works in
+//! batches, which costs little processor time and delays a byte by no more than a batch.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use lager_plant::{Warehouse, WarehouseError};
+use lager_ports::{Bus, Clock, PortError, Publisher, SendError, Shutdown};
+use lager_topics::TruthPose;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use thiserror::Error;
+
+use crate::pty::{Port, PtyError};
+use crate::robot::{Robot, RobotOptions, Wire};
+use crate::truth::{message, world_state};
+
+/// The shortest sleep between two batches, in real time.
+const BATCH: Duration = Duration::from_micros(500);
+/// The longest sleep, in real time; also how late an opened port is noticed.
+const LONGEST_SLEEP: Duration = Duration::from_millis(5);
+/// From one truth to the next, in robot time.
+const TRUTH_PERIOD: Duration = Duration::from_millis(20);
+/// How long a restarted simulator waits for its last truth, in real time.
+const KEPT_WAIT: Duration = Duration::from_millis(500);
+
+/// What the process needs to know.
+#[derive(Clone, Debug)]
+pub struct SimulatorConfig {
+    /// The world.
+    pub warehouse: Warehouse,
+    /// Chooses every imperfection.
+    pub seed: u64,
+    /// Baud rate of both serial lines.
+    pub baud: u32,
+    /// Where the sensor board's port is linked.
+    pub sensor_link: PathBuf,
+    /// Where the steering board's port is linked.
+    pub steering_link: PathBuf,
+    /// Whether to go on with the world a killed predecessor left on the bus, if there is one.
+    pub resume: bool,
+}
+
+/// Why the simulator ended.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The warehouse cannot be built.
+    #[error(transparent)]
+    Warehouse(#[from] WarehouseError),
+    /// A port could not be made.
+    #[error(transparent)]
+    Pty(#[from] PtyError),
+    /// The bus cannot be used.
+    #[error(transparent)]
+    Bus(#[from] PortError),
+    /// The truth cannot be told.
+    #[error(transparent)]
+    Send(#[from] SendError),
+}
+
+/// Runs a simulated robot until `shutdown`.
+///
+/// # Errors
+/// The warehouse, the ports or the bus cannot be used.
+pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(), RunError> {
+    let kept = if config.resume {
+        bus.kept::<TruthPose>(KEPT_WAIT)?
+    } else {
+        None
+    };
+    let options = RobotOptions {
+        seed: config.seed,
+        baud: config.baud,
+        ..RobotOptions::default()
+    };
+    let mut robot = Robot::new(&config.warehouse, options)?;
+    if let Some(kept) = &kept {
+        robot.resume(&world_state(kept));
+        tracing::info!(seconds = robot.now().as_secs_f64(), "goes on with the kept world");
+    }
+    let mut shell = Shell {
+        truth: bus.publisher::<TruthPose>()?,
+        truth_due: robot.now(),
+        goods_told: robot.goods_changes(),
+        lines: [
+            Line::new(Wire::Sensor, Port::create(&config.sensor_link)?),
+            Line::new(Wire::Steering, Port::create(&config.steering_link)?),
+        ],
+        robot,
+    };
+    shell.run(bus.clock(), shutdown)
+}
+
+struct Line {
+    wire: Wire,
+    port: Port,
+    bytes: Vec<u8>,
+    lost: usize,
+}
+
+impl Line {
+    fn new(wire: Wire, port: Port) -> Self {
+        Self {
+            wire,
+            port,
+            bytes: Vec::with_capacity(4_096),
+            lost: 0,
+        }
+    }
+}
+
+struct Shell {
+    robot: Robot,
+    lines: [Line; 2],
+    truth: Publisher<TruthPose>,
+    truth_due: Duration,
+    goods_told: u64,
+}
+
+impl Shell {
+    fn run(&mut self, clock: &Clock, shutdown: &Shutdown) -> Result<(), RunError> {
+        let (robot_start, clock_start) = (self.robot.now(), clock.now());
+        while !shutdown.is_requested() {
+            let now = robot_start + clock.now().saturating_sub(clock_start);
+            self.robot.advance_to(now);
+            self.exchange();
+            self.tell_truth(now)?;
+            let quiet = clock.real(self.robot.next_event().saturating_sub(now));
+            self.sleep(quiet.clamp(BATCH, LONGEST_SLEEP));
+        }
+        Ok(())
+    }
+
+    /// Passes bytes in both directions, after the robot has come up to the present.
+    fn exchange(&mut self) {
+        for Line {
+            wire,
+            port,
+            bytes,
+            lost,
+        } in &mut self.lines
+        {
+            port.look();
+            bytes.clear();
+            port.read(bytes);
+            if !bytes.is_empty() {
+                self.robot.write(*wire, bytes);
+                bytes.clear();
+            }
+            self.robot.read(*wire, bytes);
+            let dropped = port.write(bytes);
+            if dropped > 0 && *lost == 0 && port.is_open() {
+                tracing::warn!(?wire, "nobody reads the port fast enough; bytes are lost");
+            }
+            *lost = if port.is_open() { dropped } else { 0 };
+        }
+    }
+
+    fn tell_truth(&mut self, now: Duration) -> Result<(), SendError> {
+        let changes = self.robot.goods_changes();
+        if now < self.truth_due && changes == self.goods_told {
+            return Ok(());
+        }
+        self.goods_told = changes;
+        self.truth_due = now + TRUTH_PERIOD;
+        self.truth.send(Clock::monotonic_ns(), message(&self.robot.truth()))
+    }
+
+    /// Sleeps for `time`, or until somebody writes to an open port. A closed one cannot be waited
+    /// on: it is always ready, with an error.
+    fn sleep(&self, time: Duration) {
+        let mut fds = Vec::with_capacity(2);
+        for line in self.lines.iter().filter(|line| line.port.is_open()) {
+            fds.push(PollFd::from_borrowed_fd(line.port.fd(), PollFlags::IN));
+        }
+        let time = Timespec {
+            tv_sec: time.as_secs() as i64,
+            tv_nsec: i64::from(time.subsec_nanos()),
+        };
+        // An interrupted sleep is only a shorter one.
+        let _ = poll(&mut fds, Some(&time));
+    }
+}

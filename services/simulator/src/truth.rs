@@ -1,0 +1,111 @@
+//! The world as a sample of `truth/pose`, and back.
+
+use core::time::Duration;
+
+use lager_plant::{Good, GoodState, Pose, WorldState};
+use lager_topics as topics;
+
+use crate::robot::Truth;
+
+/// The sample that tells the truth.
+pub fn message(truth: &Truth) -> topics::Truth {
+    let world = &truth.world;
+    let mut message = topics::Truth {
+        time_ns: world.time.as_nanos() as u64,
+        x_mm: world.pose.x,
+        y_mm: world.pose.y,
+        heading_rad: world.pose.heading,
+        left_mm_per_s: world.wheel_speeds[0] as f32,
+        right_mm_per_s: world.wheel_speeds[1] as f32,
+        carrying: truth.carrying.unwrap_or(-1),
+        left_duty: truth.duties[0].unsigned_abs().min(255) as u8,
+        right_duty: truth.duties[1].unsigned_abs().min(255) as u8,
+        servo_position: world.servo_positions,
+        ..topics::Truth::default()
+    };
+    for (place, good) in message.goods.iter_mut().zip(&world.goods) {
+        *place = topics::TruthGood {
+            id: good.id,
+            x_mm: good.position[0] as f32,
+            y_mm: good.position[1] as f32,
+            z_mm: good.position[2] as f32,
+            state: match good.state {
+                GoodState::Shelf => topics::GoodState::Shelf,
+                GoodState::Held => topics::GoodState::Held,
+                GoodState::Lying => topics::GoodState::Lying,
+                GoodState::Delivered => topics::GoodState::Delivered,
+            }
+            .into(),
+            ..topics::TruthGood::default()
+        };
+    }
+    message.good_count = world.goods.len().min(message.goods.len()) as u16;
+    message
+}
+
+/// The world a sample tells of. Goods in a state this build does not know are left out, and so
+/// stay where the warehouse has them.
+pub fn world_state(message: &topics::Truth) -> WorldState {
+    let goods = message.goods().iter().filter_map(|good| {
+        Some(Good {
+            id: good.id,
+            position: [good.x_mm, good.y_mm, good.z_mm].map(f64::from),
+            state: match good.state.get()? {
+                topics::GoodState::Shelf => GoodState::Shelf,
+                topics::GoodState::Held => GoodState::Held,
+                topics::GoodState::Lying => GoodState::Lying,
+                topics::GoodState::Delivered => GoodState::Delivered,
+            },
+        })
+    });
+    WorldState {
+        time: Duration::from_nanos(message.time_ns),
+        pose: Pose {
+            x: message.x_mm,
+            y: message.y_mm,
+            heading: message.heading_rad,
+        },
+        wheel_speeds: [message.left_mm_per_s, message.right_mm_per_s].map(f64::from),
+        servo_positions: message.servo_position.map(|position| position.min(1_023)),
+        goods: goods.collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_world_survives_its_message() {
+        let good = |id, state| Good {
+            id,
+            position: [1.5, -2.0, 25.0],
+            state,
+        };
+        let world = WorldState {
+            time: Duration::from_millis(12_345),
+            pose: Pose {
+                x: 100.25,
+                y: -3.0,
+                heading: 1.5,
+            },
+            wheel_speeds: [73.0, -20.5],
+            servo_positions: [1, 2, 3, 4, 5, 6, 7, 1_023],
+            goods: vec![
+                good(7, GoodState::Shelf),
+                good(8, GoodState::Held),
+                good(9, GoodState::Lying),
+                good(10, GoodState::Delivered),
+            ],
+        };
+        let truth = Truth {
+            world: world.clone(),
+            duties: [-100, 120],
+            carrying: Some(8),
+        };
+        let message = message(&truth);
+        assert_eq!(world_state(&message), world);
+        assert_eq!((message.left_duty, message.right_duty), (100, 120));
+        assert_eq!(message.carrying, 8);
+    }
+}

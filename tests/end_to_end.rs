@@ -1,0 +1,216 @@
+//! The robot as people start it: real processes, real packets over ptys, a real bus.
+
+use lager_tests::{Domain, wait_for};
+use lager_topics::{Mode, NavStatus, Phase, SteeringState};
+use rustix::process::Signal;
+use serde_json::Value;
+
+#[test]
+fn a_mission_is_delivered_and_told_in_one_json_line() {
+    for speed in ["1", "5"] {
+        let domain = Domain::new();
+        let mut up = domain.start(&[
+            "up",
+            "--headless",
+            "--mission",
+            "1",
+            "--exit-when-done",
+            "--json",
+            "--speed",
+            speed,
+        ]);
+        assert_eq!(up.wait(), Some(0), "{}", up.log());
+        let told = up.json();
+        assert_eq!(told["delivered"], serde_json::json!([1]));
+        assert_eq!(told["lost"], 0, "{told}\n{}", up.log());
+        assert_eq!(told["restarts"], 0, "{told}\n{}", up.log());
+        let frames = told["frames"].as_u64().expect("frames");
+        let sim = told["sim_seconds"].as_f64().expect("sim_seconds");
+        // 200 sensor packets and 200 reports a second, less the time to start.
+        assert!(frames as f64 > 200.0 * sim, "{told}");
+        domain.assert_clean();
+    }
+}
+
+#[test]
+fn two_robots_run_side_by_side_and_a_name_is_taken_once() {
+    let domain = Domain::new();
+    let mission = [
+        "up",
+        "--headless",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--json",
+        "--speed",
+        "3",
+    ];
+    let mut first = domain.start(&[&["--name", "r1"], &mission[..]].concat());
+    let mut second = domain.start(&[&["--name", "r2"], &mission[..]].concat());
+    let observer = domain.observe("r1", 3.0);
+    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
+    wait_for("the first robot", || status.latest().expect("readable"));
+
+    let third = domain.run(&["--name", "r1", "up"]);
+    assert_eq!(third.status.code(), Some(4));
+    let said = String::from_utf8_lossy(&third.stderr).into_owned();
+    assert!(said.contains("`r1` is already up"), "{said}");
+    assert!(said.contains("--name"), "{said}");
+
+    assert_eq!(first.wait(), Some(0), "{}", first.log());
+    assert_eq!(second.wait(), Some(0), "{}", second.log());
+    drop((status, observer));
+    domain.assert_clean();
+}
+
+#[test]
+fn ctrl_c_stops_the_motors_and_leaves_nothing() {
+    let domain = Domain::new();
+    let mut up = domain.start(&["up", "--headless", "--speed", "2"]);
+    let observer = domain.observe("r1", 2.0);
+    let mut state = observer.subscriber::<SteeringState>().expect("a topic");
+    wait_for("the robot to drive", || {
+        state
+            .latest()
+            .expect("readable")
+            .filter(|report| report.left_duty > 0)
+            .map(|_| ())
+    });
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let mut last = None;
+    while let Some(report) = state.receive().expect("readable") {
+        last = Some((report.left_duty, report.right_duty));
+    }
+    assert_eq!(last, Some((0, 0)), "the last report before the end");
+    drop((state, observer));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_stop_latches_until_it_is_resumed() {
+    let domain = Domain::new();
+    let mut up = domain.start(&[
+        "up",
+        "--headless",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--json",
+        "--speed",
+        "3",
+    ]);
+    let observer = domain.observe("r1", 3.0);
+    let mut state = observer.subscriber::<SteeringState>().expect("a topic");
+    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
+    wait_for("the robot to drive", || {
+        state
+            .latest()
+            .expect("readable")
+            .filter(|report| report.left_duty > 0)
+            .map(|_| ())
+    });
+    assert!(domain.run(&["stop"]).status.success());
+    wait_for("the robot to stand", || {
+        state
+            .latest()
+            .expect("readable")
+            .filter(|report| report.left_duty == 0 && report.right_duty == 0)
+            .map(|_| ())
+    });
+    // Logic goes on renewing its orders; none of the next 400 reports shows a duty.
+    let mut seen = 0;
+    while seen < 400 {
+        let report = wait_for("a report", || state.receive().expect("readable"));
+        assert_eq!((report.left_duty, report.right_duty), (0, 0));
+        seen += 1;
+    }
+    let still = wait_for("nav/status", || status.latest().expect("readable"));
+    assert_ne!(still.phase.get(), Some(Phase::Stuck));
+    assert_eq!(still.mode.get(), Some(Mode::Autonomous));
+    drop(still);
+    let refused = domain.run(&["drive", "forward"]);
+    assert!(!refused.status.success(), "driving needs a resume first");
+    assert!(domain.run(&["resume"]).status.success());
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    assert_eq!(up.json()["delivered"], serde_json::json!([1]));
+    drop((state, status, observer));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_person_can_do_by_hand_what_the_script_does() {
+    let domain = Domain::new();
+    let _up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "3"]);
+    let observer = domain.observe("r1", 3.0);
+    let mut state = observer.subscriber::<SteeringState>().expect("a topic");
+    wait_for("the boards", || state.latest().expect("readable").map(|_| ()));
+    let said = |args: &[&str]| {
+        let output = domain.run(args);
+        let text = format!(
+            "{}{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        );
+        (output.status.success(), text)
+    };
+    wait_for("the script to have taken over", || {
+        said(&["mode", "manual"]).0.then_some(())
+    });
+    let (fine, text) = said(&["drive", "0x02", "--seconds", "0.5"]);
+    assert!(fine, "{text}");
+    let (fine, text) = said(&["drive", "left-45"]);
+    assert!(fine && text.contains("done"), "{text}");
+    let (fine, text) = said(&["arm", "up"]);
+    assert!(fine && text.contains("done"), "{text}");
+    let (fine, text) = said(&["drive", "00001111"]);
+    assert!(!fine && text.contains("no command"), "{text}");
+    let (fine, text) = said(&["arm", "forward"]);
+    assert!(!fine && text.contains("lager drive"), "{text}");
+    drop((state, observer));
+}
+
+#[test]
+fn the_topic_tools_show_a_running_robot() {
+    let domain = Domain::new();
+    let _up = domain.start(&["up", "--headless", "--speed", "1"]);
+    let list = wait_for("the topics", || {
+        let output = domain.run(&["topic", "list"]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        text.contains("sensor/line").then_some(text)
+    });
+    assert!(list.contains("lager/r1/sensor/line"), "{list}");
+
+    let echo = domain.run(&["topic", "echo", "sensor/line", "--count", "20", "--json"]);
+    let text = String::from_utf8_lossy(&echo.stdout).into_owned();
+    let samples: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    assert_eq!(samples.len(), 20);
+    for pair in samples.windows(2) {
+        let number = |sample: &Value| sample["sequence"].as_u64().expect("a number");
+        assert_eq!(number(&pair[1]), number(&pair[0]) + 1);
+        assert_eq!(pair[1]["lost"], 0);
+    }
+
+    let hz = domain.run(&["topic", "hz", "sensor/line", "--count", "2", "--json"]);
+    let text = String::from_utf8_lossy(&hz.stdout).into_owned();
+    let window: Value = serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
+    assert!(window["samples"].as_u64().expect("samples") > 0, "{text}");
+
+    let info = domain.run(&["topic", "info", "steering/command"]);
+    let text = String::from_utf8_lossy(&info.stdout).into_owned();
+    assert!(text.contains("origin") && text.contains("wakes       bridge"), "{text}");
+
+    let unknown = domain.run(&["topic", "echo", "sensor/lime"]);
+    let said = String::from_utf8_lossy(&unknown.stderr).into_owned();
+    assert!(!unknown.status.success() && said.contains("sensor/line"), "{said}");
+
+    let doctor = domain.run(&["doctor"]);
+    let text = String::from_utf8_lossy(&doctor.stdout).into_owned();
+    assert!(doctor.status.success(), "{text}");
+    for check in ["shared memory", "open files", "versions", "serial rights", "bus"] {
+        assert!(text.contains(check), "{text}");
+    }
+}

@@ -1,0 +1,225 @@
+//! What the robot survives: every service killed with -9 in the middle of a mission, and the
+//! supervisor itself. `tests/soak` runs the same with more kills.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use lager_ports::{Bus, Subscriber};
+use lager_tests::{Domain, Running, children, pid, wait_for};
+use lager_topics::{LinkHealth, NavStatus, TruthPose};
+use rustix::process::{Signal, kill_process, test_kill_process};
+
+/// The safe bound on driving without being steered.
+const UNSTEERED: Duration = Duration::from_millis(200);
+
+/// How often each service is killed: 5 in `tests/run`, more in `tests/soak`.
+fn kills() -> u32 {
+    std::env::var("LAGER_SOAK_KILLS")
+        .ok()
+        .and_then(|kills| kills.parse().ok())
+        .unwrap_or(5)
+}
+
+/// What an observer sees of the robot.
+struct Watch {
+    bus: Bus,
+    truth: Subscriber<TruthPose>,
+    health: Subscriber<LinkHealth>,
+    status: Subscriber<NavStatus>,
+}
+
+/// What one kill came to.
+struct Kill {
+    service: &'static str,
+    /// From the signal until the successor was at work again.
+    back: Duration,
+    /// How long after the signal the last duty other than 0 was seen while nobody steered.
+    unsteered: Duration,
+}
+
+impl Watch {
+    fn new(domain: &Domain) -> Self {
+        let bus = domain.observe("r1", 1.0);
+        Self {
+            truth: bus.subscriber().expect("a topic"),
+            health: bus.subscriber().expect("a topic"),
+            status: bus.subscriber().expect("a topic"),
+            bus,
+        }
+    }
+
+    /// Waits until all three services are at work and both boards are connected.
+    fn wait_until_whole(&mut self, up: &mut Running) -> bool {
+        let mut seen = (false, false, false);
+        loop {
+            if !up.is_running() {
+                return false;
+            }
+            seen.0 |= self.truth.latest().expect("readable").is_some();
+            seen.1 |= self
+                .health
+                .latest()
+                .expect("readable")
+                .is_some_and(|health| health.sensor.up != 0 && health.steering.up != 0);
+            seen.2 |= self.status.latest().expect("readable").is_some();
+            if seen == (true, true, true) {
+                return true;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Kills a service and watches until its successor is at work. `None` when the mission
+    /// ended first.
+    fn kill(&mut self, up: &mut Running, service: &'static str) -> Option<Kill> {
+        let victim = up.service(service)?;
+        kill_process(pid(victim), Signal::KILL).expect("a living service");
+        let killed = self.bus.clock().now();
+        let start = Instant::now();
+        let mut unsteered = Duration::ZERO;
+        loop {
+            if !up.is_running() {
+                return None;
+            }
+            if let Some(truth) = self.truth.latest().expect("readable") {
+                let at = Duration::from_nanos(truth.time_ns);
+                if service != "simulator" && at > killed && truth.left_duty + truth.right_duty > 0 {
+                    unsteered = unsteered.max(at - killed);
+                }
+                if service == "simulator" && truth.stamp().writer != victim {
+                    assert_eq!(
+                        (truth.left_duty, truth.right_duty),
+                        (0, 0),
+                        "a new body starts with its motors off"
+                    );
+                    break;
+                }
+            }
+            let health = self.health.latest().expect("readable");
+            let bridge_is_back = health.is_some_and(|health| {
+                health.stamp().writer != victim && health.sensor.up != 0 && health.steering.up != 0
+            });
+            if service == "bridge" && bridge_is_back {
+                break;
+            }
+            let status = self.status.latest().expect("readable");
+            if service == "logic" && status.is_some_and(|status| status.stamp().writer != victim) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let back = start.elapsed();
+        assert!(
+            unsteered <= UNSTEERED.max(self.bus.clock().now() - killed),
+            "the duty was not 0 after {unsteered:?} without the {service}"
+        );
+        Some(Kill {
+            service,
+            back,
+            unsteered,
+        })
+    }
+}
+
+#[test]
+fn a_killed_service_comes_back_and_the_mission_still_ends() {
+    let mut left: BTreeMap<&'static str, u32> = ["bridge", "logic", "simulator"]
+        .into_iter()
+        .map(|service| (service, kills()))
+        .collect();
+    let mut done: Vec<Kill> = Vec::new();
+    let mut missions = 0;
+    while left.values().any(|kills| *kills > 0) {
+        let domain = Domain::new();
+        let mut up = domain.start(&[
+            "up",
+            "--headless",
+            "--mission",
+            "1",
+            "--exit-when-done",
+            "--json",
+        ]);
+        let mut watch = Watch::new(&domain);
+        let mut of_this_mission = 0;
+        'mission: loop {
+            let next = left
+                .iter()
+                .filter(|(_, kills)| **kills > 0)
+                .max_by_key(|(_, kills)| **kills)
+                .map(|(service, _)| *service);
+            let Some(service) = next else {
+                break 'mission;
+            };
+            if !watch.wait_until_whole(&mut up) {
+                break 'mission;
+            }
+            // Every kill meets the mission in another place; the steps share no factor with the
+            // lengths of drives and turns.
+            let pause = 400 + (done.len() as u64 * 617) % 1_300;
+            std::thread::sleep(Duration::from_millis(pause));
+            let Some(kill) = watch.kill(&mut up, service) else {
+                break 'mission;
+            };
+            *left.get_mut(service).expect("a service") -= 1;
+            done.push(kill);
+            of_this_mission += 1;
+        }
+        assert_eq!(up.wait(), Some(0), "{}", up.log());
+        let told = up.json();
+        assert_eq!(told["delivered"], serde_json::json!([1]), "{}", up.log());
+        assert_eq!(told["restarts"], of_this_mission, "{}", up.log());
+        missions += 1;
+        drop(watch);
+        domain.assert_clean();
+    }
+    report(&done, missions);
+}
+
+/// Prints what was measured; a figure here is no verdict.
+fn report(kills: &[Kill], missions: u32) {
+    println!("{missions} missions");
+    println!("service      kills   back: median    longest   last duty after");
+    for service in ["bridge", "logic", "simulator"] {
+        let mut back: Vec<Duration> = Vec::new();
+        let mut unsteered = Duration::ZERO;
+        for kill in kills.iter().filter(|kill| kill.service == service) {
+            back.push(kill.back);
+            unsteered = unsteered.max(kill.unsteered);
+        }
+        back.sort();
+        println!(
+            "{service:12} {:5} {:12.1} ms {:7.1} ms {:9.1} ms",
+            back.len(),
+            back[back.len() / 2].as_secs_f64() * 1e3,
+            back[back.len() - 1].as_secs_f64() * 1e3,
+            unsteered.as_secs_f64() * 1e3,
+        );
+    }
+}
+
+#[test]
+fn a_killed_supervisor_takes_its_children_along() {
+    let domain = Domain::new();
+    let mut up = domain.start(&["up", "--headless"]);
+    let mut watch = Watch::new(&domain);
+    assert!(watch.wait_until_whole(&mut up), "{}", up.log());
+    let services = children(up.pid());
+    assert_eq!(services.len(), 3, "{services:?}");
+    up.signal(Signal::KILL);
+    up.wait();
+    for service in services {
+        wait_for("the child to end", || {
+            test_kill_process(pid(service)).is_err().then_some(())
+        });
+    }
+    drop(watch);
+    // What the killed supervisor held is swept by its last child, or by whoever starts next.
+    let next = domain.run(&["doctor", "--fix"]);
+    assert!(next.status.success(), "{next:?}");
+    let left: Vec<_> = domain
+        .leftovers()
+        .into_iter()
+        .filter(|file| !file.contains("lager/"))
+        .collect();
+    assert!(left.is_empty(), "{left:#?}");
+}

@@ -1,0 +1,56 @@
+//! `lager simulate`: the whole robot in one process, in virtual time.
+
+use lager_tests::Domain;
+use serde_json::Value;
+
+fn simulate(args: &[&str]) -> (Vec<Value>, String) {
+    let domain = Domain::new();
+    let output = domain.run(&[&["simulate", "--json"], args].concat());
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success(),
+        "{text}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    domain.assert_clean();
+    let runs = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("a JSON line"))
+        .collect();
+    (runs, text)
+}
+
+const WAREHOUSES: [&str; 6] = [
+    "--warehouse",
+    "small",
+    "--warehouse",
+    "curved",
+    "--warehouse",
+    "large",
+];
+
+#[test]
+fn twenty_seeds_deliver_in_three_warehouses() {
+    let (runs, text) = simulate(&[&["--seeds", "1..20"], &WAREHOUSES[..]].concat());
+    assert_eq!(runs.len(), 60);
+    for run in runs {
+        assert_eq!(run["delivered"].as_array().map(Vec::len), Some(1), "{text}");
+        assert_eq!(run["lost"], 0, "{run}");
+        assert!(run.get("failure").is_none(), "{run}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run() {
+    let args = [&["--seeds", "3..5"], &WAREHOUSES[..]].concat();
+    let strip = |mut runs: Vec<Value>| {
+        for run in &mut runs {
+            // Only how long the machine took may differ.
+            let run = run.as_object_mut().expect("an object");
+            run.remove("wall_seconds").expect("wall_seconds");
+            run.remove("times_real").expect("times_real");
+        }
+        runs
+    };
+    assert_eq!(strip(simulate(&args).0), strip(simulate(&args).0));
+}
