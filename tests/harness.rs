@@ -108,13 +108,27 @@ impl Domain {
     /// When the bus cannot be opened.
     #[must_use]
     pub fn observe(&self, robot: &str, speed: f64) -> Bus {
-        let config = BusConfig {
+        Bus::open(&self.bus(robot, speed), Role::Observer).expect("the bus opens")
+    }
+
+    /// The bus of `robot` in this domain.
+    ///
+    /// # Panics
+    /// When the name is none.
+    #[must_use]
+    pub fn bus(&self, robot: &str, speed: f64) -> BusConfig {
+        BusConfig {
             robot: robot.parse().expect("a robot's name"),
             speed,
             prefix: Some(self.prefix.clone()),
             root: Some(self.root.join("bus")),
-        };
-        Bus::open(&config, Role::Observer).expect("the bus opens")
+        }
+    }
+
+    /// A folder of this test's own.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.root
     }
 
     /// The shared memory and bookkeeping files that are left.

@@ -149,10 +149,7 @@ impl Bus {
     ///
     /// # Errors
     /// As for a subscriber.
-    pub fn kept<T: Topic>(
-        &self,
-        timeout: Duration,
-    ) -> Result<Option<T::Payload>, PortError> {
+    pub fn kept<T: Topic>(&self, timeout: Duration) -> Result<Option<T::Payload>, PortError> {
         keeper::kept::<T>(self, timeout)
     }
 

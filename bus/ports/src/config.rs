@@ -35,8 +35,11 @@ impl Default for BusConfig {
     }
 }
 
-/// A socket's path has at most 107 bytes, and the bus needs these for what is below the root.
-const BELOW_ROOT: usize = 62;
+/// The longest path of a socket, in bytes.
+const LONGEST_SOCKET: usize = 107;
+
+/// What a socket's path needs besides root and prefix: `/`, a 128-bit number, `.event`.
+const BELOW_ROOT: usize = 1 + 39 + 6;
 
 impl BusConfig {
     /// The transport's configuration; nothing is read from files or the environment.
@@ -46,8 +49,8 @@ impl BusConfig {
         }
         let mut config = Config::default();
         if let Some(prefix) = &self.prefix {
-            config.global.prefix = FileName::new(prefix.as_bytes())
-                .map_err(|_| OpenError::Prefix(prefix.clone()))?;
+            config.global.prefix =
+                FileName::new(prefix.as_bytes()).map_err(|_| OpenError::Prefix(prefix.clone()))?;
         }
         if let Some(root) = &self.root {
             let bytes = root.as_os_str().as_encoded_bytes();
@@ -56,10 +59,10 @@ impl BusConfig {
                 .filter(|_| root.is_absolute())
                 .ok_or_else(|| OpenError::Root(root.clone()))?;
             let prefix_length = config.global.prefix.len();
-            if bytes.len() + prefix_length + BELOW_ROOT > 107 {
+            if bytes.len() + prefix_length + BELOW_ROOT > LONGEST_SOCKET {
                 return Err(OpenError::RootTooLong {
                     root: root.clone(),
-                    limit: 107usize.saturating_sub(BELOW_ROOT + prefix_length),
+                    limit: LONGEST_SOCKET.saturating_sub(BELOW_ROOT + prefix_length),
                 });
             }
             config.global.set_root_path(&path);
@@ -91,7 +94,11 @@ mod tests {
         };
         assert!(with_root("var/lager").contains("absolute"));
         let long = format!("/tmp/{}", "x".repeat(80));
-        assert!(with_root(&long).contains("too long"), "{}", with_root(&long));
+        assert!(
+            with_root(&long).contains("too long"),
+            "{}",
+            with_root(&long)
+        );
     }
 
     #[test]

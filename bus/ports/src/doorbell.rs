@@ -162,10 +162,7 @@ impl InsideRope {
     fn new() -> rustix::io::Result<Self> {
         Ok(Self {
             pulled: Arc::new(AtomicBool::new(false)),
-            eventfd: Arc::new(eventfd(
-                0,
-                EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK,
-            )?),
+            eventfd: Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?),
         })
     }
 

@@ -14,7 +14,9 @@ pub enum OpenError {
     #[error("`{0}` cannot be the bus's root folder; give an absolute path")]
     Root(PathBuf),
     /// The root leaves no room for the names of sockets.
-    #[error("the bus's root folder `{root}` is too long; use at most {limit} bytes, for example one below /tmp")]
+    #[error(
+        "the bus's root folder `{root}` is too long; use at most {limit} bytes, for example one below /tmp"
+    )]
     RootTooLong {
         /// The folder.
         root: PathBuf,
@@ -25,13 +27,17 @@ pub enum OpenError {
     #[error("a robot cannot live {0} times as fast as real time; give a positive number")]
     Speed(f64),
     /// The user may not write where the bus lives.
-    #[error("no permission to use the bus's files in {root} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user")]
+    #[error(
+        "no permission to use the bus's files in {root} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user"
+    )]
     Permission {
         /// The folder.
         root: String,
     },
     /// The transport failed.
-    #[error("the bus could not be opened ({detail}); check that /dev/shm and {root} exist and are not full, then try again")]
+    #[error(
+        "the bus could not be opened ({detail}); check that /dev/shm and {root} exist and are not full, then try again"
+    )]
     Transport {
         /// What the transport says.
         detail: String,
@@ -44,7 +50,9 @@ pub enum OpenError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
     /// All places for observers are taken.
-    #[error("`{topic}` already has {limit} observers, which is the limit; stop one of them (`lager topic info {topic}` lists them) and try again")]
+    #[error(
+        "`{topic}` already has {limit} observers, which is the limit; stop one of them (`lager topic info {topic}` lists them) and try again"
+    )]
     TooManyObservers {
         /// The topic.
         topic: String,
@@ -52,7 +60,9 @@ pub enum PortError {
         limit: usize,
     },
     /// All places for readers are taken.
-    #[error("`{topic}` has no place for another reader (limit {limit}); stop a service that runs twice and try again")]
+    #[error(
+        "`{topic}` has no place for another reader (limit {limit}); stop a service that runs twice and try again"
+    )]
     TooManyReaders {
         /// The topic.
         topic: String,
@@ -60,7 +70,9 @@ pub enum PortError {
         limit: usize,
     },
     /// All places for writers are taken.
-    #[error("`{topic}` already has {limit} writers, which is the limit; stop one of them and try again")]
+    #[error(
+        "`{topic}` already has {limit} writers, which is the limit; stop one of them and try again"
+    )]
     TooManyWriters {
         /// The topic or request.
         topic: String,
@@ -76,7 +88,9 @@ pub enum PortError {
         limit: usize,
     },
     /// A running process uses another layout or other limits.
-    #[error("`{topic}` is in use with another layout or other limits ({detail}): a process of another build of lager is running; stop all processes of this robot, bring them to one build and start them again")]
+    #[error(
+        "`{topic}` is in use with another layout or other limits ({detail}): a process of another build of lager is running; stop all processes of this robot, bring them to one build and start them again"
+    )]
     OtherLayout {
         /// The topic or request.
         topic: String,
@@ -84,25 +98,33 @@ pub enum PortError {
         detail: String,
     },
     /// A running process uses another version of the transport.
-    #[error("`{topic}` belongs to a process with another version of iceoryx2 (this build has 0.10.0, and versions do not mix); stop that process, update it and start again")]
+    #[error(
+        "`{topic}` belongs to a process with another version of iceoryx2 (this build has 0.10.0, and versions do not mix); stop that process, update it and start again"
+    )]
     OtherVersion {
         /// The topic or request.
         topic: String,
     },
     /// The shared files make no sense.
-    #[error("the shared files of `{topic}` are damaged or belong to another version of iceoryx2 than 0.10.0; stop every process on this bus, start again, and if it stays so run `lager doctor`")]
+    #[error(
+        "the shared files of `{topic}` are damaged or belong to another version of iceoryx2 than 0.10.0; stop every process on this bus, start again, and if it stays so run `lager doctor`"
+    )]
     Damaged {
         /// The topic or request.
         topic: String,
     },
     /// The user may not use the shared files.
-    #[error("no permission to use the shared files of `{topic}`; run all of a robot's processes as one user")]
+    #[error(
+        "no permission to use the shared files of `{topic}`; run all of a robot's processes as one user"
+    )]
     Permission {
         /// The topic or request.
         topic: String,
     },
     /// Others kept creating and removing it.
-    #[error("`{topic}` is being created or removed by other processes and did not settle ({detail}); try again")]
+    #[error(
+        "`{topic}` is being created or removed by other processes and did not settle ({detail}); try again"
+    )]
     Busy {
         /// The topic or request.
         topic: String,
@@ -116,7 +138,9 @@ pub enum PortError {
         role: Role,
     },
     /// The transport failed.
-    #[error("the port of `{topic}` could not be made ({detail}); check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached")]
+    #[error(
+        "the port of `{topic}` could not be made ({detail}); check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
+    )]
     Transport {
         /// The topic or request.
         topic: String,
@@ -189,6 +213,8 @@ pub enum IntrospectError {
     #[error(transparent)]
     Config(#[from] OpenError),
     /// The transport failed.
-    #[error("the bus's files could not be listed ({0}); check the permissions of the bus's root folder")]
+    #[error(
+        "the bus's files could not be listed ({0}); check the permissions of the bus's root folder"
+    )]
     Transport(String),
 }

@@ -3,8 +3,7 @@
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{
-    CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service,
-    ipc,
+    CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service, ipc,
 };
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 use lager_topics::{Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
@@ -154,7 +153,8 @@ pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
         let name = details.map_or_else(String::new, |details| details.name().to_string());
         let ours = name::parse_node(&name);
         found.push(NodeInfo {
-            executable: details.map_or_else(String::new, |details| details.executable().to_string()),
+            executable: details
+                .map_or_else(String::new, |details| details.executable().to_string()),
             robot: ours.as_ref().map(|(robot, _, _)| robot.clone()),
             role: ours.as_ref().map(|(_, role, _)| *role),
             // Process ids are positive.

@@ -83,7 +83,10 @@ pub(crate) fn service(robot: &RobotName, name: &str) -> String {
 
 /// The robot and the relative name of a service, if it is one of ours.
 pub(crate) fn parse_service(name: &str) -> Option<(RobotName, &str)> {
-    let (robot, topic) = name.strip_prefix(FAMILY)?.strip_prefix('/')?.split_once('/')?;
+    let (robot, topic) = name
+        .strip_prefix(FAMILY)?
+        .strip_prefix('/')?
+        .split_once('/')?;
     Some((robot.parse().ok()?, topic))
 }
 

@@ -81,7 +81,11 @@ fn remove_unfinished(config: &Config) -> usize {
 
     let folder = config.global.service_dir().to_string();
     let prefix = config.global.prefix.to_string();
-    let suffix = config.global.service.static_config_storage_suffix.to_string();
+    let suffix = config
+        .global
+        .service
+        .static_config_storage_suffix
+        .to_string();
     let is_description = |path: &Path| {
         path.file_name()
             .and_then(OsStr::to_str)

@@ -74,8 +74,7 @@ pub(crate) fn existing_topic<T: Topic>(
     robot: &RobotName,
 ) -> Result<Option<TopicService<T>>, PortError> {
     patiently(bus, T::NAME, || {
-        match builder::<T>(bus.node(), robot)?
-            .open_with_attributes(&layout::<T::Payload, Stamp>())
+        match builder::<T>(bus.node(), robot)?.open_with_attributes(&layout::<T::Payload, Stamp>())
         {
             Ok(service) => Ok(Some(service)),
             Err(

@@ -273,7 +273,12 @@ mod tests {
     #[test]
     fn a_state_is_kept_for_late_joiners_and_a_stream_is_not() {
         for entry in TOPICS {
-            assert_eq!(entry.qos.republish, entry.qos.history == 1, "{}", entry.name);
+            assert_eq!(
+                entry.qos.republish,
+                entry.qos.history == 1,
+                "{}",
+                entry.name
+            );
             assert!(entry.qos.history <= entry.qos.buffer, "{}", entry.name);
             if entry.qos.republish {
                 assert_eq!(entry.qos.buffer, 1, "{}", entry.name);

@@ -74,17 +74,26 @@ pub struct Motor {
 
 impl Motor {
     /// Standing still.
-    pub const OFF: Self = Self { duty: 0, reverse: false };
+    pub const OFF: Self = Self {
+        duty: 0,
+        reverse: false,
+    };
 
     /// Driving the robot forwards.
     #[must_use]
     pub const fn forward(duty: u8) -> Self {
-        Self { duty, reverse: false }
+        Self {
+            duty,
+            reverse: false,
+        }
     }
 
     /// Driving the robot backwards.
     #[must_use]
     pub const fn backward(duty: u8) -> Self {
-        Self { duty, reverse: true }
+        Self {
+            duty,
+            reverse: true,
+        }
     }
 }

@@ -41,7 +41,10 @@ pub(crate) struct Calibrated {
 
 impl Calibration {
     pub(crate) const fn new(thresholds: [u8; CHANNELS]) -> Self {
-        Self { thresholds, watch: None }
+        Self {
+            thresholds,
+            watch: None,
+        }
     }
 
     /// Starts to watch for `span_us`. One that runs under the same number goes on.
@@ -82,7 +85,10 @@ impl Calibration {
                 channels += 1;
             }
         }
-        Some(Calibrated { seq: watch.seq, channels })
+        Some(Calibrated {
+            seq: watch.seq,
+            channels,
+        })
     }
 }
 
@@ -101,7 +107,13 @@ mod tests {
             }
         }
         assert_eq!(calibration.finish(999), None);
-        assert_eq!(calibration.finish(1_000), Some(Calibrated { seq: 9, channels: 11 }));
+        assert_eq!(
+            calibration.finish(1_000),
+            Some(Calibrated {
+                seq: 9,
+                channels: 11
+            })
+        );
         assert!(!calibration.is_running());
         assert!(calibration.judge(3, 55));
         assert!(!calibration.judge(3, 54));
@@ -115,7 +127,13 @@ mod tests {
             calibration.judge(channel, 30);
             calibration.judge(channel, if channel == 4 { 69 } else { 200 });
         }
-        assert_eq!(calibration.finish(1_000), Some(Calibrated { seq: 1, channels: 10 }));
+        assert_eq!(
+            calibration.finish(1_000),
+            Some(Calibrated {
+                seq: 1,
+                channels: 10
+            })
+        );
         assert!(!calibration.judge(4, 127));
         assert!(calibration.judge(4, 128));
         assert!(calibration.judge(5, 115));

@@ -28,7 +28,10 @@ pub(crate) struct CommandAge {
 
 impl CommandAge {
     pub(crate) const fn new(limit_us: u32) -> Self {
-        Self { limit_us, state: State::Untold }
+        Self {
+            limit_us,
+            state: State::Untold,
+        }
     }
 
     /// A command came, or the one in force was renewed.
@@ -38,7 +41,9 @@ impl CommandAge {
 
     /// Whether the command has grown too old just now; once for every silence.
     pub(crate) fn expires(&mut self, now_us: u32) -> bool {
-        let State::Fresh { since_us } = self.state else { return false };
+        let State::Fresh { since_us } = self.state else {
+            return false;
+        };
         // Strictly older than the limit.
         let expires = reached(now_us, since_us.wrapping_add(self.limit_us).wrapping_add(1));
         if expires {
@@ -60,9 +65,7 @@ impl CommandAge {
     /// When the command will be too old.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         match self.state {
-            State::Fresh { since_us } => {
-                Some(since_us.wrapping_add(self.limit_us).wrapping_add(1))
-            }
+            State::Fresh { since_us } => Some(since_us.wrapping_add(self.limit_us).wrapping_add(1)),
             _ => None,
         }
     }

@@ -69,7 +69,11 @@ impl LineReader {
     /// A reader that has seen nothing and supposes the line in the middle.
     #[must_use]
     pub const fn new() -> Self {
-        Self { error: 0, at_end: false, ended: false }
+        Self {
+            error: 0,
+            at_end: false,
+            ended: false,
+        }
     }
 
     /// The error reported last, in half sensor steps.
@@ -81,8 +85,15 @@ impl LineReader {
     /// Takes in one reading of the sensors.
     pub fn read(&mut self, bits: LineBits) -> Reading {
         let bits = LineBits::new(bits.0).0;
-        let state = if bits == 0 { self.without_tape() } else { self.with_tape(bits) };
-        Reading { state, error: self.error }
+        let state = if bits == 0 {
+            self.without_tape()
+        } else {
+            self.with_tape(bits)
+        };
+        Reading {
+            state,
+            error: self.error,
+        }
     }
 
     fn without_tape(&mut self) -> LineState {
@@ -90,7 +101,11 @@ impl LineReader {
             self.error = MAX_ERROR * self.error.signum();
         }
         self.ended = self.at_end;
-        if self.ended { LineState::DropStation } else { LineState::NotOnLine }
+        if self.ended {
+            LineState::DropStation
+        } else {
+            LineState::NotOnLine
+        }
     }
 
     fn with_tape(&mut self, bits: u16) -> LineState {

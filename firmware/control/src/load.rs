@@ -10,7 +10,11 @@ pub(crate) struct Load {
 
 impl Load {
     pub(crate) const fn new(now_us: u32) -> Self {
-        Self { since_us: now_us, busy_us: 0, longest_us: 0 }
+        Self {
+            since_us: now_us,
+            busy_us: 0,
+            longest_us: 0,
+        }
     }
 
     /// A step worked from `from_us` to `to_us`.

@@ -19,7 +19,9 @@ pub(crate) struct Outbox {
 
 impl Outbox {
     pub(crate) const fn new() -> Self {
-        Self { packets: Deque::new() }
+        Self {
+            packets: Deque::new(),
+        }
     }
 
     /// Whether everything was handed to the UART.

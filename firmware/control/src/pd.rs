@@ -30,6 +30,8 @@ impl Default for Gains {
 const SPAN_US: u32 = 10_000;
 /// The least age of the sample D is taken against.
 const LEAST_AGE_US: u32 = 7_500;
+/// Samples closer together than this are not all remembered, so that four always reach back far enough.
+const SPACING_US: u32 = 2_400;
 /// A pause after which older samples tell nothing.
 const STALE_US: u32 = 50_000;
 
@@ -51,7 +53,11 @@ impl Pd {
     /// A regulator without a past.
     #[must_use]
     pub fn new(gains: Gains) -> Self {
-        Self { gains, samples: [Sample::default(); 4], count: 0 }
+        Self {
+            gains,
+            samples: [Sample::default(); 4],
+            count: 0,
+        }
     }
 
     /// The gains in force.
@@ -74,13 +80,18 @@ impl Pd {
     ///
     /// `error` is in half sensor steps, positive = the line is to the right.
     pub fn update(&mut self, error: i8, now_us: u32) -> i16 {
-        let last = self.samples[0].at_us;
-        if self.count > 0 && now_us.wrapping_sub(last) > STALE_US {
+        let since_us = now_us.wrapping_sub(self.samples[0].at_us);
+        if since_us > STALE_US {
             self.reset();
         }
         let p = i16::from(self.gains.p) * i16::from(error);
         let d = self.derivative(error, now_us);
-        self.remember(Sample { at_us: now_us, error });
+        if self.count == 0 || since_us >= SPACING_US {
+            self.remember(Sample {
+                at_us: now_us,
+                error,
+            });
+        }
         p + d
     }
 

@@ -38,7 +38,12 @@ impl CommandRegister {
     /// Registers in which nothing was ever written.
     #[must_use]
     pub const fn new() -> Self {
-        Self { command: None, copy: None, refused: None, flag: false }
+        Self {
+            command: None,
+            copy: None,
+            refused: None,
+            flag: false,
+        }
     }
 
     /// Reception: writes the command register.

@@ -33,7 +33,13 @@ pub(crate) struct Ends {
 
 impl Ends {
     pub(crate) const fn new() -> Self {
-        Self { waiting: Deque::new(), told: Finish { seq: 0, end: End::Done } }
+        Self {
+            waiting: Deque::new(),
+            told: Finish {
+                seq: 0,
+                end: End::Done,
+            },
+        }
     }
 
     /// A command has ended. While nobody listens the oldest gives way.
@@ -70,12 +76,30 @@ mod tests {
     fn every_end_gets_a_report_of_its_own() {
         let mut ends = Ends::new();
         assert!(!ends.tell_next());
-        ends.push(Finish { seq: 4, end: End::Aborted });
-        ends.push(Finish { seq: 5, end: End::Refused });
+        ends.push(Finish {
+            seq: 4,
+            end: End::Aborted,
+        });
+        ends.push(Finish {
+            seq: 5,
+            end: End::Refused,
+        });
         assert!(ends.tell_next());
-        assert_eq!(ends.told(), Finish { seq: 4, end: End::Aborted });
+        assert_eq!(
+            ends.told(),
+            Finish {
+                seq: 4,
+                end: End::Aborted
+            }
+        );
         assert!(ends.tell_next());
-        assert_eq!(ends.told(), Finish { seq: 5, end: End::Refused });
+        assert_eq!(
+            ends.told(),
+            Finish {
+                seq: 5,
+                end: End::Refused
+            }
+        );
         assert!(!ends.tell_next());
         assert_eq!(ends.told().seq, 5);
     }
@@ -84,7 +108,10 @@ mod tests {
     fn unheard_ends_do_not_pile_up() {
         let mut ends = Ends::new();
         for seq in 0..20 {
-            ends.push(Finish { seq, end: End::Done });
+            ends.push(Finish {
+                seq,
+                end: End::Done,
+            });
         }
         let mut told = 0;
         while ends.tell_next() {

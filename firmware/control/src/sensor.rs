@@ -161,15 +161,22 @@ impl SensorUnit {
             }
             (SettingKey::RawLine, _) => (i16::from(self.raw_line), SettingStatus::OutOfRange),
             (SettingKey::Calibrate, 1) => {
-                self.calibration.start(setting.seq, self.config.calibration_us, now_us);
+                self.calibration
+                    .start(setting.seq, self.config.calibration_us, now_us);
                 (1, SettingStatus::Accepted)
             }
-            (SettingKey::Calibrate, _) => {
-                (i16::from(self.calibration.is_running()), SettingStatus::OutOfRange)
-            }
+            (SettingKey::Calibrate, _) => (
+                i16::from(self.calibration.is_running()),
+                SettingStatus::OutOfRange,
+            ),
             (SettingKey::GainP | SettingKey::GainD, _) => (0, SettingStatus::NotHere),
         };
-        SettingReply { key: setting.key, seq: setting.seq, value, status }
+        SettingReply {
+            key: setting.key,
+            seq: setting.seq,
+            value,
+            status,
+        }
     }
 
     /// The latest answers matter: an older one gives way.
@@ -238,7 +245,11 @@ impl SensorUnit {
         self.last_pass_us = Some(now_us);
         let period_us = self.config.loop_period_us;
         let late_us = now_us.wrapping_sub(self.pass_due_us);
-        let from_us = if late_us < period_us { self.pass_due_us } else { now_us };
+        let from_us = if late_us < period_us {
+            self.pass_due_us
+        } else {
+            now_us
+        };
         self.pass_due_us = from_us.wrapping_add(period_us);
     }
 
@@ -255,13 +266,19 @@ impl SensorUnit {
     /// The second answer to a calibration tells how many channels have a new threshold; anything but all
     /// of them is out of range.
     fn finish_calibration(&mut self, now_us: u32) {
-        let Some(calibrated) = self.calibration.finish(now_us) else { return };
+        let Some(calibrated) = self.calibration.finish(now_us) else {
+            return;
+        };
         let complete = usize::from(calibrated.channels) == CHANNELS;
         self.answer(SettingReply {
             key: SettingKey::Calibrate,
             seq: calibrated.seq,
             value: i16::from(calibrated.channels),
-            status: if complete { SettingStatus::Accepted } else { SettingStatus::OutOfRange },
+            status: if complete {
+                SettingStatus::Accepted
+            } else {
+                SettingStatus::OutOfRange
+            },
         });
     }
 
@@ -301,8 +318,13 @@ impl SensorUnit {
         } else {
             self.pass_due_us
         };
-        let syn_us = self.link.us_to_syn(now_us).map(|us| now_us.wrapping_add(us));
-        for other_us in [Some(pass_us), syn_us, self.transmitter.next_due_us()].into_iter().flatten()
+        let syn_us = self
+            .link
+            .us_to_syn(now_us)
+            .map(|us| now_us.wrapping_add(us));
+        for other_us in [Some(pass_us), syn_us, self.transmitter.next_due_us()]
+            .into_iter()
+            .flatten()
         {
             due_us = first(now_us, due_us, other_us);
         }

@@ -50,7 +50,10 @@ impl Look {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Answer {
     /// The servo answered; `look` when registers were asked for and came whole.
-    Status { errors: ErrorBits, look: Option<Look> },
+    Status {
+        errors: ErrorBits,
+        look: Option<Look>,
+    },
     /// It did not, twice.
     None,
 }
@@ -77,7 +80,12 @@ pub(crate) struct ServoBus {
 
 impl ServoBus {
     pub(crate) const fn new(reply_timeout_us: u32) -> Self {
-        Self { decoder: StatusDecoder::new(), question: None, reply_timeout_us, timeouts: 0 }
+        Self {
+            decoder: StatusDecoder::new(),
+            question: None,
+            reply_timeout_us,
+            timeouts: 0,
+        }
     }
 
     pub(crate) fn is_idle(&self) -> bool {
@@ -96,7 +104,12 @@ impl ServoBus {
 
     /// Asks a servo for its present state.
     pub(crate) fn look(&mut self, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
-        self.ask(Frame::read(id, table::PRESENT_POSITION_L, LOOK_LENGTH), id, board, now_us);
+        self.ask(
+            Frame::read(id, table::PRESENT_POSITION_L, LOOK_LENGTH),
+            id,
+            board,
+            now_us,
+        );
     }
 
     /// Sets goal position, speed and torque limit in one write. The torque limit goes along because a
@@ -180,6 +193,12 @@ impl ServoBus {
         self.decoder.reset();
         let sent = board.servo_write(frame.as_bytes());
         let due_us = now_us.wrapping_add(self.reply_timeout_us);
-        self.question = Some(Question { frame, id, due_us, attempt: 0, sent });
+        self.question = Some(Question {
+            frame,
+            id,
+            due_us,
+            attempt: 0,
+            sent,
+        });
     }
 }

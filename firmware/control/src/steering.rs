@@ -219,7 +219,10 @@ impl SteeringUnit {
             }
             Some(Command::Arm(arm)) if self.wheels.is_standby() => {
                 self.accept(now_us);
-                self.arm_waiting = Some(ArmOrder { command: arm, seq: command.seq });
+                self.arm_waiting = Some(ArmOrder {
+                    command: arm,
+                    seq: command.seq,
+                });
             }
             Some(Command::Arm(_)) | None => {
                 self.register.refuse();
@@ -258,12 +261,14 @@ impl SteeringUnit {
     fn set(&mut self, setting: Setting) -> SettingReply {
         let gains = self.line.pd.gains();
         let (in_force, changed) = match setting.key {
-            SettingKey::GainP => {
-                (gains.p, u8::try_from(setting.value).map(|p| (p, Gains { p, ..gains })))
-            }
-            SettingKey::GainD => {
-                (gains.d, u8::try_from(setting.value).map(|d| (d, Gains { d, ..gains })))
-            }
+            SettingKey::GainP => (
+                gains.p,
+                u8::try_from(setting.value).map(|p| (p, Gains { p, ..gains })),
+            ),
+            SettingKey::GainD => (
+                gains.d,
+                u8::try_from(setting.value).map(|d| (d, Gains { d, ..gains })),
+            ),
             SettingKey::RawLine | SettingKey::Calibrate => {
                 return SettingReply {
                     key: setting.key,
@@ -280,7 +285,12 @@ impl SteeringUnit {
             }
             Err(_) => (in_force, SettingStatus::OutOfRange),
         };
-        SettingReply { key: setting.key, seq: setting.seq, value: i16::from(value), status }
+        SettingReply {
+            key: setting.key,
+            seq: setting.seq,
+            value: i16::from(value),
+            status,
+        }
     }
 
     fn read_line<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
@@ -304,7 +314,9 @@ impl SteeringUnit {
     }
 
     fn line_due_us(&self) -> Option<u32> {
-        self.line.fresh_since_us.map(|since| since.wrapping_add(self.config.line_age_limit_us))
+        self.line
+            .fresh_since_us
+            .map(|since| since.wrapping_add(self.config.line_age_limit_us))
     }
 
     fn move_arm<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
@@ -337,7 +349,11 @@ impl SteeringUnit {
             self.end(seq, End::Done, now_us);
         }
         let correction = self.line.fresh_since_us.map(|_| self.line.correction);
-        let motors = if may_turn { self.wheels.motors(correction) } else { STILL };
+        let motors = if may_turn {
+            self.wheels.motors(correction)
+        } else {
+            STILL
+        };
         if self.motors != Some(motors) {
             self.motors = Some(motors);
             board.set_motors(motors.0, motors.1);
@@ -457,7 +473,10 @@ impl SteeringUnit {
     fn next_due_us(&self, now_us: u32) -> u32 {
         let mut due_us = now_us.wrapping_add(LONGEST_SLEEP_US);
         due_us = first(now_us, due_us, self.arm.next_due_us(now_us));
-        let syn_us = self.link.us_to_syn(now_us).map(|us| now_us.wrapping_add(us));
+        let syn_us = self
+            .link
+            .us_to_syn(now_us)
+            .map(|us| now_us.wrapping_add(us));
         for other_us in [
             syn_us.or_else(|| self.report_due_us(now_us)),
             self.age.next_due_us(),
@@ -477,6 +496,10 @@ impl SteeringUnit {
     fn report_due_us(&self, now_us: u32) -> Option<u32> {
         let due_us = first(now_us, self.reports.data_due_us, self.reports.status_due_us);
         let waits = !self.outbox.is_empty() || reached(now_us, due_us);
-        Some(if waits { now_us.wrapping_add(UART_POLL_US) } else { due_us })
+        Some(if waits {
+            now_us.wrapping_add(UART_POLL_US)
+        } else {
+            due_us
+        })
     }
 }

@@ -10,12 +10,20 @@ pub(crate) fn reached(now: u32, due: u32) -> bool {
 
 /// The one of two times that comes first; a time already past counts as now.
 pub(crate) fn first(now: u32, one: u32, other: u32) -> u32 {
-    if ahead(now, one) <= ahead(now, other) { one } else { other }
+    if ahead(now, one) <= ahead(now, other) {
+        one
+    } else {
+        other
+    }
 }
 
 /// How far `due` lies ahead, 0 when past.
 fn ahead(now: u32, due: u32) -> u32 {
-    if reached(now, due) { 0 } else { due.wrapping_sub(now) }
+    if reached(now, due) {
+        0
+    } else {
+        due.wrapping_sub(now)
+    }
 }
 
 #[cfg(test)]

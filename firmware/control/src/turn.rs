@@ -70,7 +70,11 @@ impl Turn {
     /// A turn that begins now.
     #[must_use]
     pub fn new(way: Way, angle: Angle, now_us: u32) -> Self {
-        Self { way, ends_us: now_us.wrapping_add(angle.duration_us()), tape: Tape::Unknown }
+        Self {
+            way,
+            ends_us: now_us.wrapping_add(angle.duration_us()),
+            tape: Tape::Unknown,
+        }
     }
 
     /// Which way it goes.
@@ -120,7 +124,10 @@ mod tests {
 
     #[test]
     fn a_turn_is_over_when_its_time_is() {
-        for (angle, duration) in [(Angle::Diagonal, 1_500_000), (Angle::Perpendicular, 3_000_000)] {
+        for (angle, duration) in [
+            (Angle::Diagonal, 1_500_000),
+            (Angle::Perpendicular, 3_000_000),
+        ] {
             let start = u32::MAX - 1_000;
             let turn = Turn::new(Way::Right, angle, start);
             assert!(!turn.is_over(start));
@@ -149,7 +156,11 @@ mod tests {
     fn only_the_three_centre_sensors_count() {
         for index in 0..11_u8 {
             let bits = LineBits(1 << (10 - index));
-            assert_eq!(words(&[LineBits(0), bits]), (4..=6).contains(&index), "sensor {index}");
+            assert_eq!(
+                words(&[LineBits(0), bits]),
+                (4..=6).contains(&index),
+                "sensor {index}"
+            );
         }
     }
 }

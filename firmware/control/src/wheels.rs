@@ -34,7 +34,13 @@ enum Mode {
     Manual(WheelCommand),
     Follow(Along),
     /// `under_way` is empty until the wheels may turn.
-    Turn { command: WheelCommand, seq: u8, way: Way, angle: Angle, under_way: Option<Turn> },
+    Turn {
+        command: WheelCommand,
+        seq: u8,
+        way: Way,
+        angle: Angle,
+        under_way: Option<Turn>,
+    },
 }
 
 /// The wheels' mode.
@@ -45,12 +51,20 @@ pub(crate) struct Wheels {
 
 impl Wheels {
     pub(crate) const fn new() -> Self {
-        Self { mode: Mode::Standby }
+        Self {
+            mode: Mode::Standby,
+        }
     }
 
     /// Takes up the mode of a command, in place of what was.
     pub(crate) fn start(&mut self, command: WheelCommand, seq: u8) {
-        let turn = |way, angle| Mode::Turn { command, seq, way, angle, under_way: None };
+        let turn = |way, angle| Mode::Turn {
+            command,
+            seq,
+            way,
+            angle,
+            under_way: None,
+        };
         self.mode = match command {
             WheelCommand::Standby => Mode::Standby,
             WheelCommand::ManualForward
@@ -68,14 +82,25 @@ impl Wheels {
 
     /// Breaks a turn off; its number, if one was under way.
     pub(crate) fn abort_turn(&mut self) -> Option<u8> {
-        let Mode::Turn { seq, .. } = self.mode else { return None };
+        let Mode::Turn { seq, .. } = self.mode else {
+            return None;
+        };
         self.mode = Mode::Standby;
         Some(seq)
     }
 
     /// Ends a turn that has come to its end; its number then. Starts the time of one that may begin.
     pub(crate) fn advance(&mut self, may_turn: bool, now_us: u32) -> Option<u8> {
-        let Mode::Turn { seq, way, angle, under_way, .. } = &mut self.mode else { return None };
+        let Mode::Turn {
+            seq,
+            way,
+            angle,
+            under_way,
+            ..
+        } = &mut self.mode
+        else {
+            return None;
+        };
         match under_way {
             Some(turn) if turn.is_over(now_us) => {
                 let seq = *seq;
@@ -94,7 +119,11 @@ impl Wheels {
 
     /// A word from the sensor board.
     pub(crate) fn on_word(&mut self, bits: LineBits) {
-        if let Mode::Turn { under_way: Some(turn), .. } = &mut self.mode {
+        if let Mode::Turn {
+            under_way: Some(turn),
+            ..
+        } = &mut self.mode
+        {
             turn.on_word(bits);
         }
     }
@@ -109,7 +138,10 @@ impl Wheels {
             Mode::Manual(WheelCommand::ManualLeft) => (back, ahead),
             Mode::Manual(WheelCommand::ManualRight) => (ahead, back),
             Mode::Follow(along) => correction.map_or(STILL, |u| follow(*along, u)),
-            Mode::Turn { under_way: Some(turn), .. } => match turn.way() {
+            Mode::Turn {
+                under_way: Some(turn),
+                ..
+            } => match turn.way() {
                 Way::Left => (back, ahead),
                 Way::Right => (ahead, back),
             },
@@ -138,7 +170,10 @@ impl Wheels {
     /// When a turn under way ends at the latest.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         match &self.mode {
-            Mode::Turn { under_way: Some(turn), .. } => Some(turn.ends_us()),
+            Mode::Turn {
+                under_way: Some(turn),
+                ..
+            } => Some(turn.ends_us()),
             _ => None,
         }
     }
@@ -207,7 +242,10 @@ mod tests {
         assert_eq!(wheels.advance(false, 0), None);
         assert_eq!(wheels.motors(None), STILL);
         assert_eq!(wheels.advance(true, 10_000), None);
-        assert_eq!(wheels.motors(None), (Motor::forward(100), Motor::backward(100)));
+        assert_eq!(
+            wheels.motors(None),
+            (Motor::forward(100), Motor::backward(100))
+        );
         assert_eq!(wheels.advance(true, 1_509_999), None);
         assert_eq!(wheels.advance(true, 1_510_000), Some(5));
         assert!(wheels.is_standby());
@@ -218,6 +256,9 @@ mod tests {
         let mut wheels = Wheels::new();
         wheels.start(WheelCommand::ActiveForward, 1);
         assert_eq!(wheels.motors(None), STILL);
-        assert_eq!(wheels.motors(Some(4)), (Motor::forward(104), Motor::forward(96)));
+        assert_eq!(
+            wheels.motors(Some(4)),
+            (Motor::forward(104), Motor::forward(96))
+        );
     }
 }

@@ -114,11 +114,17 @@ fn every_reading_is_within_the_models_range_or_no_distance() {
     for model in MODELS {
         let (mut least, mut most) = (u8::MAX, 0);
         for adc in 0..=u16::MAX {
-            let Some(cm) = model.distance(adc).get() else { continue };
+            let Some(cm) = model.distance(adc).get() else {
+                continue;
+            };
             least = least.min(cm);
             most = most.max(cm);
         }
-        assert_eq!((least, most), (model.least_cm(), model.most_cm()), "{model:?}");
+        assert_eq!(
+            (least, most),
+            (model.least_cm(), model.most_cm()),
+            "{model:?}"
+        );
     }
 }
 

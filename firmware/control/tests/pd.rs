@@ -7,7 +7,11 @@ fn table(gains: Gains, start_us: u32, rows: &[(u32, i8, i16)]) {
     let mut pd = Pd::new(gains);
     for (ms, error, expected) in rows {
         let now = start_us.wrapping_add(ms * 1_000);
-        assert_eq!(pd.update(*error, now), *expected, "at {ms} ms, error {error}, {gains:?}");
+        assert_eq!(
+            pd.update(*error, now),
+            *expected,
+            "at {ms} ms, error {error}, {gains:?}"
+        );
     }
 }
 
@@ -33,26 +37,42 @@ fn the_originals_gains_over_a_word_every_5_ms() {
 
 #[test]
 fn each_gain_works_alone() {
-    table(Gains { p: 7, d: 0 }, 0, &[(0, -10, -70), (5, 10, 70), (10, 10, 70), (15, 0, 0)]);
-    table(Gains { p: 0, d: 5 }, 0, &[(0, 0, 0), (5, 1, 0), (10, 2, 10), (15, 3, 10), (20, 3, 5)]);
+    table(
+        Gains { p: 7, d: 0 },
+        0,
+        &[(0, -10, -70), (5, 10, 70), (10, 10, 70), (15, 0, 0)],
+    );
+    table(
+        Gains { p: 0, d: 5 },
+        0,
+        &[(0, 0, 0), (5, 1, 0), (10, 2, 10), (15, 3, 10), (20, 3, 5)],
+    );
 }
 
 #[test]
 fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
-    // A line that wanders one half step every 10 ms has the same D at any pace of words: 2.
-    for pace_ms in [1_u32, 2, 5, 10, 20, 40] {
-        let mut pd = Pd::new(Gains { p: 0, d: 2 });
-        let mut last = 0;
-        for ms in (0..=80).step_by(pace_ms as usize) {
-            let error = (ms / 10) as i8;
-            last = pd.update(error, ms * 1_000);
-        }
-        if pace_ms >= 5 {
-            assert_eq!(last, 2, "a word every {pace_ms} ms");
+    // A line that wanders one half step every 5 ms changes by 2 in 10 ms: D = 10 * 2, give or take what a
+    // whole number of half steps can be off.
+    for pace_us in [500, 1_000, 2_600, 5_000, 8_000, 11_500, 20_000, 40_000] {
+        let mut pd = Pd::new(Gains { p: 0, d: 10 });
+        for step in 0.. {
+            let now_us = step * pace_us;
+            let error = (now_us / 5_000) as i8;
+            let d = pd.update(error, now_us);
+            if now_us > 30_000 {
+                assert!((10..=30).contains(&d), "{d} at a word every {pace_us} us");
+            }
+            if now_us > 100_000 {
+                break;
+            }
         }
     }
     // 12 ms apart, a change of 3: 2 * 3 * 10 / 12 = 5.
-    table(Gains { p: 0, d: 2 }, 0, &[(0, 0, 0), (12, 3, 5), (24, 0, -5)]);
+    table(
+        Gains { p: 0, d: 2 },
+        0,
+        &[(0, 0, 0), (12, 3, 5), (24, 0, -5)],
+    );
     // 11.5 ms apart is rounded: 2 * 1 * 10 / 11.5 = 1.74 -> 2.
     let mut pd = Pd::new(Gains { p: 0, d: 2 });
     pd.update(0, 0);
@@ -64,18 +84,30 @@ fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
 
 #[test]
 fn after_a_pause_the_past_tells_nothing() {
-    table(Gains { p: 0, d: 2 }, 0, &[(0, 0, 0), (10, 4, 8), (61, -4, 0), (71, -2, 4)]);
+    table(
+        Gains { p: 0, d: 2 },
+        0,
+        &[(0, 0, 0), (10, 4, 8), (61, -4, 0), (71, -2, 4)],
+    );
 }
 
 #[test]
 fn the_clocks_end_changes_nothing() {
-    table(Gains::default(), u32::MAX - 7_000, &[(0, 1, 2), (5, 2, 4), (10, 3, 10), (15, 3, 8)]);
+    table(
+        Gains::default(),
+        u32::MAX - 7_000,
+        &[(0, 1, 2), (5, 2, 4), (10, 3, 10), (15, 3, 8)],
+    );
 }
 
 #[test]
 fn the_largest_gains_and_errors_stay_in_range() {
     let gains = Gains { p: 255, d: 255 };
-    table(gains, 0, &[(0, -10, -2_550), (10, 10, 2_550 + 5_100), (20, -10, -7_650)]);
+    table(
+        gains,
+        0,
+        &[(0, -10, -2_550), (10, 10, 2_550 + 5_100), (20, -10, -7_650)],
+    );
 }
 
 #[test]

@@ -126,11 +126,11 @@ impl MarkReader {
         (self.left, self.right) = (0, 0);
     }
 
-    /// Believes what has been seen so far, however briefly: the rest of the mark may have passed
-    /// while nobody was reading.
+    /// Believes what has been seen twice: the rest of the mark may have passed while nobody was
+    /// reading. What was seen once is noise, or a mark that the robot has not rolled across yet.
     pub fn believe(&mut self) {
         for count in [&mut self.left, &mut self.right] {
-            if *count > 0 {
+            if *count + 1 == BELIEVED {
                 *count = BELIEVED;
             }
         }
@@ -229,9 +229,12 @@ mod tests {
     #[test]
     fn a_mark_cut_short_by_a_restart_is_believed() {
         let mut reader = MarkReader::default();
-        reader.push(StationToLeft);
+        for _ in 0..2 {
+            reader.push(StationToLeft);
+        }
         reader.believe();
         assert_eq!(reader.push(OnLine).map(|mark| mark.sides), Some(Sides::LEFT));
+        reader.push(StationToLeft);
         reader.believe();
         assert_eq!(reader.push(OnLine), None);
     }

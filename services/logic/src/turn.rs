@@ -6,9 +6,12 @@
 //! fragments, and what is left over counts for the next quarter of the same turn.
 //!
 //! ```text
-//!   0        60          80   90            165   180
-//!   | fragment | by line  | one quarter      | two quarters (the tape at 90 was not there)
+//!   0        60         80    90         150         172  180
+//!   | fragment | by line | one quarter     | by line   | two quarters
 //! ```
+//!
+//! Two quarters come of one turn when there was no tape at the first, and when an interrupted
+//! turn is given again.
 
 use lager_wire::LineState;
 
@@ -19,8 +22,10 @@ use crate::heading::Spin;
 const FRAGMENT_DEG: f32 = 60.0;
 /// From here the rest is small enough for the line control, whatever the sensors see.
 const QUARTER_DEG: f32 = 80.0;
-/// From here the turn has gone on to the next tape.
-const HALF_DEG: f32 = 165.0;
+/// From here tape under the sensors is that of the second quarter.
+const BEYOND_DEG: f32 = 150.0;
+/// From here the rest of a half turn is small enough.
+const HALF_DEG: f32 = 172.0;
 
 /// What to do about a turn that has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,12 +36,14 @@ pub enum Turned {
     Quarters(u8),
 }
 
-/// Judges a turn the board carried out. `turned_deg` is positive in the direction of the turn.
-pub fn done(turned_deg: f32) -> Turned {
+/// Judges a turn the board carried out, with `seen` under the sensors. `turned_deg` is positive
+/// in the direction of the turn.
+pub fn done(turned_deg: f32, seen: LineState) -> Turned {
+    let on_tape = !matches!(seen, LineState::NotOnLine | LineState::DropStation);
     match turned_deg {
         angle if angle < FRAGMENT_DEG => Turned::Fragment,
-        angle if angle < HALF_DEG => Turned::Quarters(1),
-        _ => Turned::Quarters(2),
+        angle if angle >= HALF_DEG || (angle >= BEYOND_DEG && on_tape) => Turned::Quarters(2),
+        _ => Turned::Quarters(1),
     }
 }
 
@@ -51,7 +58,7 @@ pub fn interrupted(turned_deg: f32, spin: Spin, seen: LineState) -> Turned {
     };
     let on_it = seen == LineState::OnLine || seen == beyond;
     if turned_deg >= QUARTER_DEG || (turned_deg >= FRAGMENT_DEG && on_it) {
-        done(turned_deg)
+        done(turned_deg, seen)
     } else {
         Turned::Fragment
     }
@@ -63,10 +70,16 @@ mod tests {
 
     #[test]
     fn a_turn_that_ended_on_the_cross_bar_is_no_quarter() {
-        assert_eq!(done(20.0), Turned::Fragment);
-        assert_eq!(done(84.0), Turned::Quarters(1));
-        assert_eq!(done(110.0), Turned::Quarters(1));
-        assert_eq!(done(174.0), Turned::Quarters(2));
+        assert_eq!(done(20.0, LineState::OnLine), Turned::Fragment);
+        assert_eq!(done(84.0, LineState::OnLine), Turned::Quarters(1));
+        assert_eq!(done(110.0, LineState::NotOnLine), Turned::Quarters(1));
+    }
+
+    #[test]
+    fn two_quarters_in_one_turn_end_on_the_second_tape() {
+        assert_eq!(done(168.0, LineState::NotOnLine), Turned::Quarters(1));
+        assert_eq!(done(168.0, LineState::RightOfLine), Turned::Quarters(2));
+        assert_eq!(done(174.0, LineState::NotOnLine), Turned::Quarters(2));
     }
 
     #[test]

@@ -154,7 +154,10 @@ fn the_last_value_of_a_killed_service_is_handed_to_its_successor() {
     let supervisor = domain.open(Role::Supervisor);
     let mut keeper = supervisor.keeper::<NavStatus>().unwrap();
     keeper.hand_over().unwrap();
-    assert!(!keeper.is_standing_in(), "there is nothing to hand over yet");
+    assert!(
+        !keeper.is_standing_in(),
+        "there is nothing to hand over yet"
+    );
 
     let service = Player::start(&domain, "navigator");
     let pid = service.pid();

@@ -3,12 +3,13 @@
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_ports::PortError;
+use lager_ports::{Bus, BusConfig, OpenError, Policy, PortError, Wake};
 use lager_topics::{
     DistanceFrame, Field, FieldInfo, LineFrame, OBSERVERS, Payload, Qos, Role, Schema, SensorLine,
-    Topic,
+    SteeringCommand, Topic,
 };
 use serde::{Deserialize, Serialize};
 
@@ -237,4 +238,32 @@ fn overwrite(path: &Path, contents: &[u8]) {
     std::fs::set_permissions(path, Permissions::from_mode(0o600)).unwrap();
     std::fs::write(path, contents).unwrap();
     std::fs::set_permissions(path, permissions).unwrap();
+}
+
+#[test]
+fn a_root_of_the_greatest_length_carries_a_whole_robot() {
+    let folder_of = |length: usize| {
+        let mut folder = std::env::temp_dir()
+            .join(format!("lplong{}", std::process::id()))
+            .into_os_string();
+        folder.push("x".repeat(length - folder.len()));
+        PathBuf::from(folder)
+    };
+    let too_long = BusConfig {
+        prefix: Some("lplong_".to_owned()),
+        root: Some(folder_of(80)),
+        ..BusConfig::default()
+    };
+    let Err(OpenError::RootTooLong { limit, .. }) = Bus::open(&too_long, Role::Bridge) else {
+        panic!("80 bytes are too many");
+    };
+
+    let domain = Domain::at("lplong_", folder_of(limit));
+    let bus = domain.open(Role::Bridge);
+    let waiter = bus.waiter(Policy::Block).unwrap();
+    let mut orders = bus.subscriber::<SteeringCommand>().unwrap();
+    let publisher = bus.publisher::<SteeringCommand>().unwrap();
+    publisher.send(0, Default::default()).unwrap();
+    assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
+    assert!(orders.receive().unwrap().is_some());
 }

@@ -122,10 +122,7 @@ fn a_sample_rings_every_actor_of_its_topic_and_nobody_else() {
     let command = comm.publisher::<SteeringCommand>().unwrap();
     command.send(0, Default::default()).unwrap();
     assert_eq!(bridge_waiter.wait(LONG), Wake::Rung);
-    assert_eq!(
-        logic_waiter.wait(Duration::from_millis(5)),
-        Wake::TimedOut
-    );
+    assert_eq!(logic_waiter.wait(Duration::from_millis(5)), Wake::TimedOut);
 }
 
 #[test]

@@ -20,5 +20,5 @@ pub use sensor::{DistanceFrame, LineFrame};
 pub use steering::{Finish, OrderKind, Origin, SteeringOrder, SteeringReport};
 pub use truth::{GoodState, Truth, TruthGood};
 
-/// Index of a servo that has not been heard yet has this position (AX-12 positions are 0..=1023).
+/// Position of a servo that has not been heard yet; real ones are 0..=1023 (AX-12).
 pub const SERVO_UNKNOWN: u16 = 0xFFFF;

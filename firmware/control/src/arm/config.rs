@@ -15,7 +15,10 @@ pub struct Limits {
 
 impl Limits {
     /// All positions a servo has.
-    pub const ALL: Self = Self { lowest: 0, highest: table::MAX_POSITION };
+    pub const ALL: Self = Self {
+        lowest: 0,
+        highest: table::MAX_POSITION,
+    };
 
     pub(crate) fn clamp(&self, position: u16) -> u16 {
         position.clamp(self.lowest, self.highest)
@@ -83,8 +86,18 @@ impl Default for ArmConfig {
             gripper_open: 512,
             gripper_closed: 210,
             squeeze_load: 300,
-            drop: Pose { base: 512, shoulder: 300, elbow: 512, wrist: 512 },
-            carry: Pose { base: 512, shoulder: 600, elbow: 400, wrist: 512 },
+            drop: Pose {
+                base: 512,
+                shoulder: 300,
+                elbow: 512,
+                wrist: 512,
+            },
+            carry: Pose {
+                base: 512,
+                shoulder: 600,
+                elbow: 400,
+                wrist: 512,
+            },
             reply_timeout_us: 3_000,
             look_period_us: 10_000,
             squeeze_period_us: 20_000,

@@ -179,7 +179,11 @@ impl Arm {
         if let Some(due_us) = self.bus.next_due_us() {
             return due_us;
         }
-        let round_due_us = if self.unfinished_setup().is_some() { now_us } else { self.round_due_us };
+        let round_due_us = if self.unfinished_setup().is_some() {
+            now_us
+        } else {
+            self.round_due_us
+        };
         match self.program_due_us(now_us) {
             Some(due_us) => first(now_us, due_us, round_due_us),
             None => round_due_us,
@@ -235,12 +239,18 @@ impl Arm {
     }
 
     fn unfinished_setup(&self) -> Option<Job> {
-        self.servos.iter().enumerate().find_map(|(index, servo)| match servo.setup {
-            Setup::Unseen => Some(Job::Look(index)),
-            Setup::Seen => Some(Job::Goal { index, speed: self.config.sequence_speed }),
-            Setup::Held => Some(Job::SwitchOn(index)),
-            Setup::Ready | Setup::Missing => None,
-        })
+        self.servos
+            .iter()
+            .enumerate()
+            .find_map(|(index, servo)| match servo.setup {
+                Setup::Unseen => Some(Job::Look(index)),
+                Setup::Seen => Some(Job::Goal {
+                    index,
+                    speed: self.config.sequence_speed,
+                }),
+                Setup::Held => Some(Job::SwitchOn(index)),
+                Setup::Ready | Setup::Missing => None,
+            })
     }
 
     fn choose(&mut self, now_us: u32) -> Option<(Job, bool)> {
@@ -273,8 +283,9 @@ impl Arm {
 
     /// Writes an answer down; whether the servo did what it was asked.
     fn note(&mut self, job: Job, answer: Answer) -> bool {
-        const NOT_DONE: ErrorBits =
-            ErrorBits::CHECKSUM.union(ErrorBits::INSTRUCTION).union(ErrorBits::RANGE);
+        const NOT_DONE: ErrorBits = ErrorBits::CHECKSUM
+            .union(ErrorBits::INSTRUCTION)
+            .union(ErrorBits::RANGE);
         let servo = &mut self.servos[job.index()];
         let Answer::Status { errors, look } = answer else {
             servo.setup = Setup::Missing;

@@ -119,7 +119,10 @@ impl Arm {
             Program::Squeeze(_) => 0,
         };
         self.failed = true;
-        self.program = Program::Freeze(Freeze { left: moving, looked: false });
+        self.program = Program::Freeze(Freeze {
+            left: moving,
+            looked: false,
+        });
         if moving == 0 {
             self.finish();
         }
@@ -130,7 +133,10 @@ impl Arm {
             Program::Idle => None,
             Program::Move(movement) => {
                 if let Some(index) = lowest(movement.write) {
-                    return Some(Job::Goal { index, speed: movement.speed });
+                    return Some(Job::Goal {
+                        index,
+                        speed: movement.speed,
+                    });
                 }
                 if !reached(now_us, movement.look_due_us) {
                     return None;
@@ -142,16 +148,20 @@ impl Arm {
                 movement.last_looked = index;
                 Some(Job::Look(index))
             }
-            Program::Squeeze(squeeze) if squeeze.stepping => {
-                Some(Job::Goal { index: GRIPPER, speed: self.config.step_speed })
-            }
+            Program::Squeeze(squeeze) if squeeze.stepping => Some(Job::Goal {
+                index: GRIPPER,
+                speed: self.config.step_speed,
+            }),
             Program::Squeeze(squeeze) => {
                 reached(now_us, squeeze.look_due_us).then_some(Job::Look(GRIPPER))
             }
             Program::Freeze(freeze) => {
                 let index = lowest(freeze.left)?;
                 Some(if freeze.looked {
-                    Job::Goal { index, speed: self.config.sequence_speed }
+                    Job::Goal {
+                        index,
+                        speed: self.config.sequence_speed,
+                    }
                 } else {
                     Job::Look(index)
                 })
@@ -181,7 +191,11 @@ impl Arm {
     fn finish(&mut self) {
         self.program = Program::Idle;
         self.untold |= self.touched;
-        self.finished = Some(if self.failed { Outcome::Aborted } else { Outcome::Done });
+        self.finished = Some(if self.failed {
+            Outcome::Aborted
+        } else {
+            Outcome::Done
+        });
     }
 
     /// One small step of a joint.
@@ -194,18 +208,34 @@ impl Arm {
             _ => self.servos[joint].base(),
         };
         let step = self.config.step;
-        let goal = if forward { base.saturating_add(step) } else { base.saturating_sub(step) };
+        let goal = if forward {
+            base.saturating_add(step)
+        } else {
+            base.saturating_sub(step)
+        };
         let mut goals = Goals::default();
         goals.joint(joint, self.config.limits[joint].clamp(goal));
         let (speed, timeout_us) = (self.config.step_speed, self.config.step_timeout_us);
-        self.go(&goals, Way { speed, timeout_us, tolerance: 1, then: Then::Nothing }, now_us);
+        self.go(
+            &goals,
+            Way {
+                speed,
+                timeout_us,
+                tolerance: 1,
+                then: Then::Nothing,
+            },
+            now_us,
+        );
     }
 
     fn take_pose(&mut self, pose: Pose, then: Then, now_us: u32) {
         let mut goals = Goals::default();
-        for (joint, position) in
-            [(BASE, pose.base), (SHOULDER, pose.shoulder), (ELBOW, pose.elbow), (WRIST, pose.wrist)]
-        {
+        for (joint, position) in [
+            (BASE, pose.base),
+            (SHOULDER, pose.shoulder),
+            (ELBOW, pose.elbow),
+            (WRIST, pose.wrist),
+        ] {
             goals.joint(joint, self.config.limits[joint].clamp(position));
         }
         self.go_softly(&goals, then, now_us);
@@ -213,13 +243,25 @@ impl Arm {
 
     fn open(&mut self, then: Then, now_us: u32) {
         let mut goals = Goals::default();
-        goals.joint(GRIPPER, self.config.limits[GRIPPER].clamp(self.config.gripper_open));
+        goals.joint(
+            GRIPPER,
+            self.config.limits[GRIPPER].clamp(self.config.gripper_open),
+        );
         self.go_softly(&goals, then, now_us);
     }
 
     fn go_softly(&mut self, goals: &Goals, then: Then, now_us: u32) {
         let (speed, timeout_us) = (self.config.sequence_speed, self.config.sequence_timeout_us);
-        self.go(goals, Way { speed, timeout_us, tolerance: 6, then }, now_us);
+        self.go(
+            goals,
+            Way {
+                speed,
+                timeout_us,
+                tolerance: 6,
+                then,
+            },
+            now_us,
+        );
     }
 
     /// Sends servos to their goals; those out of service are left out.

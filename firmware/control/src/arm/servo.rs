@@ -70,6 +70,10 @@ impl Servo {
     /// Where a relative movement starts from: the goal, so that what hangs on the arm does not make it sag
     /// step by step; the position, when the goal is not where the servo is.
     pub(super) fn base(&self) -> u16 {
-        if self.is_near_goal() { self.goal } else { self.look.position }
+        if self.is_near_goal() {
+            self.goal
+        } else {
+            self.look.position
+        }
     }
 }

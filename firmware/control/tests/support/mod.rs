@@ -2,14 +2,16 @@
 //!
 //! The boards are stepped when they asked to be and on input, as the simulator and a sleeping chip do.
 
-#![allow(dead_code)] // Each test file uses its part.
+// Each test file uses its part.
+#![allow(dead_code, unreachable_pub)]
 
 pub mod servos;
 
 use std::collections::VecDeque;
 
 use lager_control::{
-    Board, Motor, SensorBoard, SensorConfig, SensorUnit, SteeringBoard, SteeringConfig, SteeringUnit,
+    Board, Motor, SensorBoard, SensorConfig, SensorUnit, SteeringBoard, SteeringConfig,
+    SteeringUnit,
 };
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
@@ -30,8 +32,13 @@ pub struct Uart {
 }
 
 impl Uart {
-    fn new() -> Self {
-        Self { received: VecDeque::new(), sent: Vec::new(), busy_until_us: 0, byte_us: BYTE_US }
+    fn new(now_us: u32) -> Self {
+        Self {
+            received: VecDeque::new(),
+            sent: Vec::new(),
+            busy_until_us: now_us,
+            byte_us: BYTE_US,
+        }
     }
 
     fn left_us(&self, now_us: u32) -> u32 {
@@ -73,7 +80,9 @@ impl Pi {
 
     fn hear(&mut self, uart: &mut Uart, now_us: u32) {
         for byte in core::mem::take(&mut uart.sent) {
-            let Some(packet) = self.decoder.push(byte) else { continue };
+            let Some(packet) = self.decoder.push(byte) else {
+                continue;
+            };
             match packet.payload {
                 Payload::Handshake(handshake) => {
                     assert_eq!(handshake.kind, SynAck::Syn);
@@ -85,11 +94,16 @@ impl Pi {
                 _ => self.packets.push((now_us, packet)),
             }
         }
-        assert_eq!(self.decoder.counters().skipped_bytes, 0, "a board sends whole packets only");
+        assert_eq!(
+            self.decoder.counters().skipped_bytes,
+            0,
+            "a board sends whole packets only"
+        );
     }
 
     fn send(&mut self, payload: Payload, uart: &mut Uart) {
-        uart.received.extend(self.transmitter.encode(payload).expect("the link is up"));
+        uart.received
+            .extend(self.transmitter.encode(payload).expect("the link is up"));
     }
 
     /// Every packet of one kind, with its time.
@@ -180,7 +194,7 @@ impl Bench {
     pub fn boot(now_us: u32, config: SteeringConfig, servos: Servos) -> Self {
         let pins = SteeringPins {
             now_us,
-            uart: Uart::new(),
+            uart: Uart::new(now_us),
             motors: (Motor::forward(77), Motor::backward(77)),
             motor_log: Vec::new(),
             bits: VecDeque::new(),
@@ -214,13 +228,17 @@ impl Bench {
         bench.run_ms(200);
         bench.pi.packets.clear();
         bench.pins.motor_log.clear();
+        bench.run_ms(10);
         bench
     }
 
     /// Gives a command a new number, sends it and keeps renewing it. Its number.
     pub fn command(&mut self, code: u8) -> u8 {
         self.seq = self.seq.wrapping_add(1);
-        let command = SteerCommand { code, seq: self.seq };
+        let command = SteerCommand {
+            code,
+            seq: self.seq,
+        };
         self.renewed = Some(command);
         self.renew_us = self.pins.now_us.wrapping_add(40_000);
         self.send(Payload::SteerCommand(command));
@@ -291,7 +309,8 @@ impl Bench {
             && ahead(now_us, self.renew_us) == 0
         {
             self.renew_us = now_us.wrapping_add(40_000);
-            self.pi.send(Payload::SteerCommand(command), &mut self.pins.uart);
+            self.pi
+                .send(Payload::SteerCommand(command), &mut self.pins.uart);
         }
         if let Some(bits) = self.line
             && ahead(now_us, self.word_us) == 0
@@ -305,7 +324,9 @@ impl Bench {
     pub fn word(&mut self, bits: u16) {
         for index in 0..11_u32 {
             let at_us = self.pins.now_us.wrapping_sub((10 - index) * 100);
-            self.pins.bits.push_back((bits >> (10 - index) & 1 == 1, at_us));
+            self.pins
+                .bits
+                .push_back((bits >> (10 - index) & 1 == 1, at_us));
         }
     }
 
@@ -378,7 +399,11 @@ impl SensorBoard for SensorPins {
         self.ir
     }
     fn set_exde(&mut self, data: bool, sync: bool) {
-        assert_ne!(self.exde, (data, sync), "the wires are only touched to change them");
+        assert_ne!(
+            self.exde,
+            (data, sync),
+            "the wires are only touched to change them"
+        );
         self.exde = (data, sync);
         self.exde_log.push((self.now_us, data, sync));
     }
@@ -399,7 +424,7 @@ impl SensorBench {
     pub fn boot(now_us: u32, config: SensorConfig) -> Self {
         let pins = SensorPins {
             now_us,
-            uart: Uart::new(),
+            uart: Uart::new(now_us),
             line: [20; 11],
             ir: 0,
             ir_reads: 0,
@@ -410,7 +435,12 @@ impl SensorBench {
             kicks: 0,
         };
         let unit = SensorUnit::new(&pins, config);
-        Self { pins, unit, pi: Pi::new(), due_us: now_us }
+        Self {
+            pins,
+            unit,
+            pi: Pi::new(),
+            due_us: now_us,
+        }
     }
 
     /// A board that is up towards both sides.
@@ -426,7 +456,11 @@ impl SensorBench {
 
     pub fn tape(&mut self, bits: u16) {
         for index in 0..11 {
-            self.pins.line[index] = if bits >> (10 - index) & 1 == 1 { 200 } else { 20 };
+            self.pins.line[index] = if bits >> (10 - index) & 1 == 1 {
+                200
+            } else {
+                20
+            };
         }
     }
 

@@ -80,7 +80,10 @@ impl Servos {
     }
 
     pub fn positions(&self) -> Vec<u16> {
-        self.servos.iter().map(|servo| servo.position.round() as u16).collect()
+        self.servos
+            .iter()
+            .map(|servo| servo.position.round() as u16)
+            .collect()
     }
 
     pub fn next_byte_us(&self) -> Option<u32> {
@@ -100,10 +103,15 @@ impl Servos {
         if self.full {
             return false;
         }
-        assert!(self.answers.is_empty(), "two talk at once on the servos' wire");
+        assert!(
+            self.answers.is_empty(),
+            "two talk at once on the servos' wire"
+        );
         self.advance(now_us);
         for byte in bytes {
-            let Some(packet) = self.decoder.push(*byte) else { continue };
+            let Some(packet) = self.decoder.push(*byte) else {
+                continue;
+            };
             let (id, instruction) = (packet.id, packet.instruction());
             let parameters = packet.parameters.to_vec();
             let servo = &mut self.servos[usize::from(id) - 1];
@@ -111,8 +119,10 @@ impl Servos {
                 continue;
             }
             let registers = servo.obey(instruction.expect("a known instruction"), &parameters);
-            let mut answer =
-                Frame::status(id, servo.errors, &registers).unwrap().as_bytes().to_vec();
+            let mut answer = Frame::status(id, servo.errors, &registers)
+                .unwrap()
+                .as_bytes()
+                .to_vec();
             if servo.spoiled > 0 {
                 servo.spoiled -= 1;
                 *answer.last_mut().unwrap() ^= 0x55;
@@ -143,12 +153,18 @@ impl Servo {
         }
         let goal = f64::from(self.goal);
         // One speed unit is 0.111 rpm, a position unit 0.29 degrees; 0 is as fast as can be.
-        let speed = if self.speed == 0 { 1_200.0 } else { f64::from(self.speed) * 0.666 / 0.29 };
+        let speed = if self.speed == 0 {
+            1_200.0
+        } else {
+            f64::from(self.speed) * 0.666 / 0.29
+        };
         let way = (goal - self.position).clamp(-speed * seconds, speed * seconds);
         self.position = (self.position + way).max(self.stop.min(self.position));
         let missing = goal - self.position;
         self.load = if goal < self.stop && self.position <= self.stop {
-            (missing.round() as i16).saturating_mul(self.stiffness).clamp(-1023, 1023)
+            (missing.round() as i16)
+                .saturating_mul(self.stiffness)
+                .clamp(-1023, 1023)
         } else {
             0
         };
@@ -178,7 +194,10 @@ impl Servo {
                 Vec::new()
             }
             Instruction::Write => {
-                assert_eq!((parameters[0], parameters.len()), (table::GOAL_POSITION_L, 7));
+                assert_eq!(
+                    (parameters[0], parameters.len()),
+                    (table::GOAL_POSITION_L, 7)
+                );
                 let word = |at: usize| u16::from_le_bytes([parameters[at], parameters[at + 1]]);
                 self.goal = word(1);
                 self.speed = word(3);

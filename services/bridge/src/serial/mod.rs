@@ -154,6 +154,10 @@ impl SerialPort {
             path: path.to_owned(),
             baud,
         };
+        if baud == 0 {
+            // To a driver this means to hang up.
+            return Err(no_such_speed(Errno::INVAL));
+        }
         termios.set_speed(baud).map_err(no_such_speed)?;
         tcsetattr(&fd, OptionalActions::Now, &termios).map_err(fail)?;
         // The driver reports the speed it has really set.

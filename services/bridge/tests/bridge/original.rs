@@ -19,6 +19,9 @@ fn two_original_boards_handshake_and_drive_the_bridge() {
         health.steering.reset_cause.get(),
         Some(ResetCause::Unknown)
     );
+    wait_until("both boards have their ACK", || {
+        robot.sensor.with(|board| board.board.up) && robot.steering.with(|board| board.board.up)
+    });
     let ack = [0x00, 0x0B, 0x05, 0, 0, 0, 0, 0, 0, 0, 0xFF];
     assert_eq!(robot.sensor.with(|board| board.board.acks[0]), ack);
     assert_eq!(robot.steering.with(|board| board.board.acks[0]), ack);

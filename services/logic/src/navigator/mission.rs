@@ -43,7 +43,6 @@ impl Navigator {
             self.goal == Goal::Product && map.station(self.order.product).is_none();
         let place_is_missing = !map.contains(self.node) || station_is_missing;
         self.map = Some(map);
-        self.command.give_anew();
         if fresh {
             self.stand_at_start();
             say!(out, "I have a map. Which product shall I fetch?");

@@ -196,6 +196,7 @@ impl Navigator {
     /// Takes one input at `now` (robot time) and goes on as far as it allows.
     pub fn handle(&mut self, now: Duration, input: Input<'_>) -> Output {
         let mut out = Output::default();
+        let was_active = self.is_active();
         self.odometer.advance(now);
         match input {
             Input::Line(state) => self.line(now, state, &mut out),
@@ -205,8 +206,11 @@ impl Navigator {
             Input::Order(order) => self.take_order(order, &mut out),
             Input::PickupDone { order_id } => self.picked(order_id, &mut out),
             Input::Reset => self.reset(&mut out),
-            Input::Mode { mode, stopped } => self.set_mode(now, mode, stopped),
+            Input::Mode { mode, stopped } => self.set_mode(mode, stopped),
             Input::Tick => {}
+        }
+        if self.is_active() && !was_active {
+            self.begin_to_speak(now);
         }
         self.proceed(now, &mut out);
         let (command, arm_granted) = self.wanted();
@@ -256,16 +260,12 @@ impl Navigator {
         (command, self.phase == Phase::Picking)
     }
 
-    fn set_mode(&mut self, now: Duration, mode: Mode, stopped: bool) {
-        let was_active = self.is_active();
+    fn set_mode(&mut self, mode: Mode, stopped: bool) {
         if self.mode != Some(mode) {
             self.odometer.stirred_mm = 0.0;
         }
         self.mode = Some(mode);
         self.stopped = stopped;
-        if self.is_active() && !was_active {
-            self.begin_to_speak(now);
-        }
     }
 
     /// The orders may go out (again): a setpoint from before has ended by now, while a turn or a

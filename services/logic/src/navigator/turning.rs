@@ -10,7 +10,7 @@
 //! ```
 
 use lager_topics::{Finish, Heading, Phase};
-use lager_wire::{ArmCommand, Command, WheelCommand};
+use lager_wire::{ArmCommand, Command, LineState, WheelCommand};
 
 use super::{Navigator, Output, Pause, say};
 use crate::heading::{Compass, Spin};
@@ -74,7 +74,8 @@ impl Navigator {
             Finish::Done if self.phase == Phase::Dropping => self.have_delivered(out),
             Finish::Done => {
                 let angle = self.odometer.turned_deg * self.spin().sign();
-                self.turned(turn::done(angle), out);
+                let seen = self.sight.map_or(LineState::NotOnLine, |(_, seen)| seen);
+                self.turned(turn::done(angle, seen), out);
             }
         }
     }

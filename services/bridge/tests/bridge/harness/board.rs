@@ -2,7 +2,7 @@
 //! pulled out and put in again.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
@@ -16,10 +16,10 @@ use super::pty::Pty;
 
 /// Longest silence within a packet. Real boards allow two byte times; a pseudo terminal hands
 /// bytes over when the scheduler lets it.
-pub const GAP_US: u32 = 50_000;
+pub(crate) const GAP_US: u32 = 50_000;
 
 /// What stands at the other end of a line.
-pub trait Peer: Send + 'static {
+pub(crate) trait Peer: Send + 'static {
     /// Takes one byte from the Pi.
     fn take(&mut self, byte: u8, now_us: u32);
     /// Does what is due and appends what it sends.
@@ -37,7 +37,7 @@ struct Inner<P> {
 }
 
 /// A peer in a thread.
-pub struct Board<P: Peer> {
+pub(crate) struct Board<P: Peer> {
     inner: Arc<Mutex<Inner<P>>>,
     thread: Option<JoinHandle<()>>,
     link: PathBuf,
@@ -45,7 +45,7 @@ pub struct Board<P: Peer> {
 
 impl<P: Peer> Board<P> {
     /// Starts a peer whose port is at `link`.
-    pub fn plugged(peer: P, link: PathBuf) -> Self {
+    pub(crate) fn plugged(peer: P, link: PathBuf) -> Self {
         let inner = Arc::new(Mutex::new(Inner {
             peer,
             pty: Some(Pty::new(&link)),
@@ -65,33 +65,33 @@ impl<P: Peer> Board<P> {
         }
     }
 
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.link
     }
 
     /// Looks at the peer or changes it.
-    pub fn with<R>(&self, work: impl FnOnce(&mut P) -> R) -> R {
+    pub(crate) fn with<R>(&self, work: impl FnOnce(&mut P) -> R) -> R {
         work(&mut self.lock().peer)
     }
 
     /// Pulls the cable: the port is gone.
-    pub fn unplug(&self) {
+    pub(crate) fn unplug(&self) {
         let mut inner = self.lock();
         inner.pty = None;
         inner.out.clear();
     }
 
     /// Puts the cable in again: another port under the same path.
-    pub fn plug(&self) {
+    pub(crate) fn plug(&self) {
         self.lock().pty = Some(Pty::new(&self.link));
     }
 
-    pub fn freeze(&self, frozen: bool) {
+    pub(crate) fn freeze(&self, frozen: bool) {
         self.lock().frozen = frozen;
     }
 
     /// Sends bytes that are no packets, all of them before this returns.
-    pub fn send_noise(&self, mut next: impl FnMut() -> u8, count: usize) {
+    pub(crate) fn send_noise(&self, mut next: impl FnMut() -> u8, count: usize) {
         let mut left = count;
         super::wait_until("the noise is sent", || {
             let mut inner = self.lock();
@@ -113,15 +113,13 @@ impl<P: Peer> Board<P> {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner<P>> {
-        self.inner.lock().unwrap()
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl<P: Peer> Drop for Board<P> {
     fn drop(&mut self) {
-        if let Ok(mut inner) = self.inner.lock() {
-            inner.stop = true;
-        }
+        self.lock().stop = true;
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -134,7 +132,7 @@ fn run<P: Peer>(inner: &Mutex<Inner<P>>) {
     let mut buffer = [0; 512];
     loop {
         {
-            let mut inner = inner.lock().unwrap();
+            let mut inner = inner.lock().unwrap_or_else(PoisonError::into_inner);
             if inner.stop {
                 return;
             }
@@ -171,18 +169,18 @@ fn micros(start: Instant) -> u32 {
 }
 
 /// A sensor board: line and distance by turns, every 10 ms one of them.
-pub struct SensorBoard {
-    pub link: BoardLink,
-    pub state: LineState,
-    pub bits: u16,
-    pub distance: u8,
-    pub raw: bool,
-    pub calibrations: usize,
-    pub restarts: usize,
+pub(crate) struct SensorBoard {
+    pub(crate) link: BoardLink,
+    pub(crate) state: LineState,
+    pub(crate) bits: u16,
+    pub(crate) distance: u8,
+    pub(crate) raw: bool,
+    pub(crate) calibrations: usize,
+    pub(crate) restarts: usize,
     /// How often the link came up.
-    pub ups: usize,
+    pub(crate) ups: usize,
     /// Leaves settings without an answer.
-    pub deaf: bool,
+    pub(crate) deaf: bool,
     due_us: u32,
     flip_flop: bool,
     reset: ResetCause,
@@ -190,7 +188,7 @@ pub struct SensorBoard {
 }
 
 impl SensorBoard {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             link: BoardLink::new(Callsign::Sensor, ResetCause::PowerOn, GAP_US),
             state: LineState::OnLine,
@@ -208,7 +206,7 @@ impl SensorBoard {
         }
     }
 
-    pub fn restart(&mut self, cause: ResetCause) {
+    pub(crate) fn restart(&mut self, cause: ResetCause) {
         self.link = BoardLink::new(Callsign::Sensor, cause, GAP_US);
         self.reset = cause;
         self.raw = false;

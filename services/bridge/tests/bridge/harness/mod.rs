@@ -25,30 +25,30 @@ use lager_topics::{
 };
 use lager_wire::{Command, WheelCommand};
 
-pub use board::{Board, Peer, SensorBoard};
-pub use original::{OriginalSensor, OriginalSteering};
-pub use pty::Pty;
-pub use steering::SteeringBoard;
+pub(crate) use board::{Board, Peer, SensorBoard};
+pub(crate) use original::{OriginalSensor, OriginalSteering};
+pub(crate) use pty::Pty;
+pub(crate) use steering::SteeringBoard;
 
 /// How long anything may take before a test fails.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
 
 thread_local! {
     static EXEMPT: Cell<bool> = const { Cell::new(false) };
 }
 
 /// This thread belongs to the test and not to the bridge: what it allocates is not counted.
-pub fn exempt() {
+pub(crate) fn exempt() {
     EXEMPT.set(true);
 }
 
 /// Whether this thread belongs to the test.
-pub fn is_exempt() -> bool {
+pub(crate) fn is_exempt() -> bool {
     EXEMPT.try_with(Cell::get).unwrap_or(true)
 }
 
 /// Waits until `condition` holds.
-pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
     while !condition() {
         assert!(start.elapsed() < PATIENCE, "waited in vain until {what}");
@@ -56,60 +56,72 @@ pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     }
 }
 
+/// The bus of an isolation.
+pub(crate) fn bus_config(name: &str) -> BusConfig {
+    BusConfig {
+        prefix: Some(name.to_owned()),
+        root: Some(PathBuf::from("/tmp").join(name)),
+        ..BusConfig::default()
+    }
+}
+
 /// An isolated bus.
-pub struct Isolation {
-    pub config: BusConfig,
+pub(crate) struct Isolation {
+    pub(crate) config: BusConfig,
     folder: PathBuf,
 }
 
 impl Isolation {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let name = format!(
-            "lbr{}n{}",
+            "lbr{}n{}x",
             std::process::id(),
             NEXT.fetch_add(1, Ordering::Relaxed)
         );
-        Self::named(&name)
-    }
-
-    /// The isolation of that name, which another process may have made.
-    pub fn named(name: &str) -> Self {
-        let folder = PathBuf::from("/tmp").join(name);
+        let folder = PathBuf::from("/tmp").join(&name);
         std::fs::create_dir_all(&folder).unwrap();
         Self {
-            config: BusConfig {
-                prefix: Some(name.to_owned()),
-                root: Some(folder.clone()),
-                ..BusConfig::default()
-            },
+            config: bus_config(&name),
             folder,
         }
     }
 
-    pub fn folder(&self) -> &Path {
+    /// The name by which another process joins with [`bus_config`].
+    pub(crate) fn name(&self) -> &str {
+        self.config.prefix.as_deref().expect("it is named")
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
-    pub fn open(&self, role: Role) -> Bus {
+    pub(crate) fn open(&self, role: Role) -> Bus {
         Bus::open(&self.config, role).unwrap()
     }
 }
 
 impl Drop for Isolation {
+    /// Removes what the transport leaves for the next process of a domain, which never comes.
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder);
+        let prefix = self.name();
+        for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if file.file_name().to_string_lossy().starts_with(prefix) {
+                let _ = std::fs::remove_file(file.path());
+            }
+        }
     }
 }
 
 /// The bridge in a thread.
-pub struct Bridge {
+pub(crate) struct Bridge {
     shutdown: Shutdown,
     thread: Option<JoinHandle<Result<(), PortError>>>,
 }
 
 impl Bridge {
-    pub fn start(isolation: &Isolation, config: BridgeConfig) -> Self {
+    pub(crate) fn start(isolation: &Isolation, config: BridgeConfig) -> Self {
         let bus = isolation.open(Role::Bridge);
         let shutdown = Shutdown::new();
         let wish = shutdown.clone();
@@ -124,7 +136,7 @@ impl Bridge {
     }
 
     /// A clean stop.
-    pub fn stop(mut self) {
+    pub(crate) fn stop(mut self) {
         self.end();
     }
 
@@ -152,20 +164,20 @@ impl Drop for Bridge {
 }
 
 /// What a person and the navigator have on the bus.
-pub struct Hands {
+pub(crate) struct Hands {
     orders: Publisher<SteeringCommand>,
     requests: Client<BridgeRequest>,
-    pub line: Seen<SensorLine>,
-    pub distance: Seen<SensorDistance>,
-    pub state: Seen<SteeringState>,
-    pub health: Seen<LinkHealth>,
+    pub(crate) line: Seen<SensorLine>,
+    pub(crate) distance: Seen<SensorDistance>,
+    pub(crate) state: Seen<SteeringState>,
+    pub(crate) health: Seen<LinkHealth>,
 }
 
 /// A subscriber with the last value.
-pub struct Seen<T: Topic> {
+pub(crate) struct Seen<T: Topic> {
     subscriber: Subscriber<T>,
-    pub last: Option<T::Payload>,
-    pub count: usize,
+    pub(crate) last: Option<T::Payload>,
+    pub(crate) count: usize,
 }
 
 impl<T: Topic> Seen<T> {
@@ -178,7 +190,7 @@ impl<T: Topic> Seen<T> {
     }
 
     /// Takes what has come; the last value so far.
-    pub fn look(&mut self) -> Option<T::Payload> {
+    pub(crate) fn look(&mut self) -> Option<T::Payload> {
         for payload in self.drain() {
             self.last = Some(payload);
         }
@@ -186,7 +198,7 @@ impl<T: Topic> Seen<T> {
     }
 
     /// Everything that has come since the last look.
-    pub fn drain(&mut self) -> Vec<T::Payload> {
+    pub(crate) fn drain(&mut self) -> Vec<T::Payload> {
         let mut all = Vec::new();
         while let Ok(Some(sample)) = self.subscriber.receive() {
             self.count += 1;
@@ -195,13 +207,13 @@ impl<T: Topic> Seen<T> {
         all
     }
 
-    pub fn lost(&self) -> u64 {
+    pub(crate) fn lost(&self) -> u64 {
         self.subscriber.lost()
     }
 }
 
 impl Hands {
-    pub fn new(bus: &Bus) -> Self {
+    pub(crate) fn new(bus: &Bus) -> Self {
         Self {
             orders: bus.publisher().unwrap(),
             requests: bus.client().unwrap(),
@@ -212,12 +224,12 @@ impl Hands {
         }
     }
 
-    pub fn give(&self, order: SteeringOrder) {
+    pub(crate) fn give(&self, order: SteeringOrder) {
         self.orders.send(0, order).unwrap();
     }
 
     /// Renews `order` every 40 ms until `condition` holds.
-    pub fn give_until(
+    pub(crate) fn give_until(
         &mut self,
         order: SteeringOrder,
         what: &str,
@@ -235,11 +247,11 @@ impl Hands {
         }
     }
 
-    pub fn ask(&self, ask: Ask) -> Answer {
+    pub(crate) fn ask(&self, ask: Ask) -> Answer {
         self.requests.call(ask, PATIENCE).unwrap()
     }
 
-    pub fn set_mode(&self, mode: Mode) -> Answer {
+    pub(crate) fn set_mode(&self, mode: Mode) -> Answer {
         self.ask(Ask {
             kind: AskKind::SetMode.into(),
             mode: mode.into(),
@@ -247,14 +259,14 @@ impl Hands {
         })
     }
 
-    pub fn resume(&self) -> Answer {
+    pub(crate) fn resume(&self) -> Answer {
         self.ask(Ask {
             kind: AskKind::Resume.into(),
             ..Ask::default()
         })
     }
 
-    pub fn stop(&self) {
+    pub(crate) fn stop(&self) {
         self.give(SteeringOrder {
             origin: Origin::Operator.into(),
             kind: OrderKind::Stop.into(),
@@ -262,20 +274,20 @@ impl Hands {
         });
     }
 
-    pub fn wait_for_health(&mut self, what: &str, condition: impl Fn(&Health) -> bool) -> Health {
+    pub(crate) fn wait_for_health(&mut self, what: &str, condition: impl Fn(&Health) -> bool) -> Health {
         wait_until(what, || self.health.look().is_some_and(|health| condition(&health)));
         self.health.last.unwrap()
     }
 
-    pub fn wait_for_state(&mut self, what: &str, condition: impl Fn(&SteeringReport) -> bool) {
+    pub(crate) fn wait_for_state(&mut self, what: &str, condition: impl Fn(&SteeringReport) -> bool) {
         wait_until(what, || self.state.look().is_some_and(|state| condition(&state)));
     }
 
-    pub fn wait_for_line(&mut self, what: &str, condition: impl Fn(&LineFrame) -> bool) {
+    pub(crate) fn wait_for_line(&mut self, what: &str, condition: impl Fn(&LineFrame) -> bool) {
         wait_until(what, || self.line.look().is_some_and(|line| condition(&line)));
     }
 
-    pub fn wait_for_distance(&mut self, what: &str, condition: impl Fn(&DistanceFrame) -> bool) {
+    pub(crate) fn wait_for_distance(&mut self, what: &str, condition: impl Fn(&DistanceFrame) -> bool) {
         wait_until(what, || {
             self.distance.look().is_some_and(|distance| condition(&distance))
         });
@@ -283,18 +295,18 @@ impl Hands {
 }
 
 /// Isolation, boards, bridge and hands. Fields drop from top to bottom: the bridge ends first.
-pub struct Robot<A: Peer = SensorBoard, B: Peer = SteeringBoard> {
-    pub bridge: Option<Bridge>,
-    pub hands: Hands,
-    pub sensor: Board<A>,
-    pub steering: Board<B>,
-    pub bridge_config: BridgeConfig,
-    pub isolation: Isolation,
+pub(crate) struct Robot<A: Peer = SensorBoard, B: Peer = SteeringBoard> {
+    pub(crate) bridge: Option<Bridge>,
+    pub(crate) hands: Hands,
+    pub(crate) sensor: Board<A>,
+    pub(crate) steering: Board<B>,
+    pub(crate) bridge_config: BridgeConfig,
+    pub(crate) isolation: Isolation,
 }
 
 impl Robot {
     /// Two version-1 boards and a bridge, all up.
-    pub fn up() -> Self {
+    pub(crate) fn up() -> Self {
         let mut robot = Self::with(SensorBoard::new(), SteeringBoard::new());
         robot.start();
         robot.wait_until_up();
@@ -302,7 +314,7 @@ impl Robot {
     }
 
     /// As [`Robot::up`], in autonomous mode.
-    pub fn autonomous() -> Self {
+    pub(crate) fn autonomous() -> Self {
         let robot = Self::up();
         robot.hands.set_mode(Mode::Autonomous);
         robot
@@ -311,7 +323,7 @@ impl Robot {
 
 impl<A: Peer, B: Peer> Robot<A, B> {
     /// Boards that run, and no bridge yet.
-    pub fn with(sensor: A, steering: B) -> Self {
+    pub(crate) fn with(sensor: A, steering: B) -> Self {
         let isolation = Isolation::new();
         let sensor = Board::plugged(sensor, isolation.folder().join("sensor"));
         let steering = Board::plugged(steering, isolation.folder().join("steering"));
@@ -330,11 +342,11 @@ impl<A: Peer, B: Peer> Robot<A, B> {
         }
     }
 
-    pub fn start(&mut self) {
+    pub(crate) fn start(&mut self) {
         self.bridge = Some(Bridge::start(&self.isolation, self.bridge_config.clone()));
     }
 
-    pub fn wait_until_up(&mut self) -> Health {
+    pub(crate) fn wait_until_up(&mut self) -> Health {
         self.hands.wait_for_health("both boards are up", |health| {
             health.sensor.up == 1 && health.steering.up == 1
         })
@@ -342,7 +354,7 @@ impl<A: Peer, B: Peer> Robot<A, B> {
 }
 
 /// An order of the operator.
-pub fn operator(id: u32, command: Command) -> SteeringOrder {
+pub(crate) fn operator(id: u32, command: Command) -> SteeringOrder {
     SteeringOrder {
         id,
         origin: Origin::Operator.into(),
@@ -353,14 +365,14 @@ pub fn operator(id: u32, command: Command) -> SteeringOrder {
 }
 
 /// An order of the navigator.
-pub fn logic(id: u32, command: Command) -> SteeringOrder {
+pub(crate) fn logic(id: u32, command: Command) -> SteeringOrder {
     SteeringOrder {
         origin: Origin::Logic.into(),
         ..operator(id, command)
     }
 }
 
-pub const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
-pub const FORWARD: Command = Command::Wheel(WheelCommand::ManualForward);
-pub const FOLLOW: Command = Command::Wheel(WheelCommand::ActiveForward);
-pub const LEFT_PERP: Command = Command::Wheel(WheelCommand::LeftPerp);
+pub(crate) const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
+pub(crate) const FORWARD: Command = Command::Wheel(WheelCommand::ManualForward);
+pub(crate) const FOLLOW: Command = Command::Wheel(WheelCommand::ActiveForward);
+pub(crate) const LEFT_PERP: Command = Command::Wheel(WheelCommand::LeftPerp);

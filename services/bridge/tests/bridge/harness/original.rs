@@ -8,16 +8,16 @@ const SYN_PERIOD_US: u32 = 100_000;
 const DATA_PERIOD_US: u32 = 20_000;
 
 /// What both original boards have in common.
-pub struct Original {
+pub(crate) struct Original {
     callsign: u8,
     next_id: u8,
-    pub up: bool,
+    pub(crate) up: bool,
     due_us: u32,
     /// The packet being received.
     packet: [u8; 11],
     received: usize,
     /// ACK packets as they came.
-    pub acks: Vec<[u8; 11]>,
+    pub(crate) acks: Vec<[u8; 11]>,
 }
 
 impl Original {
@@ -76,14 +76,14 @@ impl Original {
 }
 
 /// An original steering board.
-pub struct OriginalSteering {
-    pub board: Original,
+pub(crate) struct OriginalSteering {
+    pub(crate) board: Original,
     /// The codes of all commands, in order.
-    pub commands: Vec<u8>,
+    pub(crate) commands: Vec<u8>,
 }
 
 impl OriginalSteering {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             board: Original::new(3, false),
             commands: Vec::new(),
@@ -91,7 +91,7 @@ impl OriginalSteering {
     }
 
     /// One that had its handshake before the bridge was there.
-    pub fn running() -> Self {
+    pub(crate) fn running() -> Self {
         Self {
             board: Original::new(3, true),
             commands: Vec::new(),
@@ -116,15 +116,15 @@ impl Peer for OriginalSteering {
 }
 
 /// An original sensor board.
-pub struct OriginalSensor {
-    pub board: Original,
-    pub state: u8,
-    pub distance: u8,
+pub(crate) struct OriginalSensor {
+    pub(crate) board: Original,
+    pub(crate) state: u8,
+    pub(crate) distance: u8,
     flip_flop: bool,
 }
 
 impl OriginalSensor {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             board: Original::new(2, false),
             state: 0,

@@ -9,21 +9,26 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// The master end, and the link to the slave end. Dropped it is unplugged.
-pub struct Pty {
+pub(crate) struct Pty {
     master: OwnedFd,
     link: PathBuf,
 }
 
 impl Pty {
     /// A new pseudo terminal, whose slave end is linked at `link`.
-    pub fn new(link: &Path) -> Self {
+    pub(crate) fn new(link: &Path) -> Self {
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let master = openpt(flags).unwrap();
         grantpt(&master).unwrap();
         unlockpt(&master).unwrap();
         fcntl_setfl(&master, OFlags::NONBLOCK).unwrap();
+        // A serial line has no echo, whether its port is open or not.
+        let mut termios = tcgetattr(&master).unwrap();
+        termios.make_raw();
+        tcsetattr(&master, OptionalActions::Now, &termios).unwrap();
         let slave = ptsname(&master, Vec::new()).unwrap();
         let _ = std::fs::remove_file(link);
         symlink(slave.to_str().unwrap(), link).unwrap();
@@ -34,7 +39,7 @@ impl Pty {
     }
 
     /// Opens the slave end as any program would.
-    pub fn slave(&self) -> File {
+    pub(crate) fn slave(&self) -> File {
         File::options()
             .read(true)
             .write(true)
@@ -43,7 +48,7 @@ impl Pty {
     }
 
     /// Waits at most a millisecond for bytes and reads what is there.
-    pub fn read(&self, buffer: &mut [u8]) -> usize {
+    pub(crate) fn read(&self, buffer: &mut [u8]) -> usize {
         let timeout = Timespec {
             tv_sec: 0,
             tv_nsec: 1_000_000,
@@ -64,7 +69,7 @@ impl Pty {
     }
 
     /// Writes as much as fits; how much that was.
-    pub fn write(&self, bytes: &[u8]) -> usize {
+    pub(crate) fn write(&self, bytes: &[u8]) -> usize {
         match rustix::io::write(&self.master, bytes) {
             Ok(count) => count,
             Err(Errno::AGAIN | Errno::IO) => 0,

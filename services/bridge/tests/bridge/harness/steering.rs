@@ -11,20 +11,20 @@ use super::board::{GAP_US, Peer};
 
 const AGE_LIMIT_US: u32 = 150_000;
 
-pub struct SteeringBoard {
-    pub link: BoardLink,
+pub(crate) struct SteeringBoard {
+    pub(crate) link: BoardLink,
     /// The code being executed.
-    pub code: u8,
+    pub(crate) code: u8,
     /// Every command executed, in order, over restarts.
-    pub executed: Vec<u8>,
-    pub gains: [i16; 2],
-    pub restarts: usize,
+    pub(crate) executed: Vec<u8>,
+    pub(crate) gains: [i16; 2],
+    pub(crate) restarts: usize,
     /// How often the link came up.
-    pub ups: usize,
+    pub(crate) ups: usize,
     /// The age limit has struck.
-    pub failsafe: bool,
+    pub(crate) failsafe: bool,
     /// How often a packet with a command came.
-    pub commands: usize,
+    pub(crate) commands: usize,
     reset: ResetCause,
     last_seq: Option<u8>,
     heard_us: u32,
@@ -36,7 +36,7 @@ pub struct SteeringBoard {
 }
 
 impl SteeringBoard {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             link: BoardLink::new(Callsign::Steering, ResetCause::PowerOn, GAP_US),
             code: 0,
@@ -57,7 +57,7 @@ impl SteeringBoard {
         }
     }
 
-    pub fn restart(&mut self, cause: ResetCause) {
+    pub(crate) fn restart(&mut self, cause: ResetCause) {
         *self = Self {
             link: BoardLink::new(Callsign::Steering, cause, GAP_US),
             executed: std::mem::take(&mut self.executed),
@@ -69,12 +69,12 @@ impl SteeringBoard {
     }
 
     /// Whether the wheels turn.
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         self.code > 1 && self.code <= 11
     }
 
     /// How often a command was executed.
-    pub fn count(&self, command: Command) -> usize {
+    pub(crate) fn count(&self, command: Command) -> usize {
         let code = command.code();
         self.executed.iter().filter(|done| **done == code).count()
     }

@@ -1,0 +1,377 @@
+//! The sensor board: its loop, what it tells the Pi, the words to the steering board.
+
+mod support;
+
+use lager_control::SensorConfig;
+use lager_exde::{Receiver, Timing};
+use lager_wire::{
+    Callsign, Centimetres, LineBits, LineState, Payload, ResetCause, SettingKey, SettingReply,
+    SettingStatus, SteerCommand,
+};
+use support::SensorBench;
+
+const MIDDLE: u16 = 0b000_0111_0000;
+
+fn kinds(bench: &SensorBench) -> Vec<u8> {
+    bench
+        .pi
+        .packets
+        .iter()
+        .map(|(_, packet)| packet.payload.kind().code())
+        .collect()
+}
+
+/// What a receiver makes of the wires' changes.
+fn words(log: &[(u32, bool, bool)]) -> Vec<(u32, u16)> {
+    let mut receiver = Receiver::new(Timing::STANDARD);
+    // Its first pulse is the handshake.
+    receiver.on_sync(false, log[0].0.wrapping_sub(1_000_000));
+    let mut words = Vec::new();
+    let mut high = false;
+    for (at, data, sync) in log {
+        if *sync && !high {
+            words.extend(receiver.on_sync(*data, *at).map(|word| (*at, word)));
+        }
+        high = *sync;
+    }
+    assert_eq!(receiver.errors(), 0);
+    words
+}
+
+fn replies(bench: &SensorBench) -> Vec<SettingReply> {
+    let replies = bench.pi.all(|payload| match payload {
+        Payload::SettingReply(reply) => Some(reply),
+        _ => None,
+    });
+    replies.into_iter().map(|(_, reply)| reply).collect()
+}
+
+#[test]
+fn line_and_distance_take_turns_every_5_ms() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.tape(MIDDLE);
+    bench.pins.ir = 267;
+    bench.pins.ir_reads = 0;
+    bench.run_ms(1_000);
+    let lines = bench.pi.all(|payload| match payload {
+        Payload::Line(state) => Some(state),
+        _ => None,
+    });
+    let distances = bench.pi.all(|payload| match payload {
+        Payload::Distance(distance) => Some(distance),
+        _ => None,
+    });
+    assert_eq!((lines.len(), distances.len()), (100, 100));
+    assert!(lines.iter().all(|(_, state)| *state == LineState::OnLine));
+    assert!(
+        distances
+            .iter()
+            .all(|(_, distance)| *distance == Centimetres(20))
+    );
+    assert_eq!(
+        bench.pins.ir_reads, 100,
+        "the ranger is read only when it is told"
+    );
+    let times: Vec<u32> = bench
+        .pi
+        .packets
+        .iter()
+        .filter(|(_, packet)| packet.payload.kind().code() <= 2)
+        .map(|(at, _)| *at)
+        .collect();
+    for pair in times.windows(2) {
+        assert_eq!(pair[1].wrapping_sub(pair[0]), 5_000);
+    }
+}
+
+#[test]
+fn the_steering_board_gets_every_reading_as_a_word() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    let mut sent = Vec::new();
+    for bits in [0b100_0000_0000, 0b000_0000_0001, 0b010_1010_0110, 0, 0x7FF] {
+        bench.tape(bits);
+        for _ in 0..3 {
+            bench.run_ms(5);
+            sent.push(bits);
+        }
+    }
+    bench.run_ms(4);
+    let words = words(&bench.pins.exde_log);
+    let got: Vec<u16> = words.iter().map(|(_, word)| *word).collect();
+    assert_eq!(got[..sent.len()], sent);
+    for pair in words.windows(2) {
+        assert_eq!(pair[1].0.wrapping_sub(pair[0].0), 5_000);
+    }
+}
+
+#[test]
+fn on_a_slow_line_the_loop_waits_until_everything_is_sent() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    // 9600 Bd: 11 bytes are 11.46 ms.
+    bench.pins.uart.byte_us = 1_042;
+    bench.tape(MIDDLE);
+    bench.run_ms(100);
+    bench.pi.packets.clear();
+    bench.pins.exde_log.clear();
+    bench.run_ms(2_000);
+    let packets = bench.pi.packets.len();
+    assert!((165..=175).contains(&packets), "{packets}");
+    let words = words(&bench.pins.exde_log).len();
+    assert!((160..=175).contains(&words), "one word a pass: {words}");
+}
+
+#[test]
+fn neither_handshake_waits_for_the_other() {
+    let mut bench = SensorBench::boot(0, SensorConfig::default());
+    bench.run_ms(100);
+    assert!(
+        bench.pi.packets.len() > 10,
+        "the Pi is served without the steering board"
+    );
+    assert!(
+        bench.pins.exde_log.iter().all(|(_, data, _)| !data),
+        "no data before its answer"
+    );
+
+    let mut bench = SensorBench::boot(0, SensorConfig::default());
+    bench.pi.answers = false;
+    bench.tape(MIDDLE);
+    bench.run_ms(10);
+    bench.pins.returned = true;
+    bench.step();
+    bench.run_ms(30);
+    bench.pins.exde_log.clear();
+    bench.run_ms(100);
+    assert!(bench.pi.packets.is_empty());
+    assert!(
+        words(&bench.pins.exde_log).len() >= 19,
+        "the steering board without the Pi"
+    );
+}
+
+#[test]
+fn it_says_who_it_is_and_why_it_started() {
+    let mut bench = SensorBench::boot(0, SensorConfig::default());
+    bench.pi.answers = false;
+    bench.run_ms(350);
+    assert_eq!(bench.pi.syns.len(), 4);
+    for (_, packet) in &bench.pi.syns {
+        let Payload::Handshake(handshake) = packet.payload else {
+            panic!("{packet:?}")
+        };
+        assert_eq!(
+            (handshake.sign, handshake.reset),
+            (Callsign::Sensor, ResetCause::Watchdog)
+        );
+    }
+    bench.pi.answers = true;
+    bench.run_ms(200);
+    let Payload::BoardStatus(status) = bench.pi.packets[1].1.payload else {
+        panic!("{:?}", bench.pi.packets[1])
+    };
+    assert_eq!(status.reset, ResetCause::Watchdog);
+    for (index, (_, packet)) in bench.pi.packets.iter().enumerate() {
+        assert_eq!(
+            usize::from(packet.id.get()),
+            index % 16,
+            "no number is left out"
+        );
+    }
+}
+
+#[test]
+fn status_comes_twice_a_second_and_knows_the_longest_pass() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.run_ms(5_000);
+    let status = bench.pi.all(|payload| match payload {
+        Payload::BoardStatus(status) => Some(status),
+        _ => None,
+    });
+    assert_eq!(status.len(), 10);
+    assert_eq!(status.last().unwrap().1.longest_loop_100us, 50);
+}
+
+#[test]
+fn raw_line_packets_come_when_asked_for() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.tape(0b110_0000_0001);
+    bench.run_ms(100);
+    assert!(!kinds(&bench).contains(&3));
+    bench.set(SettingKey::RawLine, 4, 1);
+    bench.run_ms(20);
+    bench.pi.packets.clear();
+    bench.run_ms(100);
+    let raw = bench.pi.all(|payload| match payload {
+        Payload::RawLine(bits) => Some(bits),
+        _ => None,
+    });
+    assert_eq!(raw.len(), 10);
+    assert!(
+        raw.iter()
+            .all(|(_, bits)| *bits == LineBits(0b110_0000_0001))
+    );
+    let kinds = kinds(&bench);
+    for (index, kind) in kinds.iter().enumerate() {
+        if *kind == 3 {
+            assert_eq!(kinds[index + 1], 1, "the class follows its bits");
+        }
+    }
+    bench.set(SettingKey::RawLine, 5, 0);
+    bench.run_ms(20);
+    bench.pi.packets.clear();
+    bench.run_ms(100);
+    assert!(!self::kinds(&bench).contains(&3));
+}
+
+#[test]
+fn settings_are_answered_in_range_out_of_range_and_not_here() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    for (seq, (key, value, now, status)) in [
+        (SettingKey::RawLine, 1, 1, SettingStatus::Accepted),
+        (SettingKey::RawLine, 2, 1, SettingStatus::OutOfRange),
+        (SettingKey::RawLine, -1, 1, SettingStatus::OutOfRange),
+        (SettingKey::RawLine, 0, 0, SettingStatus::Accepted),
+        (SettingKey::GainP, 3, 0, SettingStatus::NotHere),
+        (SettingKey::GainD, 3, 0, SettingStatus::NotHere),
+        (SettingKey::Calibrate, 7, 0, SettingStatus::OutOfRange),
+        (SettingKey::Calibrate, 1, 1, SettingStatus::Accepted),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let seq = seq as u8;
+        bench.set(key, seq, value);
+        bench.run_ms(20);
+        let expected = SettingReply {
+            key,
+            seq,
+            value: now,
+            status,
+        };
+        assert_eq!(replies(&bench).last(), Some(&expected));
+    }
+}
+
+#[test]
+fn settings_sent_together_are_all_answered() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    for seq in 0..4 {
+        bench.set(SettingKey::RawLine, seq, i16::from(seq % 2));
+    }
+    bench.run_ms(50);
+    let seqs: Vec<u8> = replies(&bench).iter().map(|reply| reply.seq).collect();
+    assert_eq!(seqs, [0, 1, 2, 3]);
+}
+
+#[test]
+fn a_calibration_finds_the_thresholds_of_another_floor() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    // A darker room: tape reads 110, floor 30. With the built-in thresholds nothing is tape.
+    let dim = |bench: &mut SensorBench, bits: u16| {
+        bench.tape(bits);
+        for reading in &mut bench.pins.line {
+            *reading = if *reading > 100 { 110 } else { 30 };
+        }
+    };
+    dim(&mut bench, MIDDLE);
+    bench.run_ms(50);
+    let last_line = |bench: &SensorBench| {
+        let lines = bench.pi.all(|payload| match payload {
+            Payload::Line(state) => Some(state),
+            _ => None,
+        });
+        lines.last().unwrap().1
+    };
+    assert_eq!(last_line(&bench), LineState::NotOnLine);
+    bench.set(SettingKey::Calibrate, 9, 1);
+    for bits in [0x7FF, 0, MIDDLE] {
+        dim(&mut bench, bits);
+        bench.run_ms(1_800);
+    }
+    assert_eq!(last_line(&bench), LineState::OnLine);
+    let replies = replies(&bench);
+    assert_eq!(replies.len(), 2);
+    let finished = SettingReply {
+        key: SettingKey::Calibrate,
+        seq: 9,
+        value: 11,
+        status: SettingStatus::Accepted,
+    };
+    assert_eq!(replies[1], finished);
+}
+
+#[test]
+fn a_calibration_that_saw_nothing_says_so_and_changes_nothing() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.tape(MIDDLE);
+    bench.set(SettingKey::Calibrate, 3, 1);
+    bench.run_ms(5_100);
+    let last = *replies(&bench).last().unwrap();
+    assert_eq!((last.value, last.status), (0, SettingStatus::OutOfRange));
+    bench.pi.packets.clear();
+    bench.run_ms(20);
+    let lines = bench.pi.all(|payload| match payload {
+        Payload::Line(state) => Some(state),
+        _ => None,
+    });
+    assert_eq!(lines.last().unwrap().1, LineState::OnLine);
+}
+
+#[test]
+fn a_command_on_the_wrong_board_is_refused_and_counted() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    for seq in 0..3 {
+        bench.send(Payload::SteerCommand(SteerCommand { code: 2, seq }));
+    }
+    bench.run_ms(1_000);
+    let status = bench.pi.all(|payload| match payload {
+        Payload::BoardStatus(status) => Some(status),
+        _ => None,
+    });
+    assert_eq!(status.last().unwrap().1.refused, 3);
+}
+
+#[test]
+fn a_step_more_or_less_changes_nothing() {
+    let run = |extra: bool| {
+        let mut bench = SensorBench::ready(SensorConfig::default());
+        for round in 0..100 {
+            bench.tape(0x7FF >> (round % 11));
+            bench.run_ms(5);
+            if extra {
+                bench.step();
+                bench.step();
+            }
+        }
+        (bench.pins.exde_log, bench.pi.packets)
+    };
+    assert_eq!(run(false), run(true));
+}
+
+#[test]
+fn a_late_step_stretches_a_word_and_keeps_it() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.tape(0b101_1001_0111);
+    // The board is stepped every 90 us only, whatever it asks for.
+    for _ in 0..600 {
+        bench.pins.now_us = bench.pins.now_us.wrapping_add(90);
+        bench.step();
+    }
+    let words = words(&bench.pins.exde_log);
+    assert!(words.len() >= 7, "{}", words.len());
+    assert!(words[1..].iter().all(|(_, word)| *word == 0b101_1001_0111));
+}
+
+#[test]
+fn the_watchdog_is_kicked_well_inside_its_time() {
+    let mut bench = SensorBench::boot(0, SensorConfig::default());
+    bench.pi.answers = false;
+    let mut longest = 0;
+    for _ in 0..2_000 {
+        let due = bench.unit.step(&mut bench.pins);
+        longest = longest.max(due.wrapping_sub(bench.pins.now_us));
+        bench.pins.now_us = bench.pins.now_us.max(due).wrapping_add(1);
+    }
+    assert!(longest <= 20_000, "{longest}");
+    assert_eq!(bench.pins.kicks, 2_000);
+}

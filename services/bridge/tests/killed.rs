@@ -1,0 +1,178 @@
+//! The bridge killed with SIGKILL again and again while the robot turns and drives: every turn is
+//! carried out once, and the robot halts by itself meanwhile.
+//!
+//! It is a program without the test harness because it starts itself again as the bridge: only a
+//! process can be killed like a process.
+
+#[path = "bridge/harness/mod.rs"]
+mod harness;
+
+use std::process::{Child, Command as Process};
+use std::time::{Duration, Instant};
+
+use lager_bridge::BridgeConfig;
+use lager_ports::{Bus, Keeper, Shutdown};
+use lager_topics::{Finish, LinkHealth, Mode, Role, SteeringOrder};
+
+use harness::{
+    Board, FOLLOW, Hands, Isolation, LEFT_PERP, PATIENCE, SensorBoard, SteeringBoard, logic,
+    wait_until,
+};
+
+const AS_BRIDGE: &str = "as-bridge";
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    match arguments.get(1).map(String::as_str) {
+        Some(AS_BRIDGE) => be_the_bridge(&arguments[2]),
+        Some("--list") => (),
+        _ => {
+            a_turn_is_carried_out_once_however_often_the_bridge_is_killed();
+            println!("test a_turn_is_carried_out_once_however_often_the_bridge_is_killed ... ok");
+        }
+    }
+}
+
+fn be_the_bridge(name: &str) {
+    let config = harness::bus_config(name);
+    let folder = config.root.clone().expect("an isolated bus has a root");
+    let bus = Bus::open(&config, Role::Bridge).unwrap();
+    let config = BridgeConfig {
+        ports: [folder.join("sensor"), folder.join("steering")],
+        resume: true,
+        ..BridgeConfig::default()
+    };
+    lager_bridge::run(&bus, &config, &Shutdown::new()).unwrap();
+}
+
+/// The bridge as a process that does not outlive the test.
+struct Running(Child);
+
+impl Running {
+    fn start(isolation: &Isolation) -> Self {
+        let program = std::env::current_exe().unwrap();
+        Self(
+            Process::new(program)
+                .args([AS_BRIDGE, isolation.name()])
+                .spawn()
+                .unwrap(),
+        )
+    }
+
+    fn kill(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+struct Scene {
+    bridge: Running,
+    keeper: Keeper<LinkHealth>,
+    supervisor: Bus,
+    hands: Hands,
+    steering: Board<SteeringBoard>,
+    _sensor: Board<SensorBoard>,
+    isolation: Isolation,
+}
+
+impl Scene {
+    fn new() -> Self {
+        let isolation = Isolation::new();
+        let sensor = Board::plugged(SensorBoard::new(), isolation.folder().join("sensor"));
+        let steering = Board::plugged(SteeringBoard::new(), isolation.folder().join("steering"));
+        let supervisor = isolation.open(Role::Supervisor);
+        Self {
+            bridge: Running::start(&isolation),
+            keeper: supervisor.keeper().unwrap(),
+            hands: Hands::new(&isolation.open(Role::Operator)),
+            supervisor,
+            steering,
+            _sensor: sensor,
+            isolation,
+        }
+    }
+
+    /// What a supervisor does when its bridge has died.
+    fn restart(&mut self) {
+        self.bridge.kill();
+        self.keeper.remember().unwrap();
+        self.supervisor.sweep();
+        self.keeper.hand_over().unwrap();
+        self.bridge = Running::start(&self.isolation);
+    }
+
+    /// Renews `order` until `condition` holds, and does the supervisor's work beside it.
+    fn renew_until(
+        &mut self,
+        order: SteeringOrder,
+        what: &str,
+        mut condition: impl FnMut(&mut Self) -> bool,
+    ) {
+        let start = Instant::now();
+        let mut renewed = None::<Instant>;
+        while !condition(self) {
+            assert!(start.elapsed() < PATIENCE, "waited in vain until {what}");
+            if renewed.is_none_or(|at| at.elapsed() >= Duration::from_millis(40)) {
+                renewed = Some(Instant::now());
+                self.hands.give(order);
+            }
+            self.keeper.remember().unwrap();
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn turns(&self) -> usize {
+        self.steering.with(|board| board.count(LEFT_PERP))
+    }
+}
+
+fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
+    let mut scene = Scene::new();
+    scene.hands.wait_for_health("both boards are up", |health| {
+        health.sensor.up == 1 && health.steering.up == 1
+    });
+    scene.hands.set_mode(Mode::Autonomous);
+    let mut finishes = [0, 0];
+    for round in 1..=6_u32 {
+        // A turn takes 300 ms: the bridge dies before, in the middle and after it.
+        let turn = logic(round * 10, LEFT_PERP);
+        let delay = Duration::from_millis(u64::from(round - 1) * 70);
+        let start = Instant::now();
+        scene.renew_until(turn, "it is time to die", |scene| {
+            scene.turns() == round as usize && start.elapsed() >= delay
+        });
+        scene.restart();
+        wait_until("the robot stands, at the latest by the board's own limit", || {
+            let stands = scene.steering.with(|board| !board.moves());
+            scene.keeper.remember().unwrap();
+            stands
+        });
+        let mut finish = Finish::None;
+        scene.renew_until(turn, "the end of the turn is told", |scene| {
+            for state in scene.hands.state.drain() {
+                if state.finished_id == turn.id {
+                    finish = state.finish.get().unwrap();
+                }
+            }
+            finish != Finish::None
+        });
+        assert_eq!(scene.turns(), round as usize, "the turn was carried out once");
+        finishes[usize::from(finish == Finish::Done)] += 1;
+
+        // The restarted bridge drives, and kept the mode.
+        let drive = logic(round * 10 + 1, FOLLOW);
+        scene.renew_until(drive, "it drives", |scene| {
+            scene.steering.with(|board| board.moves())
+        });
+        let health = scene.hands.health.look().unwrap();
+        assert_eq!(health.mode.get(), Some(Mode::Autonomous));
+    }
+    assert!(finishes[0] > 0, "some turns were cut short by the board's limit");
+    assert_eq!(scene.steering.with(|board| board.restarts), 0);
+}

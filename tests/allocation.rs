@@ -1,0 +1,166 @@
+//! Bridge and logic allocate nothing per frame once they run: a counting allocator watches the
+//! whole of both services, threads included, while the robot drives.
+//!
+//! The robot itself runs in a process of its own, so that only the two services and this test's
+//! sleeping thread are counted.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use lager_bridge::BridgeConfig;
+use lager_logic::LogicConfig;
+use lager_plant::Warehouse;
+use lager_ports::{Bus, Shutdown};
+use lager_tests::{Domain, wait_for};
+use lager_topics::{
+    Ask, AskKind, BridgeRequest, LinkHealth, MapProduct, MissionOrder, Mode, NavMap, NavStatus,
+    Order, Phase, Role, SensorLine, Side, SteeringState, WarehouseMap,
+};
+
+/// The system's allocator, which counts.
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call goes unchanged to the system's allocator; only a counter is added.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `alloc`, which is the system's too.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `System` by `alloc` above, with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: `pointer` came from `System` by `alloc` above, with this layout.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+#[test]
+fn bridge_and_logic_allocate_nothing_per_frame() {
+    let domain = Domain::new();
+    let folder = domain.folder();
+    let ports = [folder.join("sensor.tty"), folder.join("steering.tty")];
+    let config = folder.join("robot.toml");
+    std::fs::write(
+        &config,
+        format!(
+            "[serial]\nsensor = {:?}\nsteering = {:?}\n",
+            ports[0], ports[1]
+        ),
+    )
+    .expect("a configuration file");
+    let config = config.to_str().expect("a path in UTF-8");
+    let robot = domain.start(&["--config", config, "simulator"]);
+
+    let bus = |role| Bus::open(&domain.bus("r1", 1.0), role).expect("the bus opens");
+    let shutdown = Shutdown::new();
+    let operator = bus(Role::Operator);
+    let map = operator.publisher::<NavMap>().expect("a topic");
+    map.send(0, small_map()).expect("sent");
+    let orders = operator.publisher::<MissionOrder>().expect("a topic");
+    let client = operator.client::<BridgeRequest>().expect("a request");
+    let mut health = operator.subscriber::<LinkHealth>().expect("a topic");
+    let mut status = operator.subscriber::<NavStatus>().expect("a topic");
+
+    std::thread::scope(|scope| {
+        let bridge_config = BridgeConfig {
+            ports: ports.clone(),
+            ..BridgeConfig::default()
+        };
+        let (shutdown, bus) = (&shutdown, &bus);
+        scope.spawn(move || {
+            lager_bridge::run(&bus(Role::Bridge), &bridge_config, shutdown).expect("the bridge");
+        });
+        scope.spawn(move || {
+            lager_logic::run(&bus(Role::Logic), &LogicConfig::default(), shutdown)
+                .expect("logic");
+        });
+        // Whatever fails below, the services must end, or the scope never does.
+        let _end = EndAtLast(shutdown);
+
+        wait_for("the boards", || {
+            map.tick();
+            health
+                .latest()
+                .expect("readable")
+                .filter(|health| health.sensor.up != 0 && health.steering.up != 0)
+                .map(|_| ())
+        });
+        let ask = Ask {
+            kind: AskKind::SetMode.into(),
+            mode: Mode::Autonomous.into(),
+            ..Ask::default()
+        };
+        client.call(ask, Duration::from_secs(5)).expect("an answer");
+        orders.send(0, Order { id: 1, product: 1 }).expect("sent");
+        wait_for("the robot to drive", || {
+            status
+                .latest()
+                .expect("readable")
+                .filter(|status| status.phase.get() == Some(Phase::Driving))
+                .map(|_| ())
+        });
+        // The first frames may still fill caches below: let a second pass.
+        std::thread::sleep(Duration::from_secs(1));
+
+        let mut line = operator.subscriber::<SensorLine>().expect("a topic");
+        let mut state = operator.subscriber::<SteeringState>().expect("a topic");
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        // From driving over the next crossing to the station: decisions are made, not only frames
+        // passed on.
+        std::thread::sleep(Duration::from_secs(6));
+        let after = ALLOCATIONS.load(Ordering::Relaxed);
+        line.latest().expect("readable");
+        state.latest().expect("readable");
+        let frames = line.received() + line.lost() + state.received() + state.lost();
+        assert!(frames > 1_000, "{frames} frames in 6 s");
+        assert_eq!(after - before, 0, "allocations over {frames} frames");
+    });
+    drop((robot, map, orders, client, health, status, operator));
+    domain.assert_clean();
+}
+
+/// Requests the shutdown when it goes out of scope.
+struct EndAtLast<'a>(&'a Shutdown);
+
+impl Drop for EndAtLast<'_> {
+    fn drop(&mut self) {
+        self.0.request();
+    }
+}
+
+/// The built-in small warehouse as the bus carries it.
+fn small_map() -> WarehouseMap {
+    let warehouse = Warehouse::builtin("small").expect("built in");
+    let mut map = WarehouseMap {
+        width: warehouse.size[0],
+        height: warehouse.size[1],
+        delivery_x: warehouse.delivery[0],
+        delivery_y: warehouse.delivery[1],
+        side_length_cm: warehouse.side_length_cm,
+        ..WarehouseMap::default()
+    };
+    for (slot, (id, square, side)) in map.products.iter_mut().zip(warehouse.map_products()) {
+        *slot = MapProduct {
+            id,
+            x: square[0],
+            y: square[1],
+            side: [Side::Left, Side::Up, Side::Right, Side::Down][side as usize].into(),
+            ..MapProduct::default()
+        };
+        map.product_count += 1;
+    }
+    map
+}
