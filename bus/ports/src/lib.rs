@@ -33,9 +33,6 @@
 //! **Invariant:** no type of iceoryx2 is in the public interface; nothing here decides anything
 //! about the robot; sending and receiving do not allocate after start-up.
 
-/// The transport below, whose versions do not mix on one machine.
-pub const TRANSPORT: &str = "iceoryx2 0.10.0";
-
 mod bus;
 mod clock;
 mod config;

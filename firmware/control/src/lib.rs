@@ -30,7 +30,7 @@ mod load;
 mod outbox;
 pub mod pd;
 pub mod register;
-mod report;
+mod replies;
 mod sensor;
 mod servo_bus;
 mod steering;

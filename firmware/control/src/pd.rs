@@ -71,18 +71,13 @@ impl Pd {
         self.gains = gains;
     }
 
-    /// Forgets the past, as when following begins.
-    pub fn reset(&mut self) {
-        self.count = 0;
-    }
-
     /// Takes in the error at `now_us` and gives the correction `u` in duty steps.
     ///
     /// `error` is in half sensor steps, positive = the line is to the right.
     pub fn update(&mut self, error: i8, now_us: u32) -> i16 {
         let since_us = now_us.wrapping_sub(self.samples[0].at_us);
         if since_us > STALE_US {
-            self.reset();
+            self.count = 0;
         }
         let p = i16::from(self.gains.p) * i16::from(error);
         let d = self.derivative(error, now_us);

@@ -12,7 +12,6 @@
 //! The two handshakes do not wait for each other: without the steering board the Pi is served, without the
 //! Pi the steering board is. Packets leave by interrupt, ExDe edge by edge with the steps (S4).
 
-use heapless::Deque;
 use lager_exde::{Pins, Timing, Transmitter};
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
@@ -24,6 +23,7 @@ use crate::calibration::{CHANNELS, Calibration};
 use crate::ir::IrModel;
 use crate::line::LineReader;
 use crate::load::Load;
+use crate::replies::Replies;
 use crate::time::{first, reached};
 use crate::{Board, PACKET_GAP_US, SensorBoard, UART_POLL_US, outbox::Outbox};
 
@@ -77,7 +77,7 @@ pub struct SensorUnit {
     reset: ResetCause,
     link: BoardLink,
     outbox: Outbox,
-    replies: Deque<SettingReply, 4>,
+    replies: Replies,
     refused: u8,
     transmitter: Transmitter,
     pins: Pins,
@@ -102,7 +102,7 @@ impl SensorUnit {
             reset,
             link: BoardLink::new(Callsign::Sensor, reset, config.gap_us),
             outbox: Outbox::new(),
-            replies: Deque::new(),
+            replies: Replies::new(),
             refused: 0,
             transmitter: Transmitter::new(config.exde, now_us),
             pins: Pins::default(),
@@ -145,7 +145,7 @@ impl SensorUnit {
                 Some(BoardEvent::Packet(packet)) => match packet.payload {
                     Payload::Setting(setting) => {
                         let reply = self.set(setting, now_us);
-                        self.answer(reply);
+                        self.replies.push(reply);
                     }
                     _ => self.refused = self.refused.saturating_add(1),
                 },
@@ -177,15 +177,6 @@ impl SensorUnit {
             value,
             status,
         }
-    }
-
-    /// The latest answers matter: an older one gives way.
-    fn answer(&mut self, reply: SettingReply) {
-        if self.replies.is_full() {
-            self.replies.pop_front();
-        }
-        let stored = self.replies.push_back(reply).is_ok();
-        debug_assert!(stored, "room was made");
     }
 
     fn ask_for_pi<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
@@ -270,7 +261,7 @@ impl SensorUnit {
             return;
         };
         let complete = usize::from(calibrated.channels) == CHANNELS;
-        self.answer(SettingReply {
+        self.replies.push(SettingReply {
             key: SettingKey::Calibrate,
             seq: calibrated.seq,
             value: i16::from(calibrated.channels),
@@ -286,7 +277,7 @@ impl SensorUnit {
         if !self.link.is_up() {
             return;
         }
-        if let Some(reply) = self.replies.pop_front() {
+        if let Some(reply) = self.replies.pop() {
             self.send(Payload::SettingReply(reply));
         }
         if reached(now_us, self.status_due_us) {

@@ -158,6 +158,10 @@ impl ServoBus {
         let question = self.question.as_mut()?;
         if !question.sent {
             question.sent = board.servo_write(question.frame.as_bytes());
+            if question.sent {
+                // The servo has its whole time, counted from when it was asked.
+                question.due_us = now_us.wrapping_add(self.reply_timeout_us);
+            }
         }
         if !reached(now_us, question.due_us) {
             return None;

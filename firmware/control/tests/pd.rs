@@ -77,7 +77,7 @@ fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
     let mut pd = Pd::new(Gains { p: 0, d: 2 });
     pd.update(0, 0);
     assert_eq!(pd.update(1, 11_500), 2);
-    pd.reset();
+    let mut pd = Pd::new(Gains { p: 0, d: 2 });
     pd.update(0, 0);
     assert_eq!(pd.update(-1, 11_500), -2);
 }

@@ -113,11 +113,20 @@ fn on_a_slow_line_the_loop_waits_until_everything_is_sent() {
     bench.run_ms(100);
     bench.pi.packets.clear();
     bench.pins.exde_log.clear();
+    bench.pins.uart.backlog.clear();
     bench.run_ms(2_000);
     let packets = bench.pi.packets.len();
     assert!((165..=175).contains(&packets), "{packets}");
     let words = words(&bench.pins.exde_log).len();
     assert!((160..=175).contains(&words), "one word a pass: {words}");
+    let mut pass_us = None;
+    for (at_us, busy_us) in &bench.pins.uart.backlog {
+        assert!(
+            *busy_us == 0 || pass_us == Some(*at_us),
+            "S10: {busy_us} us left"
+        );
+        pass_us = Some(*at_us);
+    }
 }
 
 #[test]

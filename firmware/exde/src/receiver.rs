@@ -134,7 +134,7 @@ impl Receiver {
         let silent = reached(now_us, self.last_us.wrapping_add(self.timing.idle_us));
         match self.alignment {
             Alignment::Unaligned | Alignment::Complete if silent => {
-                self.alignment = Alignment::Aligned
+                self.alignment = Alignment::Aligned;
             }
             Alignment::Aligned if silent && self.count > 0 => {
                 if self.count == 1 {

@@ -69,9 +69,7 @@ impl Boards {
         *at = Some(place);
         *health = BoardHealth {
             epoch: board.link_epoch,
-            reboots: health
-                .reboots
-                .wrapping_add(u32::from(board.up.rebooted)),
+            reboots: health.reboots.wrapping_add(u32::from(board.up.rebooted)),
             baud,
             up: 1,
             version: match board.up.version {

@@ -148,11 +148,14 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
             scene.turns() == round as usize && start.elapsed() >= delay
         });
         scene.restart();
-        wait_until("the robot stands, at the latest by the board's own limit", || {
-            let stands = scene.steering.with(|board| !board.moves());
-            scene.keeper.remember().unwrap();
-            stands
-        });
+        wait_until(
+            "the robot stands, at the latest by the board's own limit",
+            || {
+                let stands = scene.steering.with(|board| !board.moves());
+                scene.keeper.remember().unwrap();
+                stands
+            },
+        );
         let mut finish = Finish::None;
         scene.renew_until(turn, "the end of the turn is told", |scene| {
             for state in scene.hands.state.drain() {
@@ -162,7 +165,11 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
             }
             finish != Finish::None
         });
-        assert_eq!(scene.turns(), round as usize, "the turn was carried out once");
+        assert_eq!(
+            scene.turns(),
+            round as usize,
+            "the turn was carried out once"
+        );
         finishes[usize::from(finish == Finish::Done)] += 1;
 
         // The restarted bridge drives, and kept the mode.
@@ -173,6 +180,9 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
         let health = scene.hands.health.look().unwrap();
         assert_eq!(health.mode.get(), Some(Mode::Autonomous));
     }
-    assert!(finishes[0] > 0, "some turns were cut short by the board's limit");
+    assert!(
+        finishes[0] > 0,
+        "some turns were cut short by the board's limit"
+    );
     assert_eq!(scene.steering.with(|board| board.restarts), 0);
 }

@@ -67,7 +67,7 @@ fn versions() -> Finding {
     Good(format!(
         "lager {}, {}, Linux {}",
         env!("CARGO_PKG_VERSION"),
-        lager_ports::TRANSPORT,
+        lager_ports::BUS_VERSION,
         kernel.release().to_string_lossy()
     ))
 }

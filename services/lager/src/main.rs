@@ -88,7 +88,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
                     resume,
                     ..config.navigator()
                 };
-                let _ = (bus, logic); Ok(()) //TEMP
+                Ok(lager_logic::run(bus, &logic, &shutdown)?)
             })?;
             return Ok(ExitCode::SUCCESS);
         }
@@ -180,16 +180,18 @@ fn topic(config: &Config, args: TopicArgs, shutdown: &Shutdown) -> Result<()> {
     let bus = Bus::open(&config.bus()?, Role::Observer)?;
     let out = &mut std::io::BufWriter::new(std::io::stdout().lock());
     let json = args.json;
-    match args.command {
-        TopicCommand::List => lager_monitor::list(&bus, json, out)?,
-        TopicCommand::Info { topic } => lager_monitor::info(&bus, &topic, json, out)?,
+    let shown = match args.command {
+        TopicCommand::List => lager_monitor::list(&bus, json, out),
+        TopicCommand::Info { topic } => lager_monitor::info(&bus, &topic, json, out),
         TopicCommand::Echo { topic, count } => {
-            lager_monitor::echo(&bus, &topic, count, json, shutdown, out)?;
+            lager_monitor::echo(&bus, &topic, count, json, shutdown, out)
         }
         TopicCommand::Hz { topic, count } => {
-            lager_monitor::hz(&bus, &topic, count, json, shutdown, out)?;
+            lager_monitor::hz(&bus, &topic, count, json, shutdown, out)
         }
+    };
+    match shown.and_then(|()| Ok(out.flush()?)) {
+        Err(error) if error.is_closed_output() => Ok(()),
+        shown => Ok(shown?),
     }
-    out.flush()?;
-    Ok(())
 }

@@ -46,7 +46,7 @@ pub struct Narrator {
     truth: Subscriber<TruthPose>,
     seen: Seen,
     goods: Vec<(i32, GoodState)>,
-    said: String,
+    doing: String,
     now: Duration,
     to_stderr: bool,
 }
@@ -66,7 +66,7 @@ impl Narrator {
             truth: bus.subscriber()?,
             seen: Seen::default(),
             goods: Vec::new(),
-            said: String::new(),
+            doing: String::new(),
             now: Duration::ZERO,
             to_stderr,
         })
@@ -92,7 +92,8 @@ impl Narrator {
             self.tell_event(&event);
         }
         while let Some(thought) = self.thought.receive()?.map(|thought| *thought) {
-            self.say(&format!("{}: {}", thought.from, thought.text));
+            let from = thought.from.to_string().to_lowercase();
+            self.note(&format!("{from}: \"{}\"", thought.text));
         }
         if let Some(truth) = self.truth.latest()? {
             let goods: Vec<_> = truth
@@ -142,12 +143,6 @@ impl Narrator {
         };
     }
 
-    fn say(&mut self, line: &str) {
-        if self.said != line {
-            self.note(line);
-            line.clone_into(&mut self.said);
-        }
-    }
 }
 
 impl Narrator {
@@ -185,7 +180,8 @@ impl Narrator {
 
     /// Tells what logic is doing, when it does something else than before.
     fn tell_status(&mut self, status: &NavigatorStatus) {
-        let place = format!("({},{}) heading {}", status.x, status.y, status.heading);
+        let heading = status.heading.to_string().to_lowercase();
+        let place = format!("({},{}) heading {heading}", status.x, status.y);
         let line = match status.phase.get() {
             Some(Phase::WaitingForMap) => "waits for the map".into(),
             Some(Phase::WaitingForOrder) => format!("waits for an order at {place}"),
@@ -206,7 +202,10 @@ impl Narrator {
             Some(Phase::Stuck) => format!("is STUCK at {place}"),
             None => return,
         };
-        self.say(&line);
+        if self.doing != line {
+            self.note(&line);
+            self.doing = line;
+        }
     }
 
     fn tell_event(&mut self, event: &Event) {

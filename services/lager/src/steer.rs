@@ -258,8 +258,8 @@ fn parse(
     }
     let names: Vec<_> = OperatorCommand::ALL
         .into_iter()
+        .filter(|command| by_name(command.name()) == Some(*command))
         .map(OperatorCommand::name)
-        .filter(|name| by_name(name).is_some())
         .collect();
     let code = parse_code(text)
         .with_context(|| format!("`{text}` is no command; the names are {}", names.join(", ")))?;

@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use lager_ports::Policy;
+
 /// What logic has to know of the robot and how much it forgives. Times are robot time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogicConfig {
@@ -17,6 +19,8 @@ pub struct LogicConfig {
     pub coast_mm: f32,
     /// Part of an edge by which dead reckoning may be wrong when a mark is judged.
     pub tolerance: f32,
+    /// The same for a mark that a killed navigator had only begun to see.
+    pub tolerance_cut_short: f32,
     /// Part of an edge after which a node that did not come is missing (AMB-49).
     pub overdue: f32,
     /// How far before a node the sensors must be at the start of a drive for its mark to be
@@ -47,6 +51,8 @@ pub struct LogicConfig {
     pub tries: u8,
     /// How often the pick station may be passed without being found.
     pub misses: u8,
+    /// How [`crate::run`] waits for samples.
+    pub waiting: Policy,
     /// Whether [`crate::run`] takes up the state of its predecessor.
     pub resume: bool,
 }
@@ -60,6 +66,7 @@ impl Default for LogicConfig {
             tape_mm: 15.0,
             coast_mm: 5.0,
             tolerance: 0.25,
+            tolerance_cut_short: 0.1,
             overdue: 1.3,
             run_up_mm: 60.0,
             line_lost_mm: 80.0,
@@ -73,6 +80,7 @@ impl Default for LogicConfig {
             outage: Duration::from_millis(125),
             tries: 8,
             misses: 3,
+            waiting: Policy::Block,
             resume: false,
         }
     }

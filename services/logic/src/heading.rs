@@ -92,10 +92,34 @@ mod tests {
     fn headings_and_turns_agree_with_the_plane() {
         // heading, to its left, to its right, behind it, one step from (4, 4)
         let table = [
-            (Heading::Left, Heading::Down, Heading::Up, Heading::Right, (3, 4)),
-            (Heading::Up, Heading::Left, Heading::Right, Heading::Down, (4, 5)),
-            (Heading::Right, Heading::Up, Heading::Down, Heading::Left, (5, 4)),
-            (Heading::Down, Heading::Right, Heading::Left, Heading::Up, (4, 3)),
+            (
+                Heading::Left,
+                Heading::Down,
+                Heading::Up,
+                Heading::Right,
+                (3, 4),
+            ),
+            (
+                Heading::Up,
+                Heading::Left,
+                Heading::Right,
+                Heading::Down,
+                (4, 5),
+            ),
+            (
+                Heading::Right,
+                Heading::Up,
+                Heading::Down,
+                Heading::Left,
+                (5, 4),
+            ),
+            (
+                Heading::Down,
+                Heading::Right,
+                Heading::Left,
+                Heading::Up,
+                (4, 3),
+            ),
         ];
         for (heading, left, right, back, (x, y)) in table {
             assert_eq!(heading.left(), left);

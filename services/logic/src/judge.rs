@@ -94,9 +94,27 @@ mod tests {
 
     #[test]
     fn a_mark_on_the_wrong_side_is_nobodys() {
-        check(Sides::LEFT, Sides::LEFT, Sides::RIGHT, 200.0, Verdict::Unexpected);
-        check(Sides::NONE, Sides::BOTH, Sides::LEFT, 200.0, Verdict::Unexpected);
-        check(Sides::NONE, Sides::LEFT, Sides::RIGHT, 400.0, Verdict::Unexpected);
+        check(
+            Sides::LEFT,
+            Sides::LEFT,
+            Sides::RIGHT,
+            200.0,
+            Verdict::Unexpected,
+        );
+        check(
+            Sides::NONE,
+            Sides::BOTH,
+            Sides::LEFT,
+            200.0,
+            Verdict::Unexpected,
+        );
+        check(
+            Sides::NONE,
+            Sides::LEFT,
+            Sides::RIGHT,
+            400.0,
+            Verdict::Unexpected,
+        );
     }
 
     #[test]
@@ -108,7 +126,13 @@ mod tests {
     #[test]
     fn a_full_crossing_that_comes_early_is_the_node() {
         check(Sides::LEFT, Sides::BOTH, Sides::BOTH, 250.0, Verdict::Node);
-        check(Sides::LEFT, Sides::BOTH, Sides::BOTH, 150.0, Verdict::Unexpected);
+        check(
+            Sides::LEFT,
+            Sides::BOTH,
+            Sides::BOTH,
+            150.0,
+            Verdict::Unexpected,
+        );
     }
 
     proptest! {

@@ -18,7 +18,9 @@ pub mod marks;
 mod navigator;
 pub mod odometer;
 pub mod route;
+mod shell;
 pub mod turn;
 
 pub use config::LogicConfig;
 pub use navigator::{Input, Navigator, Output};
+pub use shell::run;

@@ -111,7 +111,9 @@ pub enum MapError {
         height: u8,
     },
     /// More nodes than there is room for.
-    #[error("{width} x {height} squares have more than {MAX_NODES} crossings; divide the warehouse")]
+    #[error(
+        "{width} x {height} squares have more than {MAX_NODES} crossings; divide the warehouse"
+    )]
     TooLarge {
         /// Squares from left to right.
         width: u8,
@@ -191,7 +193,11 @@ impl Map {
         }
         for product in published.products() {
             let station = map
-                .station_at(product.id, Node::new(product.x, product.y), product.side.get())
+                .station_at(
+                    product.id,
+                    Node::new(product.x, product.y),
+                    product.side.get(),
+                )
                 .ok_or(MapError::ProductOutside(product.id))?;
             if map.station(product.id).is_some() {
                 return Err(MapError::ProductTwice(product.id));
@@ -379,7 +385,10 @@ mod tests {
         for (side, first, second, into) in table {
             let map = Map::new(&with_product((1, 1), side)).unwrap();
             let ends = [Node::new(first.0, first.1), Node::new(second.0, second.1)];
-            assert_eq!(map.station(7).map(|found| (found.ends, found.into)), Some((ends, into)));
+            assert_eq!(
+                map.station(7).map(|found| (found.ends, found.into)),
+                Some((ends, into))
+            );
         }
     }
 
@@ -414,11 +423,17 @@ mod tests {
         let refused = |map: &WarehouseMap| Map::new(map).unwrap_err();
         assert_eq!(
             refused(&published(0, 2, (0, 0))),
-            MapError::NoSquares { width: 0, height: 2 }
+            MapError::NoSquares {
+                width: 0,
+                height: 2
+            }
         );
         assert_eq!(
             refused(&published(255, 255, (0, 0))),
-            MapError::TooLarge { width: 255, height: 255 }
+            MapError::TooLarge {
+                width: 255,
+                height: 255
+            }
         );
         assert_eq!(
             refused(&published(3, 2, (1, 0))),
@@ -429,7 +444,10 @@ mod tests {
         assert_eq!(refused(&map), MapError::NoSideLength);
         map.side_length_cm = 39;
         assert_eq!(refused(&map), MapError::SideTooShort(39));
-        assert_eq!(refused(&with_product((3, 0), Side::Left)), MapError::ProductOutside(7));
+        assert_eq!(
+            refused(&with_product((3, 0), Side::Left)),
+            MapError::ProductOutside(7)
+        );
         let mut twice = with_product((0, 0), Side::Left);
         twice.products[1] = twice.products[0];
         twice.product_count = 2;

@@ -126,14 +126,19 @@ impl MarkReader {
         (self.left, self.right) = (0, 0);
     }
 
-    /// Believes what has been seen twice: the rest of the mark may have passed while nobody was
-    /// reading. What was seen once is noise, or a mark that the robot has not rolled across yet.
+    /// Believes what has been seen so far, however briefly: the rest of the mark may have passed
+    /// while nobody was reading.
     pub fn believe(&mut self) {
         for count in [&mut self.left, &mut self.right] {
-            if *count + 1 == BELIEVED {
+            if *count > 0 {
                 *count = BELIEVED;
             }
         }
+    }
+
+    /// Whether a mark is under the sensors.
+    pub fn has_begun(self) -> bool {
+        self.left > 0 || self.right > 0
     }
 
     /// The counts as the status carries them.
@@ -180,7 +185,10 @@ mod tests {
 
     fn read(states: &[LineState]) -> Vec<Mark> {
         let mut reader = MarkReader::default();
-        states.iter().filter_map(|state| reader.push(*state)).collect()
+        states
+            .iter()
+            .filter_map(|state| reader.push(*state))
+            .collect()
     }
 
     fn mark(sides: Sides, line_ends: bool) -> Vec<Mark> {
@@ -213,7 +221,10 @@ mod tests {
     #[test]
     fn one_or_two_frames_are_noise() {
         for noise in [StationToLeft, StationToRight, FourWay] {
-            assert_eq!(read(&[OnLine, noise, noise, OnLine, OnLine, noise, OnLine]), []);
+            assert_eq!(
+                read(&[OnLine, noise, noise, OnLine, OnLine, noise, OnLine]),
+                []
+            );
         }
         assert_eq!(read(&[OnLine, DropStation, OnLine]), []);
     }
@@ -229,12 +240,12 @@ mod tests {
     #[test]
     fn a_mark_cut_short_by_a_restart_is_believed() {
         let mut reader = MarkReader::default();
-        for _ in 0..2 {
-            reader.push(StationToLeft);
-        }
-        reader.believe();
-        assert_eq!(reader.push(OnLine).map(|mark| mark.sides), Some(Sides::LEFT));
         reader.push(StationToLeft);
+        reader.believe();
+        assert_eq!(
+            reader.push(OnLine).map(|mark| mark.sides),
+            Some(Sides::LEFT)
+        );
         reader.believe();
         assert_eq!(reader.push(OnLine), None);
     }

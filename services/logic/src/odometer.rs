@@ -9,7 +9,7 @@
 use core::time::Duration;
 
 use lager_topics::SteeringReport;
-use lager_wire::SteerFlags;
+use lager_wire::{Command, SteerFlags, WheelCommand};
 
 use crate::config::LogicConfig;
 
@@ -50,17 +50,51 @@ impl Odometer {
     /// Takes the duties of a report that has just come.
     pub fn report(&mut self, now: Duration, report: &SteeringReport, config: &LogicConfig) {
         self.advance(now);
-        let flags = SteerFlags(report.flags);
-        let share = |duty: u8, reverse: SteerFlags| {
-            let share = f32::from(duty) / STANDARD_DUTY;
-            if flags.contains(reverse) { -share } else { share }
-        };
-        let left = share(report.left_duty, SteerFlags::LEFT_REVERSE);
-        let right = share(report.right_duty, SteerFlags::RIGHT_REVERSE);
+        let (left, right) = speeds(report);
         self.left_mm_per_s = left * config.cruise_mm_per_s;
         self.right_mm_per_s = right * config.cruise_mm_per_s;
         self.deg_per_s = (left - right) / 2.0 * config.turn_deg_per_s;
         self.reported = now;
+    }
+}
+
+/// Speed of both wheels as a share of that at the standard duty.
+fn speeds(report: &SteeringReport) -> (f32, f32) {
+    let flags = SteerFlags(report.flags);
+    // A board of ours locks its arm while the wheels move. No flag at all is an original board,
+    // which reports nothing, and the bridge tells what it was told: its duty is the standard one.
+    if flags == SteerFlags::NONE && report.left_duty == 0 && report.right_duty == 0 {
+        return nominal(report.code);
+    }
+    let share = |duty: u8, reverse: SteerFlags| {
+        let share = f32::from(duty) / STANDARD_DUTY;
+        if flags.contains(reverse) {
+            -share
+        } else {
+            share
+        }
+    };
+    (
+        share(report.left_duty, SteerFlags::LEFT_REVERSE),
+        share(report.right_duty, SteerFlags::RIGHT_REVERSE),
+    )
+}
+
+/// The speeds a command is carried out with (W1).
+fn nominal(code: u8) -> (f32, f32) {
+    use WheelCommand::{
+        ActiveBackward, ActiveForward, LeftDiag, LeftPerp, ManualBackward, ManualForward,
+        ManualLeft, ManualRight, RightDiag, RightPerp, Standby,
+    };
+    let Some(Command::Wheel(command)) = Command::from_code(code) else {
+        return (0.0, 0.0);
+    };
+    match command {
+        Standby => (0.0, 0.0),
+        ManualForward | ActiveForward => (1.0, 1.0),
+        ManualBackward | ActiveBackward => (-1.0, -1.0),
+        ManualLeft | LeftPerp | LeftDiag => (-1.0, 1.0),
+        ManualRight | RightPerp | RightDiag => (1.0, -1.0),
     }
 }
 
@@ -82,7 +116,11 @@ mod tests {
     fn after_a_second(reports: &SteeringReport) -> Odometer {
         let mut odometer = Odometer::default();
         for step in 0..10 {
-            odometer.report(Duration::from_millis(step * 100), reports, &LogicConfig::default());
+            odometer.report(
+                Duration::from_millis(step * 100),
+                reports,
+                &LogicConfig::default(),
+            );
         }
         odometer.advance(Duration::from_secs(1));
         odometer
@@ -106,14 +144,42 @@ mod tests {
     }
 
     #[test]
+    fn an_original_board_is_believed_to_do_what_it_was_told() {
+        let told = |command: WheelCommand| SteeringReport {
+            code: Command::Wheel(command).code(),
+            ..SteeringReport::default()
+        };
+        let forward = after_a_second(&told(WheelCommand::ActiveForward));
+        assert!((forward.travelled_mm - 73.3).abs() < 0.1, "{forward:?}");
+        let left = after_a_second(&told(WheelCommand::LeftPerp));
+        assert!((left.turned_deg + 30.0).abs() < 0.1, "{left:?}");
+        // A board of ours that has not started its motors yet shows its locked arm.
+        let waiting = SteeringReport {
+            flags: SteerFlags::ARM_LOCKED.0,
+            ..told(WheelCommand::ActiveForward)
+        };
+        assert!(after_a_second(&waiting).travelled_mm.abs() < 0.01);
+    }
+
+    #[test]
     fn a_silent_board_stands_still() {
         let mut odometer = Odometer::default();
         let config = LogicConfig::default();
         odometer.report(Duration::ZERO, &report(100, 100, SteerFlags(0)), &config);
         odometer.advance(Duration::from_secs(10));
-        assert!((odometer.travelled_mm - 73.3 * 0.15).abs() < 0.1, "{odometer:?}");
-        odometer.report(Duration::from_secs(20), &report(0, 0, SteerFlags(0)), &config);
-        assert!((odometer.travelled_mm - 73.3 * 0.15).abs() < 0.1, "{odometer:?}");
+        assert!(
+            (odometer.travelled_mm - 73.3 * 0.15).abs() < 0.1,
+            "{odometer:?}"
+        );
+        odometer.report(
+            Duration::from_secs(20),
+            &report(0, 0, SteerFlags(0)),
+            &config,
+        );
+        assert!(
+            (odometer.travelled_mm - 73.3 * 0.15).abs() < 0.1,
+            "{odometer:?}"
+        );
     }
 
     proptest! {

@@ -75,7 +75,9 @@ impl Distances {
 pub fn nearer(map: &Map, from: Node, ends: [Node; 2]) -> Option<(Node, Distances)> {
     ends.map(|end| {
         let distances = Distances::to(map, end);
-        distances.from(map, from).map(|edges| (edges, end, distances))
+        distances
+            .from(map, from)
+            .map(|edges| (edges, end, distances))
     })
     .into_iter()
     .flatten()
@@ -124,27 +126,27 @@ mod tests {
     }
 
     /// All distances by relaxing every edge until nothing changes (Floyd and Warshall): slow,
-    /// and nothing like a breadth-first search.
-    fn oracle(map: &Map) -> Vec<Vec<Option<u16>>> {
+    /// and nothing like a breadth-first search. From `a` to `b` at `a * nodes + b`.
+    fn oracle(map: &Map) -> Vec<Option<u16>> {
         let count = map.node_count();
-        let mut edges = vec![vec![None; count]; count];
+        let mut edges = vec![None; count * count];
         for from in 0..count {
-            edges[from][from] = Some(0);
+            edges[from * count + from] = Some(0);
             for heading in HEADINGS {
                 if map.is_open(map.node(from), heading) {
                     let to = map.index(map.neighbour(map.node(from), heading).unwrap());
-                    edges[from][to] = Some(1);
+                    edges[from * count + to] = Some(1);
                 }
             }
         }
         for via in 0..count {
-            for from in 0..count {
-                for to in 0..count {
-                    if let (Some(first), Some(second)) = (edges[from][via], edges[via][to]) {
-                        let round = first + second;
-                        if edges[from][to].is_none_or(|direct| round < direct) {
-                            edges[from][to] = Some(round);
-                        }
+            for pair in 0..count * count {
+                let (from, to) = (pair / count, pair % count);
+                let (first, second) = (edges[from * count + via], edges[via * count + to]);
+                if let (Some(first), Some(second)) = (first, second) {
+                    let round: u16 = first + second;
+                    if edges[pair].is_none_or(|direct| round < direct) {
+                        edges[pair] = Some(round);
                     }
                 }
             }
@@ -163,15 +165,17 @@ mod tests {
             for (x, y, heading) in blocks {
                 map.block(Node::new(x, y), HEADINGS[heading]);
             }
+            let count = map.node_count();
             let truth = oracle(&map);
-            for goal in 0..map.node_count() {
+            for goal in 0..count {
                 let distances = Distances::to(&map, map.node(goal));
-                for from in 0..map.node_count() {
+                for from in 0..count {
                     let node = map.node(from);
-                    prop_assert_eq!(distances.from(&map, node), truth[from][goal]);
+                    let shortest = truth[from * count + goal];
+                    prop_assert_eq!(distances.from(&map, node), shortest);
                     let mut route = Route::default();
                     write_route(&map, &distances, node, HEADINGS[facing], &mut route);
-                    prop_assert_eq!(route.length, truth[from][goal].unwrap_or(0));
+                    prop_assert_eq!(route.length, shortest.unwrap_or(0));
                     let mut at = node;
                     for step in route.nodes() {
                         let to = Node::new(step.x, step.y);
@@ -181,7 +185,7 @@ mod tests {
                         prop_assert!(open, "{} to {} is no open way", at, to);
                         at = to;
                     }
-                    if truth[from][goal].is_some() {
+                    if shortest.is_some() {
                         prop_assert_eq!(at, map.node(goal));
                     }
                 }
@@ -202,9 +206,9 @@ mod tests {
             let (from, first, second) = (picks.0 % count, picks.1 % count, picks.2 % count);
             let ends = [map.node(first), map.node(second)];
             let truth = oracle(&map);
-            let best = [truth[from][first], truth[from][second]].into_iter().flatten().min();
+            let best = [first, second].into_iter().filter_map(|end| truth[from * count + end]).min();
             let found = nearer(&map, map.node(from), ends);
-            let distance = found.and_then(|(end, _)| truth[from][map.index(end)]);
+            let distance = found.and_then(|(end, _)| truth[from * count + map.index(end)]);
             prop_assert_eq!(distance, best);
         }
     }
@@ -215,7 +219,10 @@ mod tests {
         let distances = Distances::to(&map, Node::new(3, 3));
         let from = Node::new(0, 0);
         assert_eq!(distances.next(&map, from, Heading::Up), Some(Heading::Up));
-        assert_eq!(distances.next(&map, from, Heading::Right), Some(Heading::Right));
+        assert_eq!(
+            distances.next(&map, from, Heading::Right),
+            Some(Heading::Right)
+        );
         let mut route = Route::default();
         write_route(&map, &distances, from, Heading::Up, &mut route);
         let nodes: Vec<_> = route.nodes().iter().map(|node| (node.x, node.y)).collect();

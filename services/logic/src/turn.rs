@@ -97,9 +97,16 @@ mod tests {
             (88.0, NotOnLine, Turned::Quarters(1)),
         ];
         for (angle, seen, expected) in table {
-            assert_eq!(interrupted(angle, Spin::Right, seen), expected, "{angle} {seen:?}");
+            assert_eq!(
+                interrupted(angle, Spin::Right, seen),
+                expected,
+                "{angle} {seen:?}"
+            );
         }
-        assert_eq!(interrupted(78.0, Spin::Left, LeftOfLine), Turned::Quarters(1));
+        assert_eq!(
+            interrupted(78.0, Spin::Left, LeftOfLine),
+            Turned::Quarters(1)
+        );
         assert_eq!(interrupted(78.0, Spin::Left, RightOfLine), Turned::Fragment);
     }
 }

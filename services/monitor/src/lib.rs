@@ -17,6 +17,13 @@ use serde_json::json;
 
 pub use rate::hz;
 
+impl ToolError {
+    /// Whether only the reader of the output has gone, as after `| head`.
+    pub fn is_closed_output(&self) -> bool {
+        matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
 /// The pace at which an observer polls.
 const POLL: Duration = Duration::from_millis(5);
 

@@ -176,7 +176,8 @@ mod tests {
 
     impl Folder {
         fn new(name: &str) -> Self {
-            let path = std::env::temp_dir().join(format!("lager-pty-{}-{name}", std::process::id()));
+            let path =
+                std::env::temp_dir().join(format!("lager-pty-{}-{name}", std::process::id()));
             fs::create_dir_all(&path).unwrap();
             Self(path)
         }
@@ -194,7 +195,11 @@ mod tests {
     }
 
     fn open(link: &Path) -> File {
-        OpenOptions::new().read(true).write(true).open(link).unwrap()
+        OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(link)
+            .unwrap()
     }
 
     fn read_all(port: &Port, wanted: usize) -> Vec<u8> {
@@ -252,7 +257,11 @@ mod tests {
         let (_port, link) = folder.port();
         for _ in 0..2 {
             let settings = tcgetattr(open(&link)).unwrap();
-            assert!(!settings.local_modes.intersects(LocalModes::ECHO | LocalModes::ICANON));
+            assert!(
+                !settings
+                    .local_modes
+                    .intersects(LocalModes::ECHO | LocalModes::ICANON)
+            );
         }
     }
 
@@ -284,6 +293,9 @@ mod tests {
         let refused = Port::create(&link).unwrap_err();
         assert!(refused.to_string().contains("is not a link"), "{refused}");
         let nowhere = Port::create(&folder.0.join("no/such/folder")).unwrap_err();
-        assert!(nowhere.to_string().contains("does its folder exist"), "{nowhere}");
+        assert!(
+            nowhere.to_string().contains("does its folder exist"),
+            "{nowhere}"
+        );
     }
 }

@@ -15,9 +15,9 @@
 
 use core::time::Duration;
 
+use lager_ax12::table::MAX_POSITION;
 use lager_control::arm::ArmConfig;
 use lager_control::{SensorConfig, SensorUnit, SteeringConfig, SteeringUnit};
-use lager_ax12::table::MAX_POSITION;
 use lager_plant::arm::SERVOS;
 use lager_plant::noise::Noise;
 use lager_plant::{Pose, Warehouse, WarehouseError, World, WorldState};
@@ -364,7 +364,10 @@ impl Robot {
         if self.sensor.wants(now, self.exde.returned) {
             self.step_sensor(now);
         }
-        let servo = self.world.next_servo_byte().is_some_and(|at| at.as_nanos() as u64 <= now);
+        let servo = self
+            .world
+            .next_servo_byte()
+            .is_some_and(|at| at.as_nanos() as u64 <= now);
         if self.steering.wants(now, self.exde.rose || servo) {
             self.step_steering(now);
         }
@@ -382,7 +385,11 @@ impl Robot {
     }
 
     fn step_sensor(&mut self, now: u64) {
-        let receiver_us = self.steering.unit.is_some().then(|| self.steering.clock_us(now));
+        let receiver_us = self
+            .steering
+            .unit
+            .is_some()
+            .then(|| self.steering.clock_us(now));
         let Station { unit, chip, .. } = &mut self.sensor;
         chip.now_ns = now;
         let mut pins = SensorPins {

@@ -83,7 +83,10 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
     let mut robot = Robot::new(&config.warehouse, options)?;
     if let Some(kept) = &kept {
         robot.resume(&world_state(kept));
-        tracing::info!(seconds = robot.now().as_secs_f64(), "goes on with the kept world");
+        tracing::info!(
+            seconds = robot.now().as_secs_f64(),
+            "goes on with the kept world"
+        );
     }
     let mut shell = Shell {
         truth: bus.publisher::<TruthPose>()?,
@@ -170,7 +173,8 @@ impl Shell {
         }
         self.goods_told = changes;
         self.truth_due = now + TRUTH_PERIOD;
-        self.truth.send(Clock::monotonic_ns(), message(&self.robot.truth()))
+        self.truth
+            .send(Clock::monotonic_ns(), message(&self.robot.truth()))
     }
 
     /// Sleeps for `time`, or until somebody writes to an open port. A closed one cannot be waited

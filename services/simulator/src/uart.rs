@@ -66,7 +66,10 @@ impl Uart {
 
     /// The board queues bytes, all of them or none.
     pub(crate) fn queue(&mut self, now: u64, bytes: &[u8]) -> bool {
-        let waiting = self.to_pi_free_ns.saturating_sub(now).div_ceil(self.byte_ns);
+        let waiting = self
+            .to_pi_free_ns
+            .saturating_sub(now)
+            .div_ceil(self.byte_ns);
         if waiting + bytes.len() as u64 > BOARD_QUEUE {
             return false;
         }

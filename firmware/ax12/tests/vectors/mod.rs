@@ -1,21 +1,21 @@
 //! Packets other people published, with where each was found. The expected values are theirs.
 
 /// One published packet.
-pub struct Vector {
+pub(crate) struct Vector {
     /// Bytes as published.
-    pub bytes: &'static [u8],
+    pub(crate) bytes: &'static [u8],
     /// Whether a servo sent it.
-    pub status: bool,
+    pub(crate) status: bool,
     /// The servo's published answer, empty when none is given.
-    pub reply: &'static [u8],
+    pub(crate) reply: &'static [u8],
     /// What it does.
-    pub meaning: &'static str,
+    pub(crate) meaning: &'static str,
     /// Where it was published.
-    pub source: &'static str,
+    pub(crate) source: &'static str,
 }
 
 /// All of them.
-pub const VECTORS: &[Vector] = &[
+pub(crate) const VECTORS: &[Vector] = &[
     Vector {
         bytes: &[0xFF, 0xFF, 0x01, 0x05, 0x03, 0x0C, 0x64, 0xAA, 0xDC],
         status: false,

@@ -24,6 +24,7 @@
 mod config;
 mod program;
 mod servo;
+mod squeeze;
 
 use lager_ax12::ErrorBits;
 use lager_wire::{ArmCommand, ArmData};

@@ -20,6 +20,7 @@ use lager_ax12::{ErrorBits, table};
 use lager_wire::ArmCommand;
 
 use super::servo::NEAR_GOAL;
+use super::squeeze::Squeeze;
 use super::{
     Arm, BASE, ELBOW, GRIPPER, Job, Pose, ROTATION, SERVOS, SHOULDER, WRIST, bit, partner,
 };
@@ -34,11 +35,8 @@ pub enum Outcome {
     Aborted,
 }
 
-/// Steps of a squeeze without movement after which something is held (AMB-29).
-const STILL_STEPS: u8 = 4;
-
 /// Errors with which a servo switches its torque off.
-const GIVES_UP: ErrorBits = ErrorBits::OVERLOAD.union(ErrorBits::OVERHEATING);
+pub(super) const GIVES_UP: ErrorBits = ErrorBits::OVERLOAD.union(ErrorBits::OVERHEATING);
 
 /// What a command is doing.
 #[derive(Debug, Clone)]
@@ -73,16 +71,6 @@ enum Then {
     Nothing,
     Open,
     Raise,
-}
-
-/// The gripper closing.
-#[derive(Debug, Clone)]
-pub(super) struct Squeeze {
-    /// Whether the next thing is to write a step.
-    stepping: bool,
-    look_due_us: u32,
-    last_position: u16,
-    still: u8,
 }
 
 /// Moving servos being stopped where they are.
@@ -188,7 +176,7 @@ impl Arm {
         }
     }
 
-    fn finish(&mut self) {
+    pub(super) fn finish(&mut self) {
         self.program = Program::Idle;
         self.untold |= self.touched;
         self.finished = Some(if self.failed {
@@ -361,68 +349,6 @@ impl Arm {
             Then::Open => self.open(Then::Raise, now_us),
             Then::Raise => self.take_pose(self.config.carry, Then::Nothing, now_us),
         }
-    }
-
-    fn squeeze(&mut self, now_us: u32) {
-        self.touched |= bit(GRIPPER);
-        if !self.servos[GRIPPER].is_ready() {
-            self.failed = true;
-            self.finish();
-            return;
-        }
-        self.servos[GRIPPER].stuck = false;
-        self.servos[GRIPPER].goal = self.closer(self.servos[GRIPPER].base());
-        self.program = Program::Squeeze(Squeeze {
-            stepping: true,
-            look_due_us: now_us,
-            last_position: self.servos[GRIPPER].look.position,
-            still: 0,
-        });
-    }
-
-    fn proceed_squeeze(&mut self, mut squeeze: Squeeze, job: Job, fine: bool, now_us: u32) {
-        if !fine {
-            self.failed = true;
-            self.finish();
-            return;
-        }
-        if let Job::Goal { .. } = job {
-            squeeze.stepping = false;
-            squeeze.look_due_us = now_us.wrapping_add(self.config.squeeze_period_us);
-            self.program = Program::Squeeze(squeeze);
-            return;
-        }
-        let servo = &self.servos[GRIPPER];
-        let position = servo.look.position;
-        if position == squeeze.last_position {
-            squeeze.still += 1;
-        } else {
-            squeeze.still = 0;
-            squeeze.last_position = position;
-        }
-        let gave_up = servo.errors.intersects(GIVES_UP);
-        let loaded = servo.look.load.unsigned_abs() >= self.config.squeeze_load;
-        let closed = servo.goal == self.closer(servo.goal) && servo.distance() <= self.config.step;
-        if gave_up || loaded || closed || squeeze.still >= STILL_STEPS {
-            self.failed |= gave_up;
-            self.finish();
-            return;
-        }
-        self.servos[GRIPPER].goal = self.closer(self.servos[GRIPPER].goal);
-        squeeze.stepping = true;
-        self.program = Program::Squeeze(squeeze);
-    }
-
-    /// One step towards the closed gripper and not beyond it.
-    fn closer(&self, position: u16) -> u16 {
-        let (open, closed) = (self.config.gripper_open, self.config.gripper_closed);
-        let step = self.config.step;
-        let closer = if closed < open {
-            position.saturating_sub(step).max(closed)
-        } else {
-            position.saturating_add(step).min(closed)
-        };
-        self.config.limits[GRIPPER].clamp(closer)
     }
 
     fn proceed_freeze(&mut self, mut freeze: Freeze, job: Job, fine: bool) {

@@ -22,6 +22,8 @@ pub struct Servo {
     pub present: bool,
     /// Answers to come with a wrong checksum.
     pub spoiled: usize,
+    /// Answers to come under the id of another servo.
+    pub misnamed: usize,
     /// The servo cannot get below this.
     pub stop: f64,
     /// Load for every unit of way that is missing at the stop.
@@ -58,6 +60,7 @@ impl Servos {
                 errors: ErrorBits::NONE,
                 present: true,
                 spoiled: 0,
+                misnamed: 0,
                 stop: 0.0,
                 stiffness: 40,
                 stuck: false,
@@ -119,7 +122,9 @@ impl Servos {
                 continue;
             }
             let registers = servo.obey(instruction.expect("a known instruction"), &parameters);
-            let mut answer = Frame::status(id, servo.errors, &registers)
+            let name = if servo.misnamed > 0 { id % 8 + 1 } else { id };
+            servo.misnamed = servo.misnamed.saturating_sub(1);
+            let mut answer = Frame::status(name, servo.errors, &registers)
                 .unwrap()
                 .as_bytes()
                 .to_vec();

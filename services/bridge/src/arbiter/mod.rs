@@ -35,17 +35,20 @@
 //!   and does not repeat.
 
 mod ledger;
+mod orders;
 #[cfg(test)]
 mod tests;
+mod verdict;
 mod wire;
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Health, Mode, OrderKind, Origin, SteeringOrder, SteeringReport};
-use lager_wire::{ArmCommand, Command, SteerCommand, Version, WheelCommand};
+use lager_topics::{Finish, Health, Mode, Origin, SteeringReport};
+use lager_wire::{Command, SteerCommand, Version, WheelCommand};
 
-pub use ledger::{Ended, OrderKey};
 use ledger::Ledger;
+pub use ledger::{Ended, OrderKey};
+pub use verdict::{Ignored, Refused, Verdict};
 
 /// How long an order holds after its origin's last word, in robot time.
 pub const LEASE: Duration = Duration::from_millis(120);
@@ -53,47 +56,6 @@ pub const LEASE: Duration = Duration::from_millis(120);
 /// How often the command in force is written again to a version-1 board, so that its age stays
 /// below the board's limit of 150 ms.
 pub const RESEND: Duration = Duration::from_millis(40);
-
-/// What became of an order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It is in force from now on.
-    Executes,
-    /// It was in force already; its lease is renewed.
-    Renewed,
-    /// It ended earlier; it is not carried out again.
-    Ended(Finish),
-    /// It does not count now, but its renewals may later.
-    Ignored(Ignored),
-    /// It will never be carried out.
-    Refused(Refused),
-    /// The stop is latched.
-    Stopped,
-}
-
-/// Why an order does not count at present.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ignored {
-    /// The mode gives the wheel to the other origin.
-    NotInCharge,
-    /// A stop is latched.
-    StopLatched,
-    /// The bridge is shutting down.
-    ShuttingDown,
-}
-
-/// Why an order can never be carried out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refused {
-    /// Origin, kind or command code have no meaning (AMB-52).
-    Undefined,
-    /// Only logic may give this command (AMB-2, AMB-27).
-    LogicOnly,
-    /// The arm is locked while the wheels move (T4, AMB-28).
-    ArmLocked,
-    /// The id in force came again with another code.
-    CodeChanged,
-}
 
 /// How long an order in force still holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -286,40 +248,6 @@ impl Arbiter {
         arbiter
     }
 
-    /// Takes one order that its origin gave at `received` (robot time, at most the present).
-    ///
-    /// Hand in everything that has arrived before asking [`Arbiter::poll`] for what to write:
-    /// then a stop anywhere in the batch wins, and of several setpoints only the last is written.
-    pub fn order(&mut self, received: Duration, order: &SteeringOrder) -> Verdict {
-        self.advance(received);
-        let (Some(origin), Some(kind)) = (order.origin.get(), order.kind.get()) else {
-            self.count_refused();
-            return Verdict::Refused(Refused::Undefined);
-        };
-        if kind == OrderKind::Stop {
-            self.stop();
-            return Verdict::Stopped;
-        }
-        let key = OrderKey {
-            origin,
-            id: order.id,
-        };
-        if self.parked {
-            return Verdict::Ignored(Ignored::ShuttingDown);
-        }
-        if let Some(verdict) = self.renew(received, key, order) {
-            return verdict;
-        }
-        if let Some(ended) = self.ledger.find(key) {
-            self.tell(ended);
-            return Verdict::Ended(ended.finish);
-        }
-        let Some(command) = Command::from_code(order.code) else {
-            return self.refuse(key, Refused::Undefined);
-        };
-        self.judge(received, key, command, order.arm_granted != 0)
-    }
-
     /// Latches the stop: whatever runs is aborted, and nothing drives until
     /// [`Arbiter::resume_from_stop`].
     pub fn stop(&mut self) {
@@ -425,129 +353,6 @@ impl Arbiter {
         report.finish = health.finish;
     }
 
-    /// Renews the order in force or the grant below it; `None` if `key` is neither.
-    fn renew(
-        &mut self,
-        received: Duration,
-        key: OrderKey,
-        order: &SteeringOrder,
-    ) -> Option<Verdict> {
-        if let Some(running) = self.running.as_mut().filter(|running| running.key == key) {
-            if running.command.code() != order.code {
-                self.count_refused();
-                return Some(Verdict::Refused(Refused::CodeChanged));
-            }
-            running.arm_granted = order.arm_granted != 0;
-            let claimed = matches!(running.lease, Lease::Unclaimed(_));
-            running.lease.renew(received);
-            if claimed {
-                self.claim(received);
-            }
-            return Some(Verdict::Renewed);
-        }
-        let grant = self.grant.as_mut()?;
-        let granted = order.arm_granted != 0 && order.code == STANDBY.code();
-        let mine = match grant.key {
-            Some(known) => known == key,
-            None => key.origin == Origin::Logic && granted,
-        };
-        if !mine {
-            return None;
-        }
-        grant.key = Some(key);
-        grant.lease.renew(received);
-        if !granted {
-            self.finish_running(Finish::Aborted);
-            if let Some(base) = self.running.as_mut() {
-                base.arm_granted = false;
-            }
-        }
-        Some(Verdict::Renewed)
-    }
-
-    /// Decides on an order that is not in force and has not ended.
-    fn judge(
-        &mut self,
-        received: Duration,
-        key: OrderKey,
-        command: Command,
-        arm_granted: bool,
-    ) -> Verdict {
-        let logic_only = matches!(
-            command,
-            Command::Wheel(WheelCommand::LeftPerp | WheelCommand::RightPerp)
-                | Command::Arm(ArmCommand::Drop)
-        );
-        if logic_only && key.origin == Origin::Operator {
-            return self.refuse(key, Refused::LogicOnly);
-        }
-        let is_arm = matches!(command, Command::Arm(_));
-        let as_guest = match (self.mode, key.origin) {
-            (Mode::Manual, Origin::Operator) | (Mode::Autonomous, Origin::Logic) => false,
-            (Mode::Autonomous, Origin::Operator) if is_arm && self.arm_is_granted() => true,
-            _ => return self.ignore(key, Ignored::NotInCharge),
-        };
-        if self.stopped {
-            return self.ignore(key, Ignored::StopLatched);
-        }
-        if is_arm && self.running.is_some_and(|running| moves(running.command)) {
-            return self.refuse(key, Refused::ArmLocked);
-        }
-        self.make_way(as_guest);
-        self.begin(received, key, command, arm_granted);
-        Verdict::Executes
-    }
-
-    /// Whether logic stands and lets the operator move the arm.
-    fn arm_is_granted(&self) -> bool {
-        self.grant.is_some()
-            || self.running.is_some_and(|running| {
-                running.key.origin == Origin::Logic
-                    && running.command == STANDBY
-                    && running.arm_granted
-            })
-    }
-
-    /// Ends what runs for the sake of a newer order, or lays logic's standby below a guest.
-    fn make_way(&mut self, for_guest: bool) {
-        if for_guest && self.grant.is_none() {
-            if let Some(base) = self.running.take() {
-                self.idle_seq = base.seq;
-                self.grant = Some(Grant {
-                    key: Some(base.key),
-                    lease: base.lease,
-                });
-            }
-            return;
-        }
-        if !for_guest && let Some(Grant { key: Some(key), .. }) = self.grant.take() {
-            self.ledger.enter(Ended {
-                key,
-                finish: Finish::None,
-            });
-        }
-        if let Some(old) = self.running.take() {
-            let finish = if old.command.is_one_shot() {
-                Finish::Aborted
-            } else {
-                Finish::None
-            };
-            self.ledger.enter(Ended {
-                key: old.key,
-                finish,
-            });
-            if finish != Finish::None {
-                self.last = Some(Ended {
-                    key: old.key,
-                    finish,
-                });
-            }
-            if old.command == STANDBY {
-                self.idle_seq = old.seq;
-            }
-        }
-    }
-
     /// Ends what runs, with nothing in its place.
     fn quiet(&mut self) {
         self.grant = None;
@@ -592,39 +397,6 @@ impl Arbiter {
                 search: None,
             });
         }
-        self.revision = self.revision.wrapping_add(1);
-    }
-
-    /// Tells again how an order ended, for an origin that goes on renewing it.
-    fn tell(&mut self, ended: Ended) {
-        if ended.finish != Finish::None && self.last != Some(ended) {
-            self.last = Some(ended);
-            self.revision = self.revision.wrapping_add(1);
-        }
-    }
-
-    fn refuse(&mut self, key: OrderKey, why: Refused) -> Verdict {
-        self.count_refused();
-        let ended = Ended {
-            key,
-            finish: Finish::Refused,
-        };
-        self.ledger.enter(ended);
-        self.tell(ended);
-        Verdict::Refused(why)
-    }
-
-    fn ignore(&mut self, key: OrderKey, why: Ignored) -> Verdict {
-        let slot = &mut self.ignored[usize::from(key.origin == Origin::Operator)];
-        if *slot != Some(key) {
-            *slot = Some(key);
-            self.count_refused();
-        }
-        Verdict::Ignored(why)
-    }
-
-    fn count_refused(&mut self) {
-        self.orders_refused = self.orders_refused.wrapping_add(1);
         self.revision = self.revision.wrapping_add(1);
     }
 }

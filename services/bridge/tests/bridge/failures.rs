@@ -18,9 +18,11 @@ fn a_reset_sensor_board_is_not_counted_as_loss() {
         board.state = LineState::FourWay;
         board.restart(ResetCause::Watchdog);
     });
-    robot.hands.wait_for_line("lines of the new epoch come", |line| {
-        line.link_epoch == 2 && line.state.get() == Some(LineState::FourWay)
-    });
+    robot
+        .hands
+        .wait_for_line("lines of the new epoch come", |line| {
+            line.link_epoch == 2 && line.state.get() == Some(LineState::FourWay)
+        });
     let health = robot
         .hands
         .wait_for_health("health shows the new epoch", |health| {
@@ -36,27 +38,35 @@ fn a_reset_sensor_board_is_not_counted_as_loss() {
 fn a_reset_steering_board_drives_on_but_does_not_repeat_a_turn() {
     let mut robot = Robot::autonomous();
     let steering = &robot.steering;
-    robot.hands.give_until(logic(1, LEFT_PERP), "it turns", |_| {
-        steering.with(|board| board.count(LEFT_PERP)) == 1
-    });
+    robot
+        .hands
+        .give_until(logic(1, LEFT_PERP), "it turns", |_| {
+            steering.with(|board| board.count(LEFT_PERP)) == 1
+        });
     steering.with(|board| board.restart(ResetCause::BrownOut));
-    robot.hands.give_until(logic(1, LEFT_PERP), "the turn is aborted", |hands| {
-        hands.state.look().is_some_and(|state| {
-            state.finished_id == 1 && state.finish.get() == Some(Finish::Aborted)
-        })
-    });
+    robot
+        .hands
+        .give_until(logic(1, LEFT_PERP), "the turn is aborted", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.finished_id == 1 && state.finish.get() == Some(Finish::Aborted)
+            })
+        });
     assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 1);
 
     robot.hands.give_until(logic(2, FOLLOW), "it drives", |_| {
         steering.with(|board| board.moves())
     });
     steering.with(|board| board.restart(ResetCause::Panic));
-    robot.hands.give_until(logic(2, FOLLOW), "it drives again", |_| {
-        steering.with(|board| board.moves())
-    });
+    robot
+        .hands
+        .give_until(logic(2, FOLLOW), "it drives again", |_| {
+            steering.with(|board| board.moves())
+        });
     let health = robot
         .hands
-        .wait_for_health("both restarts are counted", |health| health.steering.reboots == 2);
+        .wait_for_health("both restarts are counted", |health| {
+            health.steering.reboots == 2
+        });
     assert_eq!(health.steering.reset_cause.get(), Some(ResetCause::Panic));
 }
 
@@ -70,9 +80,11 @@ fn ports_may_be_swapped() {
         .hands
         .wait_for_line("lines come", |line| line.link_epoch == 1);
     let steering = &robot.sensor;
-    robot.hands.give_until(operator(1, FORWARD), "the wheels turn", |_| {
-        steering.with(|board| board.moves())
-    });
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "the wheels turn", |_| {
+            steering.with(|board| board.moves())
+        });
 }
 
 #[test]
@@ -92,11 +104,16 @@ fn an_unplugged_port_is_opened_again_when_it_is_back() {
             .wait_for_health("the board is back", |health| health.steering.up == 1);
         assert_eq!(health.steering.epoch, epoch + round);
         assert_eq!(health.steering.lost, 0);
-        assert_eq!(health.steering.reboots, 0, "it was not the board that restarted");
+        assert_eq!(
+            health.steering.reboots, 0,
+            "it was not the board that restarted"
+        );
         let steering = &robot.steering;
-        robot.hands.give_until(operator(round, FORWARD), "the wheels turn", |_| {
-            steering.with(|board| board.moves())
-        });
+        robot
+            .hands
+            .give_until(operator(round, FORWARD), "the wheels turn", |_| {
+                steering.with(|board| board.moves())
+            });
         wait_until("the wheels stand", || !steering.with(|board| board.moves()));
     }
     // The sensor's stream went on all the time.
@@ -105,28 +122,19 @@ fn an_unplugged_port_is_opened_again_when_it_is_back() {
 
 #[test]
 fn boards_that_change_places_while_unplugged_are_found() {
-    let sensor = SensorBoard::new();
-    let mut robot = Robot::with(sensor, SteeringBoard::new());
-    robot.start();
-    robot.wait_until_up();
+    let mut robot = Robot::up();
     robot.sensor.unplug();
     robot.steering.unplug();
     robot.hands.wait_for_health("both are gone", |health| {
         health.sensor.up == 0 && health.steering.up == 0
     });
     // The cables come back the other way round: each board under the other's path.
-    let folder = robot.isolation.folder();
-    let (one, other) = (folder.join("sensor"), folder.join("steering"));
-    robot.sensor.plug();
-    robot.steering.plug();
-    let aside = folder.join("aside");
-    std::fs::rename(&one, &aside).unwrap();
-    std::fs::rename(&other, &one).unwrap();
-    std::fs::rename(&aside, &other).unwrap();
-    // Whatever the bridge had opened in between is gone again.
-    robot.hands.wait_for_health("both are back", |health| {
+    robot.sensor.plug_at(robot.steering.path());
+    robot.steering.plug_at(robot.sensor.path());
+    let health = robot.hands.wait_for_health("both are back", |health| {
         health.sensor.up == 1 && health.steering.up == 1
     });
+    assert_eq!((health.sensor.port, health.steering.port), (1, 0));
     let before = robot.hands.line.count;
     wait_until("lines come", || {
         robot.hands.line.look();
@@ -176,7 +184,9 @@ fn a_megabyte_of_noise_hides_no_good_packet_behind_it() {
         random as u8
     };
     robot.sensor.send_noise(noise, 1 << 20);
-    robot.sensor.with(|board| board.state = LineState::DropStation);
+    robot
+        .sensor
+        .with(|board| board.state = LineState::DropStation);
     robot.hands.wait_for_line("a good packet comes", |line| {
         line.state.get() == Some(LineState::DropStation)
     });
@@ -188,9 +198,11 @@ fn a_megabyte_of_noise_hides_no_good_packet_behind_it() {
     assert_eq!(health.sensor.up, 1);
     assert_eq!(health.steering.epoch, 1);
     let steering = &robot.steering;
-    robot.hands.give_until(operator(1, FORWARD), "the wheels turn", |_| {
-        steering.with(|board| board.moves())
-    });
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "the wheels turn", |_| {
+            steering.with(|board| board.moves())
+        });
 }
 
 #[test]
@@ -198,17 +210,22 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
     let mut robot = Robot::autonomous();
     let supervisor = robot.isolation.open(Role::Supervisor);
     let mut keeper = supervisor.keeper::<LinkHealth>().unwrap();
-    robot.hands.give_until(logic(1, LEFT_PERP), "the turn is done", |hands| {
-        hands
-            .state
-            .look()
-            .is_some_and(|state| state.finished_id == 1 && state.finish.get() == Some(Finish::Done))
-    });
+    robot
+        .hands
+        .give_until(logic(1, LEFT_PERP), "the turn is done", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.finished_id == 1 && state.finish.get() == Some(Finish::Done)
+            })
+        });
     robot.hands.stop();
-    let before = robot.hands.wait_for_health("the stop is latched", |health| health.stopped == 1);
+    let before = robot
+        .hands
+        .wait_for_health("the stop is latched", |health| health.stopped == 1);
     wait_until("the keeper has it", || {
         keeper.remember().unwrap();
-        keeper.value().is_some_and(|(health, _)| health.stopped == 1)
+        keeper
+            .value()
+            .is_some_and(|(health, _)| health.stopped == 1)
     });
 
     robot.bridge.take().unwrap().stop();
@@ -240,16 +257,19 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
     // The finished turn stays finished, and the latch holds.
     let steering = &robot.steering;
     let commands = steering.with(|board| board.commands);
-    robot.hands.give_until(logic(1, LEFT_PERP), "it is renewed", |_| {
-        steering.with(|board| board.commands > commands + 5)
-    });
+    robot
+        .hands
+        .give_until(logic(1, LEFT_PERP), "it is renewed", |_| {
+            steering.with(|board| board.commands > commands + 5)
+        });
     assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 1);
     robot.hands.resume();
-    robot.hands.give_until(logic(2, LEFT_PERP), "the next turn is done", |hands| {
-        hands
-            .state
-            .look()
-            .is_some_and(|state| state.finished_id == 2 && state.finish.get() == Some(Finish::Done))
-    });
+    robot
+        .hands
+        .give_until(logic(2, LEFT_PERP), "the next turn is done", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.finished_id == 2 && state.finish.get() == Some(Finish::Done)
+            })
+        });
     assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 2);
 }

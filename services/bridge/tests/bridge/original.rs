@@ -15,10 +15,7 @@ fn two_original_boards_handshake_and_drive_the_bridge() {
     let health = robot.wait_until_up();
     assert_eq!((health.sensor.version, health.steering.version), (0, 0));
     assert_eq!((health.sensor.port, health.steering.port), (0, 1));
-    assert_eq!(
-        health.steering.reset_cause.get(),
-        Some(ResetCause::Unknown)
-    );
+    assert_eq!(health.steering.reset_cause.get(), Some(ResetCause::Unknown));
     wait_until("both boards have their ACK", || {
         robot.sensor.with(|board| board.board.up) && robot.steering.with(|board| board.board.up)
     });
@@ -38,16 +35,23 @@ fn two_original_boards_handshake_and_drive_the_bridge() {
     let told = |code: u8| {
         steering.with(|board| board.commands.iter().filter(|told| **told == code).count())
     };
-    robot.hands.give_until(operator(1, FORWARD), "the order is on the line", |hands| {
-        told(FORWARD.code()) == 1
-            && hands.state.look().is_some_and(|state| state.current_id == 1)
-    });
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "the order is on the line", |hands| {
+            told(FORWARD.code()) == 1
+                && hands
+                    .state
+                    .look()
+                    .is_some_and(|state| state.current_id == 1)
+        });
     // It is renewed, but the board is told once.
     let seen = robot.hands.state.count;
-    robot.hands.give_until(operator(1, FORWARD), "more reports come", |hands| {
-        hands.state.look();
-        hands.state.count > seen + 20
-    });
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "more reports come", |hands| {
+            hands.state.look();
+            hands.state.count > seen + 20
+        });
     assert_eq!(told(FORWARD.code()), 1);
     let standbys = told(STANDBY.code());
     wait_until("the lease ends", || told(STANDBY.code()) == standbys + 1);
@@ -63,9 +67,11 @@ fn an_original_board_that_is_running_is_known_by_its_packets() {
     assert_eq!(health.steering.version, 0);
     assert!(robot.steering.with(|board| board.board.acks.is_empty()));
     let steering = &robot.steering;
-    robot.hands.give_until(operator(1, FORWARD), "the order is on the line", |_| {
-        steering.with(|board| board.commands.contains(&FORWARD.code()))
-    });
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "the order is on the line", |_| {
+            steering.with(|board| board.commands.contains(&FORWARD.code()))
+        });
 }
 
 #[test]
@@ -74,18 +80,22 @@ fn a_turn_of_an_original_board_ends_after_its_time() {
     robot.start();
     robot.wait_until_up();
     robot.hands.set_mode(Mode::Autonomous);
-    robot.hands.give_until(logic(1, LEFT_PERP), "the turn is done", |hands| {
-        hands
-            .state
-            .look()
-            .is_some_and(|state| state.finished_id == 1 && state.finish.get() == Some(Finish::Done))
-    });
+    robot
+        .hands
+        .give_until(logic(1, LEFT_PERP), "the turn is done", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.finished_id == 1 && state.finish.get() == Some(Finish::Done)
+            })
+        });
     let steering = &robot.steering;
     robot.hands.give_until(logic(2, FOLLOW), "it drives", |_| {
         steering.with(|board| board.commands.last() == Some(&FOLLOW.code()))
     });
     let turns = robot.steering.with(|board| {
-        let turns = board.commands.iter().filter(|code| **code == LEFT_PERP.code());
+        let turns = board
+            .commands
+            .iter()
+            .filter(|code| **code == LEFT_PERP.code());
         turns.count()
     });
     assert_eq!(turns, 1);

@@ -64,7 +64,10 @@ fn the_speed_is_the_one_asked_for() {
     for baud in [9_600, 115_200, 500_000, 1_000_000] {
         let port = SerialPort::open(&path, baud).unwrap();
         let termios = tcgetattr(port.as_fd()).unwrap();
-        assert_eq!((termios.input_speed(), termios.output_speed()), (baud, baud));
+        assert_eq!(
+            (termios.input_speed(), termios.output_speed()),
+            (baud, baud)
+        );
     }
     let error = SerialPort::open(&path, 0).unwrap_err();
     assert!(matches!(error, OpenPortError::Baud { baud: 0, .. }));

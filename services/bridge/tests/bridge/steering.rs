@@ -12,13 +12,18 @@ use lager_topics::Ask;
 #[test]
 fn both_boards_come_up_and_health_says_so() {
     let mut robot = Robot::up();
-    let health = robot.hands.wait_for_health("the boards' own counters are there", |health| {
-        health.steering.board_refused == 1 && health.sensor.board_load_percent == 42
-    });
+    let health = robot
+        .hands
+        .wait_for_health("the boards' own counters are there", |health| {
+            health.steering.board_refused == 1 && health.sensor.board_load_percent == 42
+        });
     assert_eq!((health.sensor.version, health.steering.version), (1, 1));
     assert_eq!((health.sensor.port, health.steering.port), (0, 1));
     assert_eq!((health.sensor.epoch, health.steering.epoch), (1, 1));
-    assert_eq!((health.sensor.baud, health.steering.baud), (500_000, 500_000));
+    assert_eq!(
+        (health.sensor.baud, health.steering.baud),
+        (500_000, 500_000)
+    );
     assert_eq!(health.mode.get(), Some(Mode::Manual));
     assert_eq!(health.stopped, 0);
     assert_eq!(health.steering.board_exde_errors, 2);
@@ -96,9 +101,14 @@ fn an_order_drives_the_robot_for_as_long_as_it_is_renewed() {
 #[test]
 fn logic_drives_in_autonomous_mode_and_the_operator_does_not() {
     let mut robot = Robot::autonomous();
-    robot.hands.give_until(logic(1, FOLLOW), "the wheels turn", |hands| {
-        hands.state.look().is_some_and(|state| state.left_duty == 100)
-    });
+    robot
+        .hands
+        .give_until(logic(1, FOLLOW), "the wheels turn", |hands| {
+            hands
+                .state
+                .look()
+                .is_some_and(|state| state.left_duty == 100)
+        });
     let refused = robot.hands.health.look().unwrap().orders_refused;
     robot.hands.give(operator(1, FORWARD));
     robot
@@ -114,7 +124,10 @@ fn a_stop_latches_until_a_resume() {
     let mut robot = Robot::autonomous();
     let order = logic(1, FOLLOW);
     robot.hands.give_until(order, "the wheels turn", |hands| {
-        hands.state.look().is_some_and(|state| state.left_duty == 100)
+        hands
+            .state
+            .look()
+            .is_some_and(|state| state.left_duty == 100)
     });
     robot.hands.stop();
     robot
@@ -125,42 +138,51 @@ fn a_stop_latches_until_a_resume() {
     let steering = &robot.steering;
     // Logic goes on, with this order and with new ones.
     for id in 1..4 {
-        robot.hands.give_until(logic(id, FOLLOW), "standby is renewed", |_| {
-            steering.with(|board| board.commands > commands + 5 * id as usize)
-        });
+        robot
+            .hands
+            .give_until(logic(id, FOLLOW), "standby is renewed", |_| {
+                steering.with(|board| board.commands > commands + 5 * id as usize)
+            });
     }
     assert_eq!(robot.steering.with(|board| board.code), STANDBY.code());
-    assert!(
-        robot.steering.with(|board| {
-            board.executed[executed..]
-                .iter()
-                .all(|code| *code == STANDBY.code())
-        })
-    );
+    assert!(robot.steering.with(|board| {
+        board.executed[executed..]
+            .iter()
+            .all(|code| *code == STANDBY.code())
+    }));
     let answer = robot.hands.resume();
     assert_eq!(answer.outcome.get(), Some(Outcome::Done));
     assert_eq!(answer.stopped, 0);
-    robot.hands.give_until(logic(3, FOLLOW), "the wheels turn again", |hands| {
-        hands.state.look().is_some_and(|state| state.left_duty == 100)
-    });
+    robot
+        .hands
+        .give_until(logic(3, FOLLOW), "the wheels turn again", |hands| {
+            hands
+                .state
+                .look()
+                .is_some_and(|state| state.left_duty == 100)
+        });
 }
 
 #[test]
 fn two_equal_turns_are_two_and_a_refresh_is_none() {
     let mut robot = Robot::autonomous();
     for id in 1..=2 {
-        robot.hands.give_until(logic(id, LEFT_PERP), "the turn is done", |hands| {
-            hands.state.look().is_some_and(|state| {
-                state.finished_id == id
-                    && state.finish.get() == Some(Finish::Done)
-                    && state.finished_origin.get() == Some(Origin::Logic)
-            })
-        });
+        robot
+            .hands
+            .give_until(logic(id, LEFT_PERP), "the turn is done", |hands| {
+                hands.state.look().is_some_and(|state| {
+                    state.finished_id == id
+                        && state.finish.get() == Some(Finish::Done)
+                        && state.finished_origin.get() == Some(Origin::Logic)
+                })
+            });
         let steering = &robot.steering;
         let commands = steering.with(|board| board.commands);
-        robot.hands.give_until(logic(id, LEFT_PERP), "it is refreshed", |_| {
-            steering.with(|board| board.commands > commands + 5)
-        });
+        robot
+            .hands
+            .give_until(logic(id, LEFT_PERP), "it is refreshed", |_| {
+                steering.with(|board| board.commands > commands + 5)
+            });
         assert_eq!(
             robot.steering.with(|board| board.count(LEFT_PERP)),
             id as usize
@@ -251,9 +273,11 @@ fn the_robot_can_be_steered_while_a_board_is_asked() {
             };
             crate::harness::Hands::new(&bus).ask(ask)
         });
-        robot.hands.give_until(operator(1, FORWARD), "the answer has come", |_| {
-            asked.is_finished()
-        });
+        robot
+            .hands
+            .give_until(operator(1, FORWARD), "the answer has come", |_| {
+                asked.is_finished()
+            });
     });
     assert!(!robot.steering.with(|board| board.failsafe));
     assert!(robot.steering.with(|board| board.count(FORWARD)) == 1);
@@ -297,23 +321,42 @@ fn the_switch_button_changes_the_mode() {
         .unwrap();
     for mode in [Mode::Autonomous, Mode::Manual] {
         let kind = InputKind::SwitchPressed.into();
-        buttons.send(0, Input { kind, ..Input::default() }).unwrap();
+        buttons
+            .send(
+                0,
+                Input {
+                    kind,
+                    ..Input::default()
+                },
+            )
+            .unwrap();
         robot
             .hands
-            .wait_for_health("the mode has changed", |health| health.mode.get() == Some(mode));
+            .wait_for_health("the mode has changed", |health| {
+                health.mode.get() == Some(mode)
+            });
     }
 }
 
 #[test]
 fn a_clean_stop_leaves_the_robot_in_standby() {
     let mut robot = Robot::up();
-    robot.hands.give_until(operator(1, FORWARD), "the wheels turn", |hands| {
-        hands.state.look().is_some_and(|state| state.left_duty == 100)
-    });
+    robot
+        .hands
+        .give_until(operator(1, FORWARD), "the wheels turn", |hands| {
+            hands
+                .state
+                .look()
+                .is_some_and(|state| state.left_duty == 100)
+        });
     robot.hands.give(operator(1, FORWARD));
     robot.bridge.take().unwrap().stop();
     let (moves, failsafe, last) = robot.steering.with(|board| {
-        (board.moves(), board.failsafe, *board.executed.last().unwrap())
+        (
+            board.moves(),
+            board.failsafe,
+            *board.executed.last().unwrap(),
+        )
     });
     assert!(!moves && !failsafe);
     assert_eq!(last, STANDBY.code());
@@ -334,9 +377,11 @@ fn a_setpoint_the_board_gave_up_is_taken_up_again() {
         board.failsafe = true;
         board.code = STANDBY.code();
     });
-    robot.hands.give_until(order, "the wheels turn again", |hands| {
-        hands.state.look().is_some_and(|state| {
-            state.left_duty == 100 && !SteerFlags(state.flags).contains(SteerFlags::FAILSAFE)
-        })
-    });
+    robot
+        .hands
+        .give_until(order, "the wheels turn again", |hands| {
+            hands.state.look().is_some_and(|state| {
+                state.left_duty == 100 && !SteerFlags(state.flags).contains(SteerFlags::FAILSAFE)
+            })
+        });
 }

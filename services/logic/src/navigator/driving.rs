@@ -148,7 +148,12 @@ impl Navigator {
     fn judge_mark(&mut self, mark: Mark, out: &mut Output) {
         let Some(edge) = self.edge() else { return };
         let at_mm = self.mark_at();
-        match judge(&edge, mark.sides, at_mm, self.config.tolerance) {
+        let tolerance = if core::mem::take(&mut self.mark_cut_short) {
+            self.config.tolerance_cut_short
+        } else {
+            self.config.tolerance
+        };
+        match judge(&edge, mark.sides, at_mm, tolerance) {
             Verdict::Node => {
                 self.set_by_mark(edge.length_mm);
                 self.step = Step::ToNode;
@@ -239,10 +244,11 @@ impl Navigator {
                     }
                     // The way back was measured on the way out by the same wheels, so it may be
                     // relied on where the corner's mark did not come.
-                    Step::Seeking if self.phase == Phase::Returning => {
-                        if self.mark_at() > edge.length_mm + self.config.tape_mm {
-                            self.step = Step::NearNode;
-                        }
+                    Step::Seeking
+                        if self.phase == Phase::Returning
+                            && self.mark_at() > edge.length_mm + self.config.tape_mm =>
+                    {
+                        self.step = Step::NearNode;
                     }
                     Step::Seeking if self.mark_at() > edge.length_mm * self.config.overdue => {
                         self.get_stuck("The next crossing did not come", out);
@@ -253,10 +259,8 @@ impl Navigator {
             Phase::Exiting if travelled > self.config.longest_exit_mm => {
                 self.get_stuck("The cross bar of the delivery did not come", out);
             }
-            Phase::BackingOff => {
-                if travelled <= self.turning_place() {
-                    self.begin_turn(self.heading.back(), Phase::TurningRound, out);
-                }
+            Phase::BackingOff if travelled <= self.turning_place() => {
+                self.begin_turn(self.heading.back(), Phase::TurningRound, out);
             }
             _ => {}
         }
@@ -283,8 +287,7 @@ impl Navigator {
     /// Stands still while no line frames come (AMB-49: a silent board).
     fn watch_frames(&mut self, now: Duration, out: &mut Output) {
         let seen = self.sight.map(|(at, _)| at);
-        let blind =
-            seen.is_none_or(|at| now.saturating_sub(at) > self.config.blind_after);
+        let blind = seen.is_none_or(|at| now.saturating_sub(at) > self.config.blind_after);
         if blind && !self.blind && seen.is_some() && self.is_active() {
             say!(out, "No line frames come; I stand until I see again.");
         }

@@ -1,8 +1,6 @@
 //! What to do next: maps, orders, the pick signal, and the decision at each node.
 
-use lager_topics::{
-    EventKind, Goal, Heading, Order, Phase, Route, Step, WarehouseMap,
-};
+use lager_topics::{EventKind, Goal, Heading, Order, Phase, Route, Step, WarehouseMap};
 
 use super::{Navigator, Output, Pause, say};
 use crate::heading::Compass;
@@ -82,7 +80,10 @@ impl Navigator {
         }
         self.stand_at_start();
         self.set_route(Route::default(), out);
-        say!(out, "Reset: I stand at the start. Which product shall I fetch?");
+        say!(
+            out,
+            "Reset: I stand at the start. Which product shall I fetch?"
+        );
     }
 
     fn has_goods_to_fetch(&self) -> bool {
@@ -150,6 +151,7 @@ impl Navigator {
     /// looks along the way it is about to take. So this is the one place where a way can be
     /// found blocked, be taken off the map, and the decision be made once more (L6).
     pub(super) fn set_out(&mut self, out: &mut Output) {
+        let next = self.plan(out);
         let Some(map) = &self.map else { return };
         self.step = Step::Seeking;
         self.marks.clear();
@@ -171,7 +173,7 @@ impl Navigator {
                     self.go(exit.back(), Phase::WaitingForOrder, out);
                 }
             }
-            _ => match self.plan(out) {
+            _ => match next {
                 Some(heading) => self.go(heading, Phase::Driving, out),
                 None => self.get_stuck("There is no way to where I must go", out),
             },
@@ -265,7 +267,9 @@ impl Navigator {
         let (Phase::Picking, true, Some(map)) = (self.phase, meant, &self.map) else {
             return;
         };
-        let Some(station) = self.station() else { return };
+        let Some(station) = self.station() else {
+            return;
+        };
         let distances = Distances::to(map, map.delivery());
         let best = station
             .ends
@@ -293,7 +297,11 @@ impl Navigator {
         };
         route.length += 1;
         self.set_route(route, out);
-        say!(out, "I have product {} and take it to delivery.", self.order.product);
+        say!(
+            out,
+            "I have product {} and take it to delivery.",
+            self.order.product
+        );
         self.begin_turn(heading, Phase::Leaving, out);
     }
 
@@ -301,7 +309,11 @@ impl Navigator {
     pub(super) fn have_delivered(&mut self, out: &mut Output) {
         self.delivered = self.delivered.wrapping_add(1);
         self.announce(EventKind::ItemDelivered, self.order, out);
-        say!(out, "Product {} is delivered. I go back.", self.order.product);
+        say!(
+            out,
+            "Product {} is delivered. I go back.",
+            self.order.product
+        );
         self.goal = Goal::Home;
         self.phase = Phase::BackingOff;
     }

@@ -143,6 +143,8 @@ pub struct Navigator {
     misses: u8,
 
     marks: MarkReader,
+    /// The mark under the sensors was begun by a predecessor: perhaps one frame of noise.
+    mark_cut_short: bool,
     /// The line state last seen, and when.
     sight: Option<(Duration, LineState)>,
     /// No line frame for too long: stand until one comes.
@@ -180,6 +182,7 @@ impl Navigator {
             delivered: 0,
             misses: 0,
             marks: MarkReader::default(),
+            mark_cut_short: false,
             sight: None,
             blind: false,
             line_lost_at: None,
@@ -296,7 +299,10 @@ impl Navigator {
             // A setpoint ends by a stop, a lease that ran out or a board that restarted. It is
             // given anew, but not faster than the bridge can answer.
             News::Ended(_) | News::Unheard => {
-                if self.is_active() && self.command.is_older_than(now, self.config.unheard_setpoint)
+                if self.is_active()
+                    && self
+                        .command
+                        .is_older_than(now, self.config.unheard_setpoint)
                 {
                     self.command.give_anew();
                 }

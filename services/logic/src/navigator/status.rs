@@ -71,10 +71,7 @@ impl Navigator {
 
     fn from_status(config: LogicConfig, status: &NavigatorStatus) -> Option<Self> {
         let mut navigator = Self::new(config);
-        navigator.node = Node::new(
-            u8::try_from(status.x).ok()?,
-            u8::try_from(status.y).ok()?,
-        );
+        navigator.node = Node::new(u8::try_from(status.x).ok()?, u8::try_from(status.y).ok()?);
         navigator.phase = status.phase.get()?;
         navigator.step = status.step.get()?;
         navigator.heading = status.heading.get()?;
@@ -100,11 +97,15 @@ impl Navigator {
         navigator.command = Standing::resumed(status.command_id, command);
         let was_driving = status.mode == Mode::Autonomous && status.stopped == 0;
         if was_driving {
+            navigator.mark_cut_short = navigator.marks.has_begun();
             navigator.marks.believe();
             navigator.reckon_outage(command);
         }
         // A turn or drop whose order is out is read from the reports; else it begins anew.
-        if navigator.one_shot_command().is_some_and(|wanted| wanted != command) {
+        if navigator
+            .one_shot_command()
+            .is_some_and(|wanted| wanted != command)
+        {
             navigator.pause = Pause::Wanted;
         }
         Some(navigator)

@@ -5,9 +5,7 @@
 
 use std::time::Duration;
 
-use lager_topics::{
-    Finish, Heading, Origin, Side, SteeringOrder, SteeringReport, WarehouseMap,
-};
+use lager_topics::{Finish, Heading, Origin, Side, SteeringOrder, SteeringReport, WarehouseMap};
 use lager_wire::{ArmCommand, Command, LineState, SteerFlags, WheelCommand};
 
 /// One step of the world.
@@ -106,9 +104,8 @@ impl Floor {
             let line = (value / self.side).round().clamp(0.0, count);
             (value - line * self.side).abs() <= HALF_TAPE
         };
-        let within = |value: f64, count: f64| {
-            (-HALF_TAPE..=count * self.side + HALF_TAPE).contains(&value)
-        };
+        let within =
+            |value: f64, count: f64| (-HALF_TAPE..=count * self.side + HALF_TAPE).contains(&value);
         let inside = within(x, self.columns) && within(y, self.rows);
         (inside && (near_line(x, self.columns) || near_line(y, self.rows)))
             || self.strips.iter().any(|strip| is_on(*strip, (x, y)))
@@ -162,7 +159,7 @@ struct Work {
 #[derive(Clone, Debug)]
 pub(crate) struct Body {
     pub(crate) floor: Floor,
-    trouble: Trouble,
+    pub(crate) trouble: Trouble,
     random: u64,
     pub(crate) now: Duration,
     pub(crate) x: f64,
@@ -240,7 +237,10 @@ impl Body {
             order.id
         );
         if let Some(work) = self.work.take() {
-            assert!(!work.command.is_one_shot(), "a one-shot order was not waited for");
+            assert!(
+                !work.command.is_one_shot(),
+                "a one-shot order was not waited for"
+            );
             self.replaced = work.id;
         }
         if command.is_one_shot() {

@@ -24,7 +24,12 @@ fn fetch(
     trial.deliver(1);
     assert_eq!(trial.count(EventKind::GettingItem), 1, "{}", trial.story());
     assert_eq!(trial.count(EventKind::InPosition), 1, "{}", trial.story());
-    assert_eq!(trial.count(EventKind::ItemDelivered), 1, "{}", trial.story());
+    assert_eq!(
+        trial.count(EventKind::ItemDelivered),
+        1,
+        "{}",
+        trial.story()
+    );
     trial
 }
 
@@ -71,7 +76,14 @@ fn a_way_out_that_curves() {
 
 #[test]
 fn every_crossing_on_the_way_is_announced() {
-    let trial = fetch((3, 1), (0, 0), 50, (2, 0, Side::Down), STRAIGHT, Trouble::NONE);
+    let trial = fetch(
+        (3, 1),
+        (0, 0),
+        50,
+        (2, 0, Side::Down),
+        STRAIGHT,
+        Trouble::NONE,
+    );
     let nodes: Vec<_> = trial
         .events
         .iter()
@@ -85,7 +97,14 @@ fn every_crossing_on_the_way_is_announced() {
 
 #[test]
 fn a_crossing_passed_straight_on_does_not_stop_the_robot() {
-    let trial = fetch((4, 1), (0, 0), 50, (3, 0, Side::Down), STRAIGHT, Trouble::NONE);
+    let trial = fetch(
+        (4, 1),
+        (0, 0),
+        50,
+        (3, 0, Side::Down),
+        STRAIGHT,
+        Trouble::NONE,
+    );
     // In and out at the station, round at the bar; both ways along the lower edge are straight.
     let left = trial.body.begun.iter().filter(|code| **code == 7).count();
     let right = trial.body.begun.iter().filter(|code| **code == 10).count();
@@ -96,7 +115,12 @@ fn a_crossing_passed_straight_on_does_not_stop_the_robot() {
 #[test]
 fn three_orders_one_after_the_other() {
     let products = [(0, 0, Side::Up), (1, 1, Side::Left), (1, 0, Side::Right)];
-    let mut trial = Trial::new(warehouse((2, 2), (2, 0), 50, &products), STRAIGHT, Trouble::NONE, 1);
+    let mut trial = Trial::new(
+        warehouse((2, 2), (2, 0), 50, &products),
+        STRAIGHT,
+        Trouble::NONE,
+        1,
+    );
     for (id, product) in [(1, 1), (2, 3), (3, 2)] {
         trial.order(id, product);
         trial.deliver(id);
@@ -107,7 +131,12 @@ fn three_orders_one_after_the_other() {
 #[test]
 fn a_waiting_order_is_begun_at_the_corner() {
     let products = [(0, 0, Side::Up), (1, 1, Side::Left)];
-    let mut trial = Trial::new(warehouse((2, 2), (0, 0), 50, &products), STRAIGHT, Trouble::NONE, 1);
+    let mut trial = Trial::new(
+        warehouse((2, 2), (0, 0), 50, &products),
+        STRAIGHT,
+        Trouble::NONE,
+        1,
+    );
     trial.order(1, 1);
     trial.run_for(Duration::from_secs(5));
     trial.order(2, 2);

@@ -23,9 +23,17 @@ fn finish(mut trial: Trial, killed_at: Duration) {
     trial.thoughts.push(format!("(killed at {killed_at:?})"));
     trial.deliver(1);
     // An event announced just before the kill may be announced again, never left out.
-    assert!(trial.count(EventKind::GettingItem) >= 1, "{}", trial.story());
+    assert!(
+        trial.count(EventKind::GettingItem) >= 1,
+        "{}",
+        trial.story()
+    );
     assert!(trial.count(EventKind::InPosition) >= 1, "{}", trial.story());
-    assert!(trial.count(EventKind::ItemDelivered) >= 1, "{}", trial.story());
+    assert!(
+        trial.count(EventKind::ItemDelivered) >= 1,
+        "{}",
+        trial.story()
+    );
 }
 
 /// Kills at every step of the mission, with outages of all lengths in turn.
@@ -38,7 +46,11 @@ fn killed_everywhere(mut trial: Trial) {
         fork.kill(outages[kills % outages.len()]);
         finish(fork, trial.body.now);
         kills += 1;
-        assert!(trial.body.now < Duration::from_secs(120), "{}", trial.story());
+        assert!(
+            trial.body.now < Duration::from_secs(120),
+            "{}",
+            trial.story()
+        );
     }
     assert!(kills > 4000, "only {kills} steps");
 }
@@ -66,7 +78,13 @@ fn a_status_goes_through_a_navigator_unchanged() {
             ..trial.navigator.status()
         };
         let again = Navigator::resume(LogicConfig::default(), &status).status();
-        assert_eq!(NavigatorStatus { stopped: 1, ..again }, status);
+        assert_eq!(
+            NavigatorStatus {
+                stopped: 1,
+                ..again
+            },
+            status
+        );
     }
 }
 
@@ -92,7 +110,10 @@ fn a_waiting_order_survives() {
 #[test]
 fn a_granted_arm_stays_granted() {
     let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Down));
-    assert!(trial.run_until(Duration::from_secs(60), |trial| trial.phase() == Phase::Picking));
+    assert!(
+        trial.run_until(Duration::from_secs(60), |trial| trial.phase()
+            == Phase::Picking)
+    );
     trial.kill(Duration::from_millis(300));
     let order = trial.navigator.current_order().unwrap();
     assert_eq!((order.code, order.arm_granted), (1, 1));
@@ -105,7 +126,11 @@ fn order_ids_go_on_after_the_old_ones() {
     let before = trial.status.command_id;
     trial.kill(Duration::from_millis(300));
     trial.run_for(Duration::from_millis(100));
-    assert!(trial.status.command_id >= before, "{} < {before}", trial.status.command_id);
+    assert!(
+        trial.status.command_id >= before,
+        "{} < {before}",
+        trial.status.command_id
+    );
 }
 
 #[test]
@@ -124,7 +149,10 @@ fn a_status_that_makes_no_sense_yields_a_fresh_navigator() {
         ..NavigatorStatus::default()
     };
     let status = Navigator::resume(LogicConfig::default(), &nonsense).status();
-    assert_eq!((status.phase.get(), status.delivered), (Some(Phase::WaitingForMap), 0));
+    assert_eq!(
+        (status.phase.get(), status.delivered),
+        (Some(Phase::WaitingForMap), 0)
+    );
 }
 
 proptest! {

@@ -120,7 +120,8 @@ impl Trial {
         } = self.navigator.handle(now, input);
         for event in &events {
             let kind = event.kind.get().unwrap();
-            self.events.push((kind, event.order_id, Node::new(event.x, event.y)));
+            self.events
+                .push((kind, event.order_id, Node::new(event.x, event.y)));
             self.check_event(kind);
         }
         self.thoughts
@@ -237,7 +238,11 @@ impl Trial {
             }
             EventKind::ItemDelivered => {
                 let distance = self.body.distance_to(self.body.floor.bar);
-                assert!((120.0..180.0).contains(&distance), "{distance} {}", self.story());
+                assert!(
+                    (120.0..180.0).contains(&distance),
+                    "{distance} {}",
+                    self.story()
+                );
             }
             _ => {}
         }
@@ -245,12 +250,20 @@ impl Trial {
 
     fn assert_at(&self, place: (f64, f64)) {
         let off = self.body.distance_to(place);
-        assert!(off < PLACE_MM, "{off:.0} mm off {place:?}: {}", self.story());
+        assert!(
+            off < PLACE_MM,
+            "{off:.0} mm off {place:?}: {}",
+            self.story()
+        );
     }
 
     fn assert_looks(&self, heading: lager_topics::Heading, turned: f64) {
         let off = (self.body.degrees_off(heading) - turned).abs();
-        assert!(off < LOOK_DEG, "{off:.0} degrees off {heading:?}: {}", self.story());
+        assert!(
+            off < LOOK_DEG,
+            "{off:.0} degrees off {heading:?}: {}",
+            self.story()
+        );
     }
 
     /// What the robot thought, for a failed test.
@@ -268,6 +281,9 @@ impl Trial {
 
     /// How often an event was announced.
     pub(crate) fn count(&self, wanted: EventKind) -> usize {
-        self.events.iter().filter(|(kind, ..)| *kind == wanted).count()
+        self.events
+            .iter()
+            .filter(|(kind, ..)| *kind == wanted)
+            .count()
     }
 }

@@ -39,10 +39,16 @@ fn state(truth: &Truth) -> GoodState {
 fn goods_are_picked_up_and_dropped_at_the_bar() {
     let mut pi = loaded();
     let gripper = pi.heard.servos[7].unwrap();
-    assert!(gripper.position > 300, "held open by the goods: {gripper:?}");
+    assert!(
+        gripper.position > 300,
+        "held open by the goods: {gripper:?}"
+    );
     assert!(gripper.load < -200, "pressing: {gripper:?}");
     assert_eq!(state(&pi.robot.truth()), GoodState::Held);
-    assert!(pi.robot.truth().world.goods[0].position[2] > 200.0, "lifted");
+    assert!(
+        pi.robot.truth().world.goods[0].position[2] > 200.0,
+        "lifted"
+    );
 
     // In front of the bar, as after following the exit.
     pi.place(-640.0, 0.0, PI);
@@ -97,8 +103,20 @@ fn a_kept_world_is_taken_up_with_what_is_held() {
 
     let mut pi = Pi::around(robot);
     pi.until(ms(1_000), Pi::is_up);
-    assert!(pi.heard.ups.iter().all(|(_, up)| up.reset == lager_wire::ResetCause::External));
+    assert!(
+        pi.heard
+            .ups
+            .iter()
+            .all(|(_, up)| up.reset == lager_wire::ResetCause::External)
+    );
     pi.run(ms(3_000));
-    assert_eq!(pi.robot.truth().carrying, Some(1), "the board's start drops nothing");
-    assert_eq!(pi.robot.truth().world.servo_positions, before.world.servo_positions);
+    assert_eq!(
+        pi.robot.truth().carrying,
+        Some(1),
+        "the board's start drops nothing"
+    );
+    assert_eq!(
+        pi.robot.truth().world.servo_positions,
+        before.world.servo_positions
+    );
 }

@@ -21,16 +21,28 @@ fn long() -> Warehouse {
 #[test]
 fn both_boards_say_who_they_are_and_then_report() {
     let mut pi = Pi::in_builtin("small");
-    let mut callsigns: Vec<_> = pi.heard.ups.iter().map(|(wire, up)| (*wire, up.callsign)).collect();
+    let mut callsigns: Vec<_> = pi
+        .heard
+        .ups
+        .iter()
+        .map(|(wire, up)| (*wire, up.callsign))
+        .collect();
     callsigns.sort_by_key(|(_, callsign)| callsign.code());
     assert_eq!(
         callsigns,
-        [(Wire::Sensor, Callsign::Sensor), (Wire::Steering, Callsign::Steering)]
+        [
+            (Wire::Sensor, Callsign::Sensor),
+            (Wire::Steering, Callsign::Steering)
+        ]
     );
     pi.run(ms(1_000));
     assert_eq!(pi.lost(), 0);
     // 200 sensor packets and 200 reports a second, servos and statuses beside them.
-    assert!((380..450).contains(&pi.heard.packets), "{}", pi.heard.packets);
+    assert!(
+        (380..450).contains(&pi.heard.packets),
+        "{}",
+        pi.heard.packets
+    );
     assert!(pi.heard.servos.iter().all(Option::is_some));
     assert!(pi.heard.steer.unwrap().flags.contains(SteerFlags::EXDE_OK));
 }
@@ -46,7 +58,11 @@ fn the_boards_work_at_the_originals_baud_rate() {
     pi.wheels(WheelCommand::ActiveForward);
     pi.run(ms(5_000));
     assert_eq!(pi.lost(), 0);
-    assert!(pi.pose().x > 250.0 && pi.pose().y.abs() < 5.0, "{:?}", pi.pose());
+    assert!(
+        pi.pose().x > 250.0 && pi.pose().y.abs() < 5.0,
+        "{:?}",
+        pi.pose()
+    );
 }
 
 #[test]
@@ -85,35 +101,52 @@ fn following_settles_on_the_line_from_twenty_millimetres_beside() {
 #[test]
 fn a_turn_at_a_crossing_ends_on_tape_a_quarter_further() {
     for seed in 1..=8 {
-        for (command, quarter) in [(WheelCommand::LeftPerp, 1.0), (WheelCommand::RightPerp, -1.0)] {
+        for (command, quarter) in [
+            (WheelCommand::LeftPerp, 1.0),
+            (WheelCommand::RightPerp, -1.0),
+        ] {
             for heading in [0.0, FRAC_PI_2, PI] {
                 let mut pi = Pi::started(&Warehouse::builtin("small").unwrap(), seed);
                 pi.place(500.0, 500.0, heading);
                 let flags = pi.carry_out(Command::Wheel(command), ms(4_000));
                 pi.run(ms(500));
                 let turned = (pi.pose().heading - heading).to_degrees() * quarter;
-                println!("seed {seed} {command:?} from {:.0}: {turned:.2}", heading.to_degrees());
+                println!(
+                    "seed {seed} {command:?} from {:.0}: {turned:.2}",
+                    heading.to_degrees()
+                );
                 assert!(!flags.contains(SteerFlags::ABORTED));
                 assert!((turned - 90.0).abs() < 3.0, "{turned}");
-                assert_eq!(pi.heard.states.last().unwrap().1, LineState::OnLine);
+                assert_ne!(pi.heard.states.last().unwrap().1, LineState::NotOnLine);
                 assert_eq!(pi.robot.truth().duties, [0, 0]);
             }
         }
     }
 }
 
-/// The states a robot meets on its way along the line, without the followers' small deviations.
+/// The states a robot meets on its way along the line: those that last 50 ms, since a crossing
+/// passed a little aslant shows one half for a moment, and without the follower's deviations.
 fn met(pi: &mut Pi, x: f64, y: f64, heading: f64, time: u64) -> Vec<LineState> {
     pi.place(x, y, heading);
     pi.run(ms(50));
     pi.heard.states.clear();
     pi.wheels(WheelCommand::ActiveForward);
     pi.run(ms(time));
-    let mut states: Vec<_> = pi
+    let ends = pi
         .heard
         .states
         .iter()
-        .map(|(_, state)| *state)
+        .skip(1)
+        .map(|(at, _)| *at)
+        .chain([pi.robot.now()]);
+    let lasting = pi
+        .heard
+        .states
+        .iter()
+        .zip(ends)
+        .filter(|((from, _), to)| *to - *from >= ms(50));
+    let mut states: Vec<_> = lasting
+        .map(|((_, state), _)| *state)
         .filter(|state| !matches!(state, LineState::LeftOfLine | LineState::RightOfLine))
         .collect();
     states.dedup();
@@ -125,7 +158,11 @@ fn a_mark_is_told_on_its_side_and_a_crossing_on_both() {
     use LineState::{FourWay, OnLine, StationToLeft, StationToRight};
     let mut warehouse = Warehouse::builtin("small").unwrap();
     warehouse.size = [3, 3];
-    warehouse.products = vec![Product { id: 1, square: [1, 1], side: Side::Down }];
+    warehouse.products = vec![Product {
+        id: 1,
+        square: [1, 1],
+        side: Side::Down,
+    }];
     let mut pi = Pi::started(&warehouse, 1);
     // Along y = 500 from x = 550: the station of square (1, 1) at 750, the crossing at 1000.
     assert_eq!(
@@ -134,7 +171,15 @@ fn a_mark_is_told_on_its_side_and_a_crossing_on_both() {
     );
     assert_eq!(
         met(&mut pi, 1_450.0, 500.0, PI, 13_000),
-        [OnLine, FourWay, OnLine, StationToRight, OnLine, FourWay, OnLine]
+        [
+            OnLine,
+            FourWay,
+            OnLine,
+            StationToRight,
+            OnLine,
+            FourWay,
+            OnLine
+        ]
     );
 }
 
@@ -144,8 +189,14 @@ fn a_border_crossing_looks_like_a_mark() {
     let mut warehouse = Warehouse::builtin("small").unwrap();
     warehouse.products.clear();
     let mut pi = Pi::started(&warehouse, 2);
-    assert_eq!(met(&mut pi, 200.0, 0.0, 0.0, 5_000), [OnLine, StationToLeft, OnLine]);
-    assert_eq!(met(&mut pi, 200.0, 1_000.0, 0.0, 5_000), [OnLine, StationToRight, OnLine]);
+    assert_eq!(
+        met(&mut pi, 200.0, 0.0, 0.0, 5_000),
+        [OnLine, StationToLeft, OnLine]
+    );
+    assert_eq!(
+        met(&mut pi, 200.0, 1_000.0, 0.0, 5_000),
+        [OnLine, StationToRight, OnLine]
+    );
 }
 
 #[test]
@@ -179,16 +230,21 @@ fn every_exit_can_be_followed_to_its_bar() {
             (Curve::S, 40),
         ] {
             let mut warehouse = Warehouse::builtin("small").unwrap();
-            warehouse.exit = Exit { length_cm: 130, curve, radius_cm };
+            warehouse.exit = Exit {
+                length_cm: 130,
+                curve,
+                radius_cm,
+            };
             let mut pi = Pi::started(&warehouse, seed);
             pi.place(0.0, 0.0, PI);
             pi.run(ms(20));
             pi.heard.states.clear();
             pi.wheels(WheelCommand::ActiveForward);
-            let mut aside: f64 = 0.0;
-            pi.watch(ms(17_000), |pi| {
-                let (x, y) = pi.pose().point(160.0, 0.0);
-                aside = aside.max(pi.robot.world().tape().distance(x, y));
+            pi.until(ms(20_000), |pi| {
+                pi.heard
+                    .states
+                    .last()
+                    .is_some_and(|(_, state)| *state == LineState::DropStation)
             });
             let bar = pi.robot.world().tape().bar();
             let pose = pi.pose();
@@ -196,16 +252,19 @@ fn every_exit_can_be_followed_to_its_bar() {
                 (pose.x - bar.x) * bar.heading.cos() + (pose.y - bar.y) * bar.heading.sin(),
                 (pose.y - bar.y) * bar.heading.cos() - (pose.x - bar.x) * bar.heading.sin(),
             );
-            let states: Vec<_> = pi.heard.states.iter().map(|(_, state)| *state).collect();
             println!(
-                "seed {seed} {curve:?} {radius_cm} cm: at the bar {ahead:.0} ahead {left:.1} left {:.1} deg, \
-                 {} states, {states:?}",
-                (pose.heading - bar.heading).to_degrees(),
-                states.len()
+                "seed {seed} {curve:?} {radius_cm} cm: axle {ahead:.0} mm ahead, {left:.1} mm left of \
+                 the bar's middle, {:.1} degrees",
+                (pose.heading - bar.heading).to_degrees()
             );
-            assert!(states.contains(&LineState::FourWay), "{curve:?}: {states:?}");
-            assert!(!states.contains(&LineState::NotOnLine), "{curve:?}: {states:?}");
+            assert!((-165.0..-135.0).contains(&ahead), "{curve:?}: {ahead}");
             assert!(left.abs() < 25.0, "{curve:?}: {left}");
+            assert!(
+                pi.heard
+                    .states
+                    .iter()
+                    .all(|(_, state)| *state != LineState::NotOnLine)
+            );
         }
     }
 }
@@ -213,30 +272,28 @@ fn every_exit_can_be_followed_to_its_bar() {
 #[test]
 fn an_obstacle_is_told_at_its_distance() {
     let mut warehouse = long();
-    warehouse.obstacles.push(Obstacle { between: [[0, 0], [1, 0]] });
+    warehouse.obstacles.push(Obstacle {
+        between: [[0, 0], [1, 0]],
+    });
     let mut pi = Pi::started(&warehouse, 1);
     // Its face is at x = 1960 and the ranger 100 mm ahead of the axle.
     for (centimetres, tolerance) in [(12, 1), (20, 1), (35, 2), (60, 4), (75, 8)] {
         pi.place(1_860.0 - 10.0 * f64::from(centimetres), 0.0, 0.0);
         pi.run(ms(150));
         let told = pi.heard.distance.expect("it is in range");
-        assert!(told.abs_diff(centimetres) <= tolerance, "{centimetres} cm told as {told}");
+        assert!(
+            told.abs_diff(centimetres) <= tolerance,
+            "{centimetres} cm told as {told}"
+        );
     }
     pi.place(400.0, 0.0, 0.0);
     pi.run(ms(150));
     assert_eq!(pi.heard.distance, None);
     pi.place(1_860.0 - 50.0, 0.0, 0.0);
     pi.run(ms(150));
-    assert_eq!(pi.heard.distance, Some(10), "never less than the ranger can measure");
-}
-
-#[test]
-fn tmp_bar() {
-    let mut good = 0;
-    for seed in 1..=60 {
-        let mut pi = Pi::started(&Warehouse::builtin("small").unwrap(), seed);
-        let states = met(&mut pi, -100.0, 0.0, PI, 8_300);
-        good += u32::from(states.contains(&LineState::DropStation));
-    }
-    println!("bar found {good} of 60");
+    assert_eq!(
+        pi.heard.distance,
+        Some(10),
+        "never less than the ranger can measure"
+    );
 }

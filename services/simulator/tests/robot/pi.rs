@@ -123,7 +123,9 @@ impl Pi {
     pub(crate) fn carry_out(&mut self, command: Command, limit: Duration) -> SteerFlags {
         let seq = self.command(command);
         self.until(limit, |pi| {
-            pi.heard.steer.is_some_and(|steer| steer.finished_seq == seq)
+            pi.heard
+                .steer
+                .is_some_and(|steer| steer.finished_seq == seq)
         });
         self.heard.steer.expect("it was reported").flags
     }
@@ -171,17 +173,28 @@ impl Pi {
                 self.robot.write(Wire::Steering, &bytes);
             }
         }
-        let next = self.lines.iter().map(|line| line.link.next_due()).min().unwrap_or(end);
+        let next = self
+            .lines
+            .iter()
+            .map(|line| line.link.next_due())
+            .min()
+            .unwrap_or(end);
         let next = next.max(now + ms(1)).min(end);
-        let next = if self.command.is_some() { next.min(self.renew_at) } else { next };
+        let next = if self.command.is_some() {
+            next.min(self.renew_at)
+        } else {
+            next
+        };
         let now = self.robot.advance_to_output(next);
         let mut packets = Vec::new();
         for line in &mut self.lines {
             let mut bytes = Vec::new();
             self.robot.read(line.wire, &mut bytes);
             self.heard.bytes.extend(&bytes);
-            let mut events: Vec<_> =
-                bytes.iter().filter_map(|byte| line.link.push(*byte, now)).collect();
+            let mut events: Vec<_> = bytes
+                .iter()
+                .filter_map(|byte| line.link.push(*byte, now))
+                .collect();
             events.extend(line.link.poll(now));
             for event in events {
                 match event {
@@ -206,7 +219,8 @@ impl Pi {
         self.heard.packets += 1;
         match packet.payload {
             Payload::Line(state) => {
-                if self.heard.states.last().is_none_or(|(_, last)| *last != state) {
+                let last = self.heard.states.last().map(|(_, last)| *last);
+                if last != Some(state) {
                     self.heard.states.push((now, state));
                 }
             }

@@ -83,7 +83,12 @@ impl<P: Peer> Board<P> {
 
     /// Puts the cable in again: another port under the same path.
     pub(crate) fn plug(&self) {
-        self.lock().pty = Some(Pty::new(&self.link));
+        self.plug_at(&self.link);
+    }
+
+    /// Puts the cable in where it gets another path.
+    pub(crate) fn plug_at(&self, link: &Path) {
+        self.lock().pty = Some(Pty::new(link));
     }
 
     pub(crate) fn freeze(&self, frozen: bool) {

@@ -3,7 +3,11 @@
 //!
 //! Every robot has its own bus prefix and folder, and removes both when it is dropped. Nothing
 //! here waits without an end: [`wait_until`] panics after [`PATIENCE`].
-#![allow(dead_code, reason = "each test program uses a part of it")]
+#![allow(
+    dead_code,
+    unused_imports,
+    reason = "each test program uses a part of it"
+)]
 
 mod board;
 mod original;
@@ -106,7 +110,11 @@ impl Drop for Isolation {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder);
         let prefix = self.name();
-        for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+        for file in std::fs::read_dir("/dev/shm")
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
             if file.file_name().to_string_lossy().starts_with(prefix) {
                 let _ = std::fs::remove_file(file.path());
             }
@@ -178,6 +186,8 @@ pub(crate) struct Seen<T: Topic> {
     subscriber: Subscriber<T>,
     pub(crate) last: Option<T::Payload>,
     pub(crate) count: usize,
+    /// How many samples the writer had sent with the last one seen.
+    pub(crate) sent: u64,
 }
 
 impl<T: Topic> Seen<T> {
@@ -186,6 +196,7 @@ impl<T: Topic> Seen<T> {
             subscriber: bus.subscriber().unwrap(),
             last: None,
             count: 0,
+            sent: 0,
         }
     }
 
@@ -202,6 +213,7 @@ impl<T: Topic> Seen<T> {
         let mut all = Vec::new();
         while let Ok(Some(sample)) = self.subscriber.receive() {
             self.count += 1;
+            self.sent = sample.stamp().sequence + 1;
             all.push(*sample);
         }
         all
@@ -274,22 +286,42 @@ impl Hands {
         });
     }
 
-    pub(crate) fn wait_for_health(&mut self, what: &str, condition: impl Fn(&Health) -> bool) -> Health {
-        wait_until(what, || self.health.look().is_some_and(|health| condition(&health)));
+    pub(crate) fn wait_for_health(
+        &mut self,
+        what: &str,
+        condition: impl Fn(&Health) -> bool,
+    ) -> Health {
+        wait_until(what, || {
+            self.health.look().is_some_and(|health| condition(&health))
+        });
         self.health.last.unwrap()
     }
 
-    pub(crate) fn wait_for_state(&mut self, what: &str, condition: impl Fn(&SteeringReport) -> bool) {
-        wait_until(what, || self.state.look().is_some_and(|state| condition(&state)));
+    pub(crate) fn wait_for_state(
+        &mut self,
+        what: &str,
+        condition: impl Fn(&SteeringReport) -> bool,
+    ) {
+        wait_until(what, || {
+            self.state.look().is_some_and(|state| condition(&state))
+        });
     }
 
     pub(crate) fn wait_for_line(&mut self, what: &str, condition: impl Fn(&LineFrame) -> bool) {
-        wait_until(what, || self.line.look().is_some_and(|line| condition(&line)));
+        wait_until(what, || {
+            self.line.look().is_some_and(|line| condition(&line))
+        });
     }
 
-    pub(crate) fn wait_for_distance(&mut self, what: &str, condition: impl Fn(&DistanceFrame) -> bool) {
+    pub(crate) fn wait_for_distance(
+        &mut self,
+        what: &str,
+        condition: impl Fn(&DistanceFrame) -> bool,
+    ) {
         wait_until(what, || {
-            self.distance.look().is_some_and(|distance| condition(&distance))
+            self.distance
+                .look()
+                .is_some_and(|distance| condition(&distance))
         });
     }
 }

@@ -147,7 +147,8 @@ impl Peer for OriginalSensor {
         if self.flip_flop {
             self.board.send(1, [self.state, 7, 7, 7, 7, 7, 7, 7], out);
         } else {
-            self.board.send(2, [self.distance, 9, 9, 9, 9, 9, 9, 9], out);
+            self.board
+                .send(2, [self.distance, 9, 9, 9, 9, 9, 9, 9], out);
         }
     }
 }

@@ -10,6 +10,9 @@
 //! several times at shutdown. If this process is killed, the steering board halts by itself
 //! within 150 ms.
 
+mod links;
+mod requests;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -17,12 +20,12 @@ use std::time::Duration;
 use heapless::spsc::{Consumer, Queue};
 use lager_ports::{Bus, Clock, PortError, Publisher, Server, Shutdown, Subscriber, Waiter};
 use lager_topics::{
-    Answer, Ask, AskKind, BridgeRequest, Health, InputKind, LinkHealth, Mode, OperatorInput,
-    Outcome, SteeringCommand, SteeringState,
+    BridgeRequest, Health, InputKind, LinkHealth, Mode, OperatorInput, SteeringCommand,
+    SteeringState,
 };
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
-    Callsign, PACKET_LENGTH, Payload, SettingKey, SteerCommand, SteerData, SteerFlags, Version,
+    Callsign, PACKET_LENGTH, Payload, SettingKey, SteerCommand, SteerData, SteerFlags,
 };
 
 use crate::arbiter::Arbiter;
@@ -31,7 +34,7 @@ use crate::config::BridgeConfig;
 use crate::frames::{ServoTable, steering_report};
 use crate::reader::{PortEvent, QUEUE, Reader, Shared};
 use crate::serial::{PacketWriter, Sent, SerialPort};
-use crate::settings::{self, Progress, Settings};
+use crate::settings::Settings;
 
 /// How often `link/health` is published when nothing changes, in robot time.
 const HEALTH_PERIOD: Duration = Duration::from_millis(100);
@@ -214,112 +217,6 @@ impl<'a> Core<'a> {
         self.settings.next_due().filter(|_| either)
     }
 
-    /// Takes what the readers have brought.
-    fn take_events(&mut self) {
-        for place in 0..self.ports.len() {
-            while let Some(event) = self.ports[place].events.dequeue() {
-                self.take(place, event);
-            }
-        }
-    }
-
-    fn take(&mut self, place: usize, event: PortEvent) {
-        match event {
-            PortEvent::Opened(device) => {
-                let port = &mut self.ports[place];
-                port.device = Some(device);
-                port.writer = PacketWriter::default();
-                port.transmitter = HostTransmitter::new();
-            }
-            PortEvent::Lost => {
-                self.board_down(place);
-                self.boards.gone(place);
-                self.ports[place].device = None;
-                self.publish_health(self.clock.now());
-            }
-            PortEvent::SendSyn => {
-                let syn = self.ports[place].transmitter.syn();
-                self.write(place, &syn);
-            }
-            PortEvent::SendAck { version, up } => {
-                let ack = self.ports[place].transmitter.ack(version);
-                self.write(place, &ack);
-                if let Some(up) = up {
-                    self.board_up(place, &up);
-                }
-            }
-            PortEvent::Adopt(up) => {
-                self.ports[place].transmitter.adopt(up.up.version);
-                self.board_up(place, &up);
-            }
-            PortEvent::Silent => {
-                // What still waits in the driver would be old when it is sent.
-                if let Some(device) = &self.ports[place].device {
-                    device.discard_output();
-                }
-                self.ports[place].writer = PacketWriter::default();
-                tracing::warn!(
-                    "the board on {} has fallen silent",
-                    self.config.ports[place].display()
-                );
-                self.board_down(place);
-                self.publish_health(self.clock.now());
-            }
-            PortEvent::Steer { data, at_ns } => self.take_report(place, data, at_ns),
-            PortEvent::Arm(data) => self.servos.hear(&data),
-            PortEvent::Status(status) => self.boards.status(place, &status),
-            PortEvent::Setting(reply) => self.settings.answer(&reply),
-        }
-    }
-
-    fn board_up(&mut self, place: usize, board: &crate::reader::BoardUp) {
-        let now = self.clock.now();
-        let up = board.up;
-        // A steering board that was on this port is not there any more.
-        if up.callsign != Callsign::Steering {
-            self.board_down(place);
-        }
-        self.boards.up(place, self.config.baud, board);
-        self.settings.board_up(now, up.callsign);
-        if up.callsign == Callsign::Steering {
-            self.report = None;
-            self.servos = ServoTable::default();
-            self.arbiter.board_up(now, up.version, up.rebooted);
-        }
-        tracing::info!(
-            port = %self.config.ports[place].display(),
-            version = ?up.version,
-            epoch = board.link_epoch,
-            reset = ?up.reset,
-            "the {} board {}",
-            if up.callsign == Callsign::Steering { "steering" } else { "sensor" },
-            if up.rebooted { "has restarted" } else { "is up" },
-        );
-        self.publish_health(now);
-    }
-
-    fn board_down(&mut self, place: usize) {
-        if self.boards.down(place) == Some(Callsign::Steering) {
-            self.arbiter.board_down();
-            self.report = None;
-        }
-    }
-
-    fn take_report(&mut self, place: usize, data: SteerData, at_ns: u64) {
-        if self.boards.place(Callsign::Steering) != Some(place) {
-            return;
-        }
-        if self.boards.version(Callsign::Steering) == Some(Version::One) {
-            self.arbiter.observe(self.clock.now(), &data);
-            self.report = Some(data);
-            let at_rest = data.left_duty == 0 && data.right_duty == 0;
-            if let Some((writes @ 1.., rest)) = &mut self.parking {
-                *rest = at_rest && *writes > 0;
-            }
-        }
-        self.publish_state(at_ns);
-    }
-
     /// Drains orders and buttons completely.
     fn take_orders(&mut self) {
         let now = self.clock.now();
@@ -461,94 +358,6 @@ impl<'a> Core<'a> {
         match sent {
             Ok(()) => self.state_revision = self.arbiter.revision(),
             Err(error) => self.complain(&error),
-        }
-    }
-
-    /// Answers one request.
-    fn answer(&mut self, ask: &Ask) -> Answer {
-        let outcome = match (ask.kind.get(), ask.mode.get()) {
-            (Some(AskKind::SetMode), Some(mode)) => {
-                tracing::info!(?mode, "the mode is set");
-                self.arbiter.set_mode(mode);
-                Outcome::Done
-            }
-            (Some(AskKind::Resume), _) => {
-                tracing::info!("resumed");
-                self.arbiter.resume_from_stop();
-                Outcome::Done
-            }
-            (Some(AskKind::SetGains), _) => self.set(
-                Callsign::Steering,
-                &[
-                    (SettingKey::GainP, ask.gain_p.into()),
-                    (SettingKey::GainD, ask.gain_d.into()),
-                ],
-            ),
-            (Some(AskKind::Calibrate), _) => {
-                self.set(Callsign::Sensor, &[(SettingKey::Calibrate, 1)])
-            }
-            (Some(AskKind::ResetBoards), _) => {
-                tracing::warn!(
-                    "the boards cannot be restarted from here: the protocol has no packet for it; \
-                     press the button on the board or switch its power off and on"
-                );
-                Outcome::Refused
-            }
-            (Some(AskKind::SetMode), None) | (None, _) => Outcome::Refused,
-        };
-        // What is answered is in force, and seen to be.
-        self.flush();
-        let gain = |key| {
-            let value = self.settings.in_force(key).unwrap_or(0);
-            u8::try_from(value).unwrap_or(0)
-        };
-        Answer {
-            outcome: outcome.into(),
-            mode: self.arbiter.mode().into(),
-            stopped: self.arbiter.is_stopped().into(),
-            gain_p: gain(SettingKey::GainP),
-            gain_d: gain(SettingKey::GainD),
-            ..Answer::default()
-        }
-    }
-
-    /// Sends settings to a board and turns the loop until it has answered.
-    fn set(&mut self, board: Callsign, wishes: &[(SettingKey, i16)]) -> Outcome {
-        match self.boards.version(board) {
-            None => return Outcome::NoBoard,
-            // An original board knows no settings.
-            Some(Version::Original) => return Outcome::Refused,
-            Some(Version::One) => (),
-        }
-        let start = self.clock.now();
-        for (key, value) in wishes {
-            self.settings.want(start, *key, *value);
-        }
-        self.flush();
-        let progress = |settings: &Settings| {
-            let of = |(key, _): &(SettingKey, i16)| settings.progress(*key);
-            wishes
-                .iter()
-                .map(of)
-                .max_by_key(|progress| match progress {
-                    Progress::Accepted => 0,
-                    Progress::Refused => 1,
-                    Progress::Unanswered => 2,
-                    Progress::Pending => 3,
-                })
-        };
-        while progress(&self.settings) == Some(Progress::Pending)
-            && self.clock.now() < start + settings::LONGEST
-        {
-            self.wait();
-            self.take_events();
-            self.take_orders();
-            self.flush();
-        }
-        match progress(&self.settings) {
-            Some(Progress::Accepted) => Outcome::Done,
-            Some(Progress::Refused) => Outcome::Refused,
-            _ => Outcome::NoBoard,
         }
     }
 

@@ -17,11 +17,15 @@
 //! - A refused command is counted and changes nothing: what was under way goes on and is not renewed by it.
 //! - Of an arm command, the servos' states are told before its end is.
 
+mod ends;
+mod telling;
+
+use ends::{End, Finish};
 use lager_exde::{Receiver, Timing};
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    ArmCommand, BoardStatus, Callsign, Command, LineBits, Payload, ResetCause, Setting, SettingKey,
-    SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags,
+    ArmCommand, Callsign, Command, LineBits, Payload, ResetCause, Setting, SettingKey,
+    SettingReply, SettingStatus, SteerCommand,
 };
 
 use crate::arm::{Arm, ArmConfig, Outcome};
@@ -30,10 +34,10 @@ use crate::line::LineReader;
 use crate::load::Load;
 use crate::pd::{Gains, Pd};
 use crate::register::{CommandRegister, Receipt};
-use crate::report::{End, Ends, Finish};
 use crate::time::{first, reached};
 use crate::wheels::{Motors, STILL, Wheels};
-use crate::{Board, Motor, PACKET_GAP_US, SteeringBoard, UART_POLL_US, outbox::Outbox};
+use crate::{Board, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
+use telling::Reports;
 
 /// The steering board's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,16 +96,6 @@ struct ArmOrder {
     seq: u8,
 }
 
-/// What the Pi is told besides the regular report, and when.
-#[derive(Debug, Clone)]
-struct Reports {
-    ends: Ends,
-    reply: Option<SettingReply>,
-    status_wanted: bool,
-    status_due_us: u32,
-    data_due_us: u32,
-}
-
 /// The steering board's whole behaviour.
 #[derive(Debug, Clone)]
 pub struct SteeringUnit {
@@ -148,13 +142,7 @@ impl SteeringUnit {
             arm_waiting: None,
             arm_running: None,
             motors: None,
-            reports: Reports {
-                ends: Ends::new(),
-                reply: None,
-                status_wanted: false,
-                status_due_us: now_us,
-                data_due_us: now_us,
-            },
+            reports: Reports::new(now_us),
             load: Load::new(now_us),
             config,
         }
@@ -184,7 +172,10 @@ impl SteeringUnit {
                 Some(BoardEvent::Up) => self.greet(now_us),
                 Some(BoardEvent::Packet(packet)) => match packet.payload {
                     Payload::SteerCommand(command) => self.receive(command, now_us),
-                    Payload::Setting(setting) => self.reports.reply = Some(self.set(setting)),
+                    Payload::Setting(setting) => {
+                        let reply = self.set(setting);
+                        self.reports.replies.push(reply);
+                    }
                     _ => self.count_refused(),
                 },
             }
@@ -215,7 +206,6 @@ impl SteeringUnit {
             Some(Command::Wheel(wheel)) => {
                 self.accept(now_us);
                 self.wheels.start(wheel, command.seq);
-                self.line.pd.reset();
             }
             Some(Command::Arm(arm)) if self.wheels.is_standby() => {
                 self.accept(now_us);
@@ -364,112 +354,6 @@ impl SteeringUnit {
         self.arm_waiting.is_some() || self.arm.is_busy()
     }
 
-    fn report<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
-        self.outbox.flush(board);
-        if self.outbox.is_empty()
-            && let Some(syn) = self.link.poll(now_us)
-        {
-            self.outbox.push(syn);
-            self.outbox.flush(board);
-        }
-        if !self.link.is_up() {
-            return;
-        }
-        if reached(now_us, self.reports.status_due_us) {
-            self.reports.status_wanted = true;
-        }
-        while self.outbox.is_empty()
-            && let Some(payload) = self.next_payload(board, now_us)
-            && let Some(packet) = self.link.encode(payload)
-        {
-            self.outbox.push(packet);
-            self.outbox.flush(board);
-        }
-    }
-
-    /// What is to be told now, most urgent first. Everything but the regular report is told as soon as the
-    /// UART takes it; that one waits until the line is free, so that it is never old when it arrives.
-    fn next_payload<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> Option<Payload> {
-        if let Some(arm_data) = self.arm.take_report() {
-            return Some(Payload::ArmData(arm_data));
-        }
-        if self.reports.ends.tell_next() {
-            return Some(Payload::SteerData(self.steer_data(board, now_us)));
-        }
-        if let Some(reply) = self.reports.reply.take() {
-            return Some(Payload::SettingReply(reply));
-        }
-        if core::mem::take(&mut self.reports.status_wanted) {
-            return Some(Payload::BoardStatus(self.board_status(now_us)));
-        }
-        if reached(now_us, self.reports.data_due_us) && board.uart_idle() {
-            return Some(Payload::SteerData(self.steer_data(board, now_us)));
-        }
-        None
-    }
-
-    fn steer_data<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> SteerData {
-        self.reports.data_due_us = now_us.wrapping_add(self.config.report_period_us);
-        let (left, right) = self.motors.unwrap_or(STILL);
-        let finish = self.reports.ends.told();
-        SteerData {
-            code: self.code(),
-            left_duty: left.duty,
-            right_duty: right.duty,
-            flags: self.flags(left, right, finish.end),
-            line_error: self.line.reader.error(),
-            finished_seq: finish.seq,
-            servo_errors: self.arm.errors(),
-            battery_decivolts: board.battery_decivolts(),
-        }
-    }
-
-    /// What is being executed; 0 before the first command.
-    fn code(&self) -> u8 {
-        if self.register.copy().is_none() {
-            return 0;
-        }
-        match self.arm_running.or(self.arm_waiting) {
-            Some(order) => Command::Arm(order.command).code(),
-            None => Command::Wheel(self.wheels.command()).code(),
-        }
-    }
-
-    fn flags(&self, left: Motor, right: Motor, end: End) -> SteerFlags {
-        let mut flags = SteerFlags::NONE;
-        let busy = self.wheels.is_turning() || self.arm_is_active();
-        for (holds, flag) in [
-            (left.reverse, SteerFlags::LEFT_REVERSE),
-            (right.reverse, SteerFlags::RIGHT_REVERSE),
-            (!self.wheels.is_standby(), SteerFlags::ARM_LOCKED),
-            (self.line.fresh_since_us.is_some(), SteerFlags::EXDE_OK),
-            (self.age.is_expired(), SteerFlags::FAILSAFE),
-            (end == End::Aborted, SteerFlags::ABORTED),
-            (end == End::Refused, SteerFlags::REFUSED),
-            (busy, SteerFlags::BUSY),
-        ] {
-            if holds {
-                flags.insert(flag);
-            }
-        }
-        flags
-    }
-
-    fn board_status(&mut self, now_us: u32) -> BoardStatus {
-        self.reports.status_due_us = now_us.wrapping_add(self.config.status_period_us);
-        let (load_percent, longest_loop_100us) = self.load.report(now_us);
-        BoardStatus {
-            reset: self.reset,
-            bad_packets: self.link.bad_packets(),
-            lost_packets: self.link.lost_packets(),
-            refused: self.refused,
-            exde_errors: u8::try_from(self.receiver.errors()).unwrap_or(u8::MAX),
-            servo_timeouts: self.arm.timeouts(),
-            load_percent,
-            longest_loop_100us,
-        }
-    }
-
     fn next_due_us(&self, now_us: u32) -> u32 {
         let mut due_us = now_us.wrapping_add(LONGEST_SLEEP_US);
         due_us = first(now_us, due_us, self.arm.next_due_us(now_us));
@@ -490,16 +374,5 @@ impl SteeringUnit {
             due_us = first(now_us, due_us, other_us);
         }
         due_us
-    }
-
-    /// When the next report is due; what is overdue waits for the UART and for nothing else.
-    fn report_due_us(&self, now_us: u32) -> Option<u32> {
-        let due_us = first(now_us, self.reports.data_due_us, self.reports.status_due_us);
-        let waits = !self.outbox.is_empty() || reached(now_us, due_us);
-        Some(if waits {
-            now_us.wrapping_add(UART_POLL_US)
-        } else {
-            due_us
-        })
     }
 }

@@ -1,0 +1,33 @@
+//! Answers to settings that wait to be sent.
+
+use heapless::Deque;
+use lager_wire::SettingReply;
+
+/// The latest answers, in order.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Replies {
+    waiting: Deque<SettingReply, 4>,
+}
+
+impl Replies {
+    pub(crate) const fn new() -> Self {
+        Self {
+            waiting: Deque::new(),
+        }
+    }
+
+    /// Puts an answer behind the others. The latest matter: when there is no room the oldest gives way, and
+    /// whoever asked asks again.
+    pub(crate) fn push(&mut self, reply: SettingReply) {
+        if self.waiting.is_full() {
+            self.waiting.pop_front();
+        }
+        let stored = self.waiting.push_back(reply).is_ok();
+        debug_assert!(stored, "room was made");
+    }
+
+    /// The next answer to send.
+    pub(crate) fn pop(&mut self) -> Option<SettingReply> {
+        self.waiting.pop_front()
+    }
+}

@@ -1,0 +1,160 @@
+//! What the steering board tells the Pi, and in which order.
+//!
+//! ```text
+//!   states of servos --> ends of commands --> answers to settings --> board status --> regular report
+//!   '------------------- as soon as the UART takes them ----------------------------'  '-- when the
+//!                                                                                        UART is idle
+//! ```
+//!
+//! A servo's state comes before the end of the command that moved it, so whoever hears of the end knows
+//! where the arm is.
+
+use lager_wire::{BoardStatus, Command, Payload, SteerData, SteerFlags};
+
+use super::SteeringUnit;
+use super::ends::{End, Ends};
+use crate::replies::Replies;
+use crate::time::{first, reached};
+use crate::wheels::STILL;
+use crate::{Motor, SteeringBoard, UART_POLL_US};
+
+/// What waits to be told, and when the regular things are due.
+#[derive(Debug, Clone)]
+pub(super) struct Reports {
+    pub(super) ends: Ends,
+    pub(super) replies: Replies,
+    pub(super) status_wanted: bool,
+    pub(super) status_due_us: u32,
+    pub(super) data_due_us: u32,
+}
+
+impl Reports {
+    pub(super) const fn new(now_us: u32) -> Self {
+        Self {
+            ends: Ends::new(),
+            replies: Replies::new(),
+            status_wanted: false,
+            status_due_us: now_us,
+            data_due_us: now_us,
+        }
+    }
+}
+
+impl SteeringUnit {
+    pub(super) fn report<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        self.outbox.flush(board);
+        if self.outbox.is_empty()
+            && let Some(syn) = self.link.poll(now_us)
+        {
+            self.outbox.push(syn);
+            self.outbox.flush(board);
+        }
+        if !self.link.is_up() {
+            return;
+        }
+        if reached(now_us, self.reports.status_due_us) {
+            self.reports.status_wanted = true;
+        }
+        while self.outbox.is_empty()
+            && let Some(payload) = self.next_payload(board, now_us)
+            && let Some(packet) = self.link.encode(payload)
+        {
+            self.outbox.push(packet);
+            self.outbox.flush(board);
+        }
+    }
+
+    /// What is to be told now, most urgent first. Everything but the regular report is told as soon as the
+    /// UART takes it; that one waits until the line is free, so that it is never old when it arrives.
+    fn next_payload<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> Option<Payload> {
+        if let Some(arm_data) = self.arm.take_report() {
+            return Some(Payload::ArmData(arm_data));
+        }
+        if self.reports.ends.tell_next() {
+            return Some(Payload::SteerData(self.steer_data(board, now_us)));
+        }
+        if let Some(reply) = self.reports.replies.pop() {
+            return Some(Payload::SettingReply(reply));
+        }
+        if core::mem::take(&mut self.reports.status_wanted) {
+            return Some(Payload::BoardStatus(self.board_status(now_us)));
+        }
+        if reached(now_us, self.reports.data_due_us) && board.uart_idle() {
+            return Some(Payload::SteerData(self.steer_data(board, now_us)));
+        }
+        None
+    }
+
+    fn steer_data<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> SteerData {
+        self.reports.data_due_us = now_us.wrapping_add(self.config.report_period_us);
+        let (left, right) = self.motors.unwrap_or(STILL);
+        let finish = self.reports.ends.told();
+        SteerData {
+            code: self.code(),
+            left_duty: left.duty,
+            right_duty: right.duty,
+            flags: self.flags(left, right, finish.end),
+            line_error: self.line.reader.error(),
+            finished_seq: finish.seq,
+            servo_errors: self.arm.errors(),
+            battery_decivolts: board.battery_decivolts(),
+        }
+    }
+
+    /// What is being executed; 0 before the first command.
+    fn code(&self) -> u8 {
+        if self.register.copy().is_none() {
+            return 0;
+        }
+        match self.arm_running.or(self.arm_waiting) {
+            Some(order) => Command::Arm(order.command).code(),
+            None => Command::Wheel(self.wheels.command()).code(),
+        }
+    }
+
+    fn flags(&self, left: Motor, right: Motor, end: End) -> SteerFlags {
+        let mut flags = SteerFlags::NONE;
+        let busy = self.wheels.is_turning() || self.arm_is_active();
+        for (holds, flag) in [
+            (left.reverse, SteerFlags::LEFT_REVERSE),
+            (right.reverse, SteerFlags::RIGHT_REVERSE),
+            (!self.wheels.is_standby(), SteerFlags::ARM_LOCKED),
+            (self.line.fresh_since_us.is_some(), SteerFlags::EXDE_OK),
+            (self.age.is_expired(), SteerFlags::FAILSAFE),
+            (end == End::Aborted, SteerFlags::ABORTED),
+            (end == End::Refused, SteerFlags::REFUSED),
+            (busy, SteerFlags::BUSY),
+        ] {
+            if holds {
+                flags.insert(flag);
+            }
+        }
+        flags
+    }
+
+    fn board_status(&mut self, now_us: u32) -> BoardStatus {
+        self.reports.status_due_us = now_us.wrapping_add(self.config.status_period_us);
+        let (load_percent, longest_loop_100us) = self.load.report(now_us);
+        BoardStatus {
+            reset: self.reset,
+            bad_packets: self.link.bad_packets(),
+            lost_packets: self.link.lost_packets(),
+            refused: self.refused,
+            exde_errors: u8::try_from(self.receiver.errors()).unwrap_or(u8::MAX),
+            servo_timeouts: self.arm.timeouts(),
+            load_percent,
+            longest_loop_100us,
+        }
+    }
+
+    /// When the next report is due; what is overdue waits for the UART and for nothing else.
+    pub(super) fn report_due_us(&self, now_us: u32) -> Option<u32> {
+        let due_us = first(now_us, self.reports.data_due_us, self.reports.status_due_us);
+        let waits = !self.outbox.is_empty() || reached(now_us, due_us);
+        Some(if waits {
+            now_us.wrapping_add(UART_POLL_US)
+        } else {
+            due_us
+        })
+    }
+}

@@ -1,0 +1,297 @@
+//! The navigator's shell on the bus: it carries samples in and out and decides nothing.
+//!
+//! One turn: wait, drain every subscriber, hand each sample to the navigator, and send what
+//! changed at once: events first, then the status, then the order. Killed between any two of
+//! these, the successor knows at least as much as the bridge; an event can come twice, never not
+//! at all. An unchanged order is renewed every 40 ms of robot time.
+//!
+//! **Safe state**: silence. When this process ends, however it ends, nobody renews the order in
+//! force; the bridge brings the robot to rest when the lease is over, 120 ms later.
+
+use core::time::Duration;
+
+use lager_ports::{
+    Bus, Clock, PortError, Publisher, ReceiveError, SendError, Shutdown, Subscriber, Waiter,
+};
+use lager_topics::{
+    InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, NavMap, NavRoute, NavStatus,
+    NavigatorStatus, OperatorInput, SensorDistance, SensorLine, SteeringCommand, SteeringOrder,
+    SteeringState, Topic,
+};
+
+use crate::config::LogicConfig;
+use crate::navigator::{Input, Navigator};
+
+/// How often the order in force is renewed, in robot time; its lease is three times as long.
+const RENEWAL: Duration = Duration::from_millis(40);
+
+/// How often `nav/status` is published when nothing changes, in robot time.
+const STATUS_PERIOD: Duration = Duration::from_millis(50);
+
+/// Longest wait for anything, in real time: a wake can be missed, and the shutdown flag is looked
+/// at that often.
+const LONGEST_WAIT: Duration = Duration::from_millis(20);
+
+/// How long a predecessor's status is waited for, in real time.
+const RESUME_WAIT: Duration = Duration::from_millis(500);
+
+/// Runs the logic unit until `shutdown` is requested.
+///
+/// # Errors
+/// Logic's place on the bus cannot be had; the sentence says what to do.
+pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), PortError> {
+    let kept = if config.resume {
+        bus.kept::<NavStatus>(RESUME_WAIT)?
+    } else {
+        None
+    };
+    let mut shell = Shell::new(bus, config, kept.as_ref())?;
+    shutdown.wake(shell.waiter.ringer()?);
+    shell.publish_status(shell.clock.now());
+    while !shutdown.is_requested() {
+        shell.turn();
+    }
+    Ok(())
+}
+
+struct Shell {
+    clock: Clock,
+    waiter: Waiter,
+    navigator: Navigator,
+
+    line: Subscriber<SensorLine>,
+    distance: Subscriber<SensorDistance>,
+    steering: Subscriber<SteeringState>,
+    health: Subscriber<LinkHealth>,
+    map: Subscriber<NavMap>,
+    orders: Subscriber<MissionOrder>,
+    inputs: Subscriber<OperatorInput>,
+
+    commands: Publisher<SteeringCommand>,
+    status: Publisher<NavStatus>,
+    route: Publisher<NavRoute>,
+    events: Publisher<MissionEvent>,
+    thoughts: Publisher<LogThought>,
+
+    sent_status: NavigatorStatus,
+    status_due: Duration,
+    sent_order: Option<SteeringOrder>,
+    renewal_due: Duration,
+    lost_before: u64,
+    complaints: u32,
+}
+
+impl Shell {
+    fn new(
+        bus: &Bus,
+        config: &LogicConfig,
+        kept: Option<&NavigatorStatus>,
+    ) -> Result<Self, PortError> {
+        let navigator = match kept {
+            Some(status) => {
+                tracing::info!(
+                    phase = ?status.phase,
+                    order = status.order_id,
+                    "the state of an earlier navigator is taken up"
+                );
+                Navigator::resume(*config, status)
+            }
+            None => Navigator::new(*config),
+        };
+        Ok(Self {
+            clock: *bus.clock(),
+            // Before the subscribers: what they miss while they are made is drained anyway.
+            waiter: bus.waiter(config.waiting)?,
+            line: bus.subscriber()?,
+            distance: bus.subscriber()?,
+            steering: bus.subscriber()?,
+            health: bus.subscriber()?,
+            map: bus.subscriber()?,
+            orders: bus.subscriber()?,
+            inputs: bus.subscriber()?,
+            commands: bus.publisher()?,
+            status: bus.publisher()?,
+            route: bus.publisher()?,
+            events: bus.publisher()?,
+            thoughts: bus.publisher()?,
+            sent_status: navigator.status(),
+            navigator,
+            status_due: Duration::ZERO,
+            sent_order: None,
+            renewal_due: Duration::ZERO,
+            lost_before: kept.map_or(0, |status| status.frames_lost),
+            complaints: 0,
+        })
+    }
+
+    /// One turn of the loop.
+    fn turn(&mut self) {
+        self.wait();
+        // First who may drive and in what world, then what people want, then what the robot
+        // senses: the line last, so that its decision knows all the rest.
+        self.take_states();
+        self.take_wishes();
+        self.take_senses();
+        self.tell(Input::Tick, Clock::monotonic_ns());
+        self.keep_time();
+    }
+
+    fn wait(&self) {
+        let due = self.status_due.min(self.renewal_due);
+        let left = due.saturating_sub(self.clock.now());
+        self.waiter.wait(self.clock.real(left).min(LONGEST_WAIT));
+    }
+
+    fn take_states(&mut self) {
+        let health = self.health.latest();
+        if let Some((health, at_ns)) = self.unpack(health)
+            && let Some(mode) = health.mode.get()
+        {
+            let stopped = health.stopped != 0;
+            self.tell(Input::Mode { mode, stopped }, at_ns);
+        }
+        let map = self.map.latest();
+        if let Some((map, at_ns)) = self.unpack(map) {
+            self.tell(Input::Map(&map), at_ns);
+        }
+    }
+
+    fn take_wishes(&mut self) {
+        loop {
+            let order = self.orders.receive();
+            let Some((order, at_ns)) = self.unpack(order) else {
+                break;
+            };
+            self.tell(Input::Order(&order), at_ns);
+        }
+        loop {
+            let input = self.inputs.receive();
+            let Some((input, at_ns)) = self.unpack(input) else {
+                break;
+            };
+            match input.kind.get() {
+                Some(InputKind::PickupDone) => {
+                    let order_id = input.order_id;
+                    self.tell(Input::PickupDone { order_id }, at_ns);
+                }
+                Some(InputKind::ResetPressed) => self.tell(Input::Reset, at_ns),
+                // The switch is the bridge's (E14): the mode comes back with its health.
+                Some(InputKind::SwitchPressed) | None => {}
+            }
+        }
+    }
+
+    fn take_senses(&mut self) {
+        loop {
+            let report = self.steering.receive();
+            let Some((report, at_ns)) = self.unpack(report) else {
+                break;
+            };
+            self.tell(Input::Steering(&report), at_ns);
+        }
+        loop {
+            let frame = self.distance.receive();
+            let Some((frame, at_ns)) = self.unpack(frame) else {
+                break;
+            };
+            self.tell(Input::Distance(frame.distance_cm), at_ns);
+        }
+        loop {
+            let frame = self.line.receive();
+            let Some((frame, at_ns)) = self.unpack(frame) else {
+                break;
+            };
+            if let Some(state) = frame.state.get() {
+                self.tell(Input::Line(state), at_ns);
+            }
+        }
+    }
+
+    /// A received sample's payload and the time of the event behind it.
+    fn unpack<T: Topic>(
+        &mut self,
+        received: Result<Option<lager_ports::Sample<T>>, ReceiveError>,
+    ) -> Option<(T::Payload, u64)> {
+        match received {
+            Ok(sample) => sample.map(|sample| (*sample, sample.stamp().source_time_ns)),
+            Err(error) => {
+                self.complain(&error);
+                None
+            }
+        }
+    }
+
+    /// Hands one input to the navigator and sends what changed. `at_ns` is when the event behind
+    /// the input happened; it goes with everything that follows from it.
+    fn tell(&mut self, input: Input<'_>, at_ns: u64) {
+        let now = self.clock.now();
+        let output = self.navigator.handle(now, input);
+        for event in &output.events {
+            let sent = self.events.send(at_ns, *event);
+            self.check(sent);
+        }
+        if let Some(thought) = output.thought {
+            tracing::debug!("{}", thought.text.as_str());
+            let sent = self.thoughts.send(at_ns, thought);
+            self.check(sent);
+        }
+        if output.route_changed {
+            let sent = self.route.send(at_ns, *self.navigator.route());
+            self.check(sent);
+        }
+        if Navigator::is_news(&self.sent_status, &self.navigator.status()) {
+            self.publish_status(now);
+        }
+        let order = self.navigator.current_order();
+        if order != self.sent_order {
+            self.sent_order = order;
+            self.give_order(now, at_ns);
+        }
+    }
+
+    /// Does what is due by the clock.
+    fn keep_time(&mut self) {
+        let now = self.clock.now();
+        if now >= self.status_due {
+            self.publish_status(now);
+            self.status.tick();
+            self.route.tick();
+        }
+        if now >= self.renewal_due {
+            self.give_order(now, Clock::monotonic_ns());
+        }
+    }
+
+    fn give_order(&mut self, now: Duration, at_ns: u64) {
+        self.renewal_due = now + RENEWAL;
+        if let Some(order) = self.sent_order {
+            let sent = self.commands.send(at_ns, order);
+            self.check(sent);
+        }
+    }
+
+    fn publish_status(&mut self, now: Duration) {
+        self.status_due = now + STATUS_PERIOD;
+        self.sent_status = self.navigator.status();
+        let status = NavigatorStatus {
+            frames_lost: self.lost_before + self.line.lost(),
+            ..self.sent_status
+        };
+        let sent = self.status.send(Clock::monotonic_ns(), status);
+        self.check(sent);
+    }
+
+    fn check(&mut self, sent: Result<(), SendError>) {
+        if let Err(error) = sent {
+            self.complain(&error);
+        }
+    }
+
+    /// Says what goes wrong on the bus, but not for ever.
+    fn complain(&mut self, error: &dyn std::error::Error) {
+        self.complaints = self.complaints.wrapping_add(1);
+        if self.complaints.is_power_of_two() {
+            tracing::error!(times = self.complaints, "{error}");
+        }
+    }
+}

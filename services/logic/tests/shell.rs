@@ -1,0 +1,260 @@
+//! The shell on a real bus: what goes out, in which order, and what a successor takes up.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_logic::{LogicConfig, run};
+use lager_ports::{Bus, BusConfig, Publisher, Shutdown, Subscriber, remove_stale_nodes};
+use lager_topics::{
+    EventKind, Health, LineFrame, LinkHealth, LogThought, MapProduct, MissionEvent, MissionOrder,
+    Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, Order, Phase, Role, SensorLine, Side,
+    SteeringCommand, SteeringOrder, SteeringReport, SteeringState, WarehouseMap,
+};
+use lager_wire::LineState;
+
+/// A bus of its own for one test.
+struct Domain(BusConfig);
+
+impl Domain {
+    fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let id = format!("ll{}x{number}", std::process::id());
+        Self(BusConfig {
+            prefix: Some(format!("{id}_")),
+            root: Some(std::env::temp_dir().join(id)),
+            ..BusConfig::default()
+        })
+    }
+
+    fn open(&self, role: Role) -> Bus {
+        Bus::open(&self.0, role).unwrap()
+    }
+}
+
+impl Drop for Domain {
+    fn drop(&mut self) {
+        let _ = remove_stale_nodes(&self.0);
+        let prefix = self.0.prefix.clone().unwrap();
+        for entry in std::fs::read_dir("/dev/shm")
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            if entry.file_name().to_string_lossy().starts_with(&prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+        let _ = std::fs::remove_dir_all(self.0.root.clone().unwrap_or(PathBuf::new()));
+    }
+}
+
+/// Everything around logic.
+struct World {
+    map: Publisher<NavMap>,
+    health: Publisher<LinkHealth>,
+    orders: Publisher<MissionOrder>,
+    line: Publisher<SensorLine>,
+    state: Publisher<SteeringState>,
+    commands: Subscriber<SteeringCommand>,
+    status: Subscriber<NavStatus>,
+    events: Subscriber<MissionEvent>,
+    thoughts: Subscriber<LogThought>,
+    route: Subscriber<NavRoute>,
+    seen: Option<NavigatorStatus>,
+    given: Vec<SteeringOrder>,
+}
+
+impl World {
+    fn new(bus: &Bus) -> Self {
+        Self {
+            map: bus.publisher().unwrap(),
+            health: bus.publisher().unwrap(),
+            orders: bus.publisher().unwrap(),
+            line: bus.publisher().unwrap(),
+            state: bus.publisher().unwrap(),
+            commands: bus.subscriber().unwrap(),
+            status: bus.subscriber().unwrap(),
+            events: bus.subscriber().unwrap(),
+            thoughts: bus.subscriber().unwrap(),
+            route: bus.subscriber().unwrap(),
+            seen: None,
+            given: Vec::new(),
+        }
+    }
+
+    /// Tells the retained topics, and lets the boards report standing on the line.
+    fn tell(&self, mode: Mode, stopped: bool) {
+        let mut map = WarehouseMap {
+            width: 1,
+            height: 1,
+            side_length_cm: 50,
+            product_count: 1,
+            ..WarehouseMap::default()
+        };
+        map.products[0] = MapProduct {
+            id: 1,
+            side: Side::Down.into(),
+            ..MapProduct::default()
+        };
+        self.map.send(0, map).unwrap();
+        let health = Health {
+            mode: mode.into(),
+            stopped: stopped.into(),
+            ..Health::default()
+        };
+        self.health.send(0, health).unwrap();
+        self.state.send(0, SteeringReport::default()).unwrap();
+        let frame = LineFrame {
+            state: LineState::OnLine.into(),
+            ..LineFrame::default()
+        };
+        self.line.send(0, frame).unwrap();
+    }
+
+    /// Reads what logic has sent. An order is read before the status, so a status that went out
+    /// before its order is always there.
+    fn look(&mut self) {
+        while let Some(order) = self.commands.receive().unwrap() {
+            self.given.push(*order);
+        }
+        if let Some(status) = self.status.latest().unwrap() {
+            self.seen = Some(*status);
+        }
+        if let (Some(order), Some(status)) = (self.given.last(), &self.seen) {
+            assert!(status.command_id >= order.id, "{order:?} before its status");
+        }
+    }
+
+    /// Goes on telling and looking until `done`; the watchdog against hanging for ever.
+    #[track_caller]
+    fn until(&mut self, what: &str, stopped: bool, mut done: impl FnMut(&Self) -> bool) {
+        let start = Instant::now();
+        while !done(self) {
+            assert!(
+                start.elapsed() < Duration::from_secs(60),
+                "gave up waiting until {what}"
+            );
+            self.tell(Mode::Autonomous, stopped);
+            std::thread::sleep(Duration::from_millis(5));
+            self.look();
+        }
+    }
+
+    fn phase(&self) -> Option<Phase> {
+        self.seen.and_then(|status| status.phase.get())
+    }
+}
+
+/// Runs logic on `domain` while `work` is done.
+fn with_logic(domain: &Domain, resume: bool, work: impl FnOnce()) {
+    let shutdown = Shutdown::new();
+    let bus = domain.open(Role::Logic);
+    let config = LogicConfig {
+        resume,
+        ..LogicConfig::default()
+    };
+    std::thread::scope(|scope| {
+        let logic = scope.spawn(|| run(&bus, &config, &shutdown));
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+        shutdown.request();
+        logic.join().unwrap().unwrap();
+        if let Err(panic) = result {
+            std::panic::resume_unwind(panic);
+        }
+    });
+}
+
+#[test]
+fn an_order_leads_to_a_renewed_steering_order_and_is_announced() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Supervisor);
+    let mut world = World::new(&bus);
+    with_logic(&domain, false, || {
+        world.until("logic has its map", false, |world| {
+            world.phase() == Some(Phase::WaitingForOrder)
+        });
+        world.orders.send(0, Order { id: 5, product: 1 }).unwrap();
+        world.until("the line is followed", false, |world| {
+            let follow = |order: &&SteeringOrder| order.code == 3;
+            world.given.iter().filter(follow).count() >= 4
+        });
+        let last = *world.given.last().unwrap();
+        let same = world
+            .given
+            .iter()
+            .filter(|order| order.id == last.id)
+            .count();
+        assert!(same >= 4, "renewed under the same id: {:?}", world.given);
+        assert_eq!(world.phase(), Some(Phase::Approaching));
+
+        let event = world.events.receive().unwrap().expect("an event");
+        assert_eq!(
+            (event.kind.get(), event.order_id),
+            (Some(EventKind::GettingItem), 5)
+        );
+        let thought = world.thoughts.receive().unwrap().expect("a thought");
+        assert_eq!(thought.from.get(), Some(Role::Logic));
+        // The near end of the edge is where the robot stands, so no node is left to pass.
+        let route = world.route.latest().unwrap();
+        assert!(route.is_none_or(|route| route.length == 0));
+    });
+}
+
+#[test]
+fn a_latched_stop_silences_logic_until_the_resume() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Supervisor);
+    let mut world = World::new(&bus);
+    with_logic(&domain, false, || {
+        world.until("logic stands ready", false, |world| !world.given.is_empty());
+        world.until("logic knows of the stop", true, |world| {
+            world.seen.is_some_and(|status| status.stopped == 1)
+        });
+        world.look();
+        world.given.clear();
+        for _ in 0..40 {
+            world.tell(Mode::Autonomous, true);
+            std::thread::sleep(Duration::from_millis(5));
+            world.look();
+        }
+        assert_eq!(world.given, []);
+        world.until("logic speaks again", false, |world| !world.given.is_empty());
+    });
+}
+
+#[test]
+fn a_successor_takes_up_the_kept_state() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Supervisor);
+    let mut world = World::new(&bus);
+    let mut keeper = bus.keeper::<NavStatus>().unwrap();
+    with_logic(&domain, false, || {
+        world.until("logic has its map", false, |world| {
+            world.phase() == Some(Phase::WaitingForOrder)
+        });
+        world.orders.send(0, Order { id: 5, product: 1 }).unwrap();
+        world.until("it is on its way", false, |world| {
+            world.phase() == Some(Phase::Approaching)
+        });
+        keeper.remember().unwrap();
+    });
+    let before = world.seen.expect("a status");
+    world.seen = None;
+    world.given.clear();
+    keeper.remember().unwrap();
+    keeper.hand_over().unwrap();
+    with_logic(&domain, true, || {
+        world.until("the successor drives", false, |world| {
+            // What the supervisor does for as long as nobody has taken the topic up.
+            keeper.remember().unwrap();
+            world.given.iter().any(|order| order.code == 3)
+        });
+        let status = world.seen.expect("a status");
+        assert_eq!(status.order_id, 5);
+        assert_eq!(status.phase.get(), Some(Phase::Approaching));
+        assert!(status.frames > before.frames);
+        assert!(world.given.iter().all(|order| order.id > before.command_id));
+    });
+}

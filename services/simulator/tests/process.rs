@@ -1,0 +1,245 @@
+//! The simulator as a process would run it: real ptys, a real bus, real time.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use lager_plant::Warehouse;
+use lager_ports::{Bus, BusConfig, Shutdown};
+use lager_simulator::{RunError, SimulatorConfig};
+use lager_topics::{Role, TruthPose};
+use lager_wire::link::{HostEvent, HostLink, HostTransmitter};
+use lager_wire::{Callsign, Command, Payload, ResetCause, SteerCommand, WheelCommand};
+use rustix::fs::OFlags;
+
+/// What must happen happens before this, or the test fails instead of hanging.
+const WATCHDOG: Duration = Duration::from_secs(60);
+
+/// A bus and a folder of the test's own.
+struct Place {
+    bus: BusConfig,
+    folder: PathBuf,
+}
+
+impl Place {
+    fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let name = format!(
+            "ls{}x{}",
+            std::process::id(),
+            NEXT.fetch_add(1, Ordering::Relaxed)
+        );
+        let folder = std::env::temp_dir().join(&name);
+        std::fs::create_dir_all(&folder).unwrap();
+        let bus = BusConfig {
+            speed: 2.0,
+            prefix: Some(format!("{name}_")),
+            root: Some(folder.join("bus")),
+            ..BusConfig::default()
+        };
+        Self { bus, folder }
+    }
+
+    fn open(&self, role: Role) -> Bus {
+        Bus::open(&self.bus, role).unwrap()
+    }
+
+    fn config(&self, resume: bool) -> SimulatorConfig {
+        SimulatorConfig {
+            warehouse: Warehouse::builtin("large").unwrap(),
+            seed: 5,
+            baud: 500_000,
+            sensor_link: self.folder.join("sensor"),
+            steering_link: self.folder.join("steering"),
+            resume,
+        }
+    }
+
+    fn start(&self, resume: bool) -> Simulator {
+        let shutdown = Shutdown::new();
+        let (bus, config) = (self.open(Role::Simulator), self.config(resume));
+        let thread = {
+            let shutdown = shutdown.clone();
+            std::thread::spawn(move || lager_simulator::run(&bus, &config, &shutdown))
+        };
+        Simulator { shutdown, thread }
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+struct Simulator {
+    shutdown: Shutdown,
+    thread: JoinHandle<Result<(), RunError>>,
+}
+
+impl Simulator {
+    fn stop(self) {
+        self.shutdown.request();
+        self.thread.join().expect("it does not panic").unwrap();
+    }
+}
+
+/// One serial port as the Pi has it open.
+struct Cable {
+    file: File,
+    link: HostLink,
+    transmitter: HostTransmitter,
+    start: Instant,
+    reset: Option<ResetCause>,
+}
+
+impl Cable {
+    fn open(path: &Path) -> Self {
+        let deadline = Instant::now() + WATCHDOG;
+        let file = loop {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true);
+            options.custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32);
+            match options.open(path) {
+                Ok(file) => break file,
+                Err(error) => assert!(Instant::now() < deadline, "{}: {error}", path.display()),
+            }
+            std::thread::yield_now();
+        };
+        Self {
+            file,
+            link: HostLink::new(),
+            transmitter: HostTransmitter::new(),
+            start: Instant::now(),
+            reset: None,
+        }
+    }
+
+    fn poll(&mut self) {
+        let now = self.start.elapsed();
+        let mut chunk = [0; 512];
+        let count = rustix::io::read(&self.file, &mut chunk).unwrap_or(0);
+        let mut events: Vec<_> = chunk[..count]
+            .iter()
+            .filter_map(|byte| self.link.push(*byte, now))
+            .collect();
+        events.extend(self.link.poll(now));
+        for event in events {
+            match event {
+                HostEvent::SendSyn => self.file.write_all(&self.transmitter.syn()).unwrap(),
+                HostEvent::SendAck { up } => {
+                    let ack = self.transmitter.ack(self.link.version().unwrap());
+                    self.file.write_all(&ack).unwrap();
+                    self.reset = up.map(|up| up.reset).or(self.reset);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn command(&mut self, command: WheelCommand) {
+        let code = Command::Wheel(command).code();
+        let order = Payload::SteerCommand(SteerCommand { code, seq: 1 });
+        if let Some(bytes) = self.transmitter.encode(order) {
+            self.file.write_all(&bytes).unwrap();
+        }
+    }
+}
+
+/// Polls until `done`.
+fn until(what: &str, mut done: impl FnMut() -> bool) {
+    let deadline = Instant::now() + WATCHDOG;
+    while !done() {
+        assert!(Instant::now() < deadline, "never came: {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
+    let place = Place::new();
+    let observer = place.open(Role::Supervisor);
+    let mut keeper = observer.keeper::<TruthPose>().unwrap();
+    let mut truth = observer.subscriber::<TruthPose>().unwrap();
+    let config = place.config(false);
+
+    let simulator = place.start(false);
+    let mut sensor = Cable::open(&config.sensor_link);
+    let mut steering = Cable::open(&config.steering_link);
+    until("both boards", || {
+        sensor.poll();
+        steering.poll();
+        sensor.link.is_up() && steering.link.is_up()
+    });
+    assert_eq!(sensor.link.callsign(), Some(Callsign::Sensor));
+    assert_eq!(steering.link.callsign(), Some(Callsign::Steering));
+    assert_eq!(steering.reset, Some(ResetCause::PowerOn));
+
+    let mut x = 0.0;
+    until("a hundred millimetres", || {
+        sensor.poll();
+        steering.poll();
+        steering.command(WheelCommand::ManualForward);
+        keeper.remember().unwrap();
+        if let Some(sample) = truth.latest().unwrap() {
+            x = sample.x_mm;
+        }
+        x > 100.0
+    });
+    drop((sensor, steering));
+    simulator.stop();
+    assert!(
+        std::fs::symlink_metadata(&config.sensor_link).is_err(),
+        "the link is gone"
+    );
+
+    keeper.remember().unwrap();
+    let kept = *keeper.value().expect("it was told").0;
+    assert!(kept.x_mm >= x && kept.good_count == 6);
+    keeper.hand_over().unwrap();
+
+    let simulator = place.start(true);
+    until("the second's port", || {
+        // As the supervisor does on its tick: a late joiner gets the kept value from here.
+        keeper.remember().unwrap();
+        config.steering_link.exists()
+    });
+    let mut steering = Cable::open(&config.steering_link);
+    until("the steering board", || {
+        steering.poll();
+        steering.link.is_up()
+    });
+    assert_eq!(steering.reset, Some(ResetCause::External));
+    let mut resumed = None;
+    until("a truth of the second", || {
+        while let Some(sample) = truth.receive().unwrap() {
+            resumed = (sample.time_ns > kept.time_ns)
+                .then_some(*sample)
+                .or(resumed);
+        }
+        resumed.is_some()
+    });
+    let resumed = resumed.unwrap();
+    assert!(
+        (resumed.x_mm - kept.x_mm).abs() < 20.0,
+        "{} {}",
+        resumed.x_mm,
+        kept.x_mm
+    );
+    assert_eq!((resumed.left_duty, resumed.right_duty), (0, 0));
+    assert_eq!(resumed.servo_position, kept.servo_position);
+    simulator.stop();
+}
+
+#[test]
+fn a_port_that_cannot_be_made_is_said_in_a_sentence() {
+    let place = Place::new();
+    std::fs::write(place.folder.join("sensor"), "not a link").unwrap();
+    let simulator = place.start(false);
+    let refused = simulator.thread.join().unwrap().unwrap_err();
+    assert!(refused.to_string().contains("is not a link"), "{refused}");
+}
