@@ -84,8 +84,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
             lager_bridge::run(&bus(Role::Bridge), &bridge_config, shutdown).expect("the bridge");
         });
         scope.spawn(move || {
-            lager_logic::run(&bus(Role::Logic), &LogicConfig::default(), shutdown)
-                .expect("logic");
+            lager_logic::run(&bus(Role::Logic), &LogicConfig::default(), shutdown).expect("logic");
         });
         // Whatever fails below, the services must end, or the scope never does.
         let _end = EndAtLast(shutdown);

@@ -144,7 +144,9 @@ fn a_person_can_do_by_hand_what_the_script_does() {
     let _up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "3"]);
     let observer = domain.observe("r1", 3.0);
     let mut state = observer.subscriber::<SteeringState>().expect("a topic");
-    wait_for("the boards", || state.latest().expect("readable").map(|_| ()));
+    wait_for("the boards", || {
+        state.latest().expect("readable").map(|_| ())
+    });
     let said = |args: &[&str]| {
         let output = domain.run(args);
         let text = format!(
@@ -201,16 +203,28 @@ fn the_topic_tools_show_a_running_robot() {
 
     let info = domain.run(&["topic", "info", "steering/command"]);
     let text = String::from_utf8_lossy(&info.stdout).into_owned();
-    assert!(text.contains("origin") && text.contains("wakes       bridge"), "{text}");
+    assert!(
+        text.contains("origin") && text.contains("wakes       bridge"),
+        "{text}"
+    );
 
     let unknown = domain.run(&["topic", "echo", "sensor/lime"]);
     let said = String::from_utf8_lossy(&unknown.stderr).into_owned();
-    assert!(!unknown.status.success() && said.contains("sensor/line"), "{said}");
+    assert!(
+        !unknown.status.success() && said.contains("sensor/line"),
+        "{said}"
+    );
 
     let doctor = domain.run(&["doctor"]);
     let text = String::from_utf8_lossy(&doctor.stdout).into_owned();
     assert!(doctor.status.success(), "{text}");
-    for check in ["shared memory", "open files", "versions", "serial rights", "bus"] {
+    for check in [
+        "shared memory",
+        "open files",
+        "versions",
+        "serial rights",
+        "bus",
+    ] {
         assert!(text.contains(check), "{text}");
     }
 }

@@ -226,7 +226,12 @@ impl Running {
     #[must_use]
     pub fn json(&self) -> Value {
         let output = self.output();
-        assert_eq!(output.lines().count(), 1, "one line: {output}\n{}", self.log());
+        assert_eq!(
+            output.lines().count(),
+            1,
+            "one line: {output}\n{}",
+            self.log()
+        );
         serde_json::from_str(&output).expect("a JSON line")
     }
 
@@ -297,9 +302,16 @@ pub fn pid(raw: u32) -> Pid {
 #[must_use]
 pub fn children(parent: u32) -> Vec<u32> {
     let mut found = Vec::new();
-    for task in fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten().flatten() {
+    for task in fs::read_dir(format!("/proc/{parent}/task"))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
         let list = fs::read_to_string(task.path().join("children")).unwrap_or_default();
-        found.extend(list.split_whitespace().filter_map(|pid| pid.parse::<u32>().ok()));
+        found.extend(
+            list.split_whitespace()
+                .filter_map(|pid| pid.parse::<u32>().ok()),
+        );
     }
     found
 }

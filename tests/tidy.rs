@@ -77,7 +77,13 @@ fn root() -> PathBuf {
 
 fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
-        .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
+        .args([
+            "metadata",
+            "--format-version",
+            "1",
+            "--no-deps",
+            "--offline",
+        ])
         .current_dir(root())
         .output()
         .expect("cargo runs");
@@ -178,7 +184,12 @@ fn only_ports_opens_iceoryx2() {
     }
     for file in rust_files(Path::new("bus/topics/src")) {
         let text = std::fs::read_to_string(&file).expect("a readable file");
-        for port in ["NodeBuilder", "PortFactory", "iceoryx2::port", "ServiceName"] {
+        for port in [
+            "NodeBuilder",
+            "PortFactory",
+            "iceoryx2::port",
+            "ServiceName",
+        ] {
             assert!(!text.contains(port), "{} names {port}", file.display());
         }
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::prelude::{
-    LogLevel, Node, NodeBuilder, NodeName, PortName, SignalHandlingMode, ipc, set_log_level,
+    LogLevel, Node, NodeBuilder, NodeName, PortName, SignalHandlingMode, set_log_level,
 };
 use lager_topics::{Request, Role, Topic};
 
@@ -20,6 +20,7 @@ use crate::name::{self, RobotName};
 use crate::publisher::Publisher;
 use crate::request::{Client, Server};
 use crate::subscriber::Subscriber;
+use crate::transport::Ipc;
 use crate::waiter::{Policy, Waiter};
 
 /// A process's membership on the bus; clones share it.
@@ -32,7 +33,7 @@ pub struct Bus {
 }
 
 struct Shared {
-    node: Node<ipc::Service>,
+    node: Node<Ipc>,
     config: Config,
     robot: RobotName,
     role: Role,
@@ -174,7 +175,7 @@ impl Bus {
         introspect::list(&self.shared.config)
     }
 
-    pub(crate) fn node(&self) -> &Node<ipc::Service> {
+    pub(crate) fn node(&self) -> &Node<Ipc> {
         &self.shared.node
     }
 
@@ -200,18 +201,14 @@ impl fmt::Debug for Bus {
 /// How long a sweep waits for another one that has the same dead process in hand.
 pub(crate) const OTHERS_SWEEP: Duration = Duration::from_millis(100);
 
-fn make_node(
-    config: &Config,
-    robot: &RobotName,
-    role: Role,
-) -> Result<Node<ipc::Service>, OpenError> {
+fn make_node(config: &Config, robot: &RobotName, role: Role) -> Result<Node<Ipc>, OpenError> {
     let name = NodeName::new(&name::node(robot, role, std::process::id()))
         .expect("robot, role and number fit into a node's name");
     NodeBuilder::new()
         .name(&name)
         .config(config)
         .signal_handling_mode(SignalHandlingMode::Disabled)
-        .create::<ipc::Service>()
+        .create::<Ipc>()
         .map_err(|failure| {
             let root = config.global.root_path().to_string();
             match failure {

@@ -22,7 +22,7 @@ use std::time::Instant;
 
 use iceoryx2::port::listener::{Listener, ListenerCreateError};
 use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
-use iceoryx2::prelude::{FileDescriptorBased, ipc};
+use iceoryx2::prelude::FileDescriptorBased;
 use lager_topics::Role;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, eventfd, poll};
 use rustix::time::Timespec;
@@ -30,10 +30,11 @@ use rustix::time::Timespec;
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::service::{self, Fault, patiently};
+use crate::transport::Ipc;
 
 /// The actor's end.
 pub(crate) struct Bell {
-    listener: Listener<ipc::Service>,
+    listener: Listener<Ipc>,
     inside: OnceCell<InsideRope>,
 }
 
@@ -132,7 +133,7 @@ impl Bell {
 
 /// One waker's end; stays in its thread.
 pub(crate) struct Rope {
-    notifier: Notifier<ipc::Service>,
+    notifier: Notifier<Ipc>,
 }
 
 impl Rope {
@@ -183,7 +184,7 @@ impl InsideRope {
     }
 }
 
-fn notifier(bus: &Bus, role: Role) -> Result<Notifier<ipc::Service>, PortError> {
+fn notifier(bus: &Bus, role: Role) -> Result<Notifier<Ipc>, PortError> {
     let service = service::wake(bus, role)?;
     let name = service::wake_name(role);
     patiently(bus, &name, || {

@@ -3,7 +3,7 @@
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{
-    CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service, ipc,
+    CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service,
 };
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 use lager_topics::{Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
@@ -13,6 +13,7 @@ use crate::config::BusConfig;
 use crate::error::IntrospectError;
 use crate::name::{self, RobotName};
 use crate::service;
+use crate::transport::Ipc;
 
 /// How a topic in use compares with this build's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,7 +131,7 @@ pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
     let mut removed = 0;
-    Node::<ipc::Service>::list(&config.transport()?, |state| {
+    Node::<Ipc>::list(&config.transport()?, |state| {
         if let IpcNodeState::Dead(dead) = state {
             removed += usize::from(dead.blocking_remove_stale_resources(OTHERS_SWEEP).is_ok());
         }
@@ -142,7 +143,7 @@ pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> 
 
 pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
     let mut found = Vec::new();
-    Node::<ipc::Service>::list(config, |state| {
+    Node::<Ipc>::list(config, |state| {
         let (details, state) = match &state {
             IpcNodeState::Alive(view) => (view.details().as_ref(), NodeState::Alive),
             IpcNodeState::Dead(view) => (view.details().as_ref(), NodeState::Stale),
@@ -171,7 +172,7 @@ pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
 
 pub(crate) fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
     let mut in_use = Vec::new();
-    ipc::Service::list(bus.transport(), |details| {
+    Ipc::list(bus.transport(), |details| {
         let details = details.static_details;
         if matches!(
             details.messaging_pattern(),

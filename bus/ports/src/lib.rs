@@ -42,12 +42,14 @@ mod introspect;
 mod keeper;
 mod name;
 mod patience;
+mod pooled;
 mod publisher;
 mod request;
 mod service;
 mod shutdown;
 mod streams;
 mod subscriber;
+mod transport;
 mod waiter;
 
 pub use bus::Bus;

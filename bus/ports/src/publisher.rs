@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use iceoryx2::port::LoanError;
 use iceoryx2::port::publisher::{Publisher as IpcPublisher, PublisherCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{BackpressureStrategy, ipc};
+use iceoryx2::prelude::BackpressureStrategy;
 use iceoryx2::sample_mut::SampleMut;
 use lager_topics::{Stamp, Topic};
 
@@ -17,12 +17,13 @@ use crate::clock::Clock;
 use crate::doorbell::Rope;
 use crate::error::{PortError, SendError};
 use crate::service::{self, Fault, MAX_LOANS, patiently};
+use crate::transport::Ipc;
 
 /// The writing end of a topic; stays in the thread that made it.
 ///
 /// Sending never waits for a reader and does not allocate, except when a reader has come or gone.
 pub struct Publisher<T: Topic> {
-    inner: IpcPublisher<ipc::Service, T::Payload, Stamp>,
+    inner: IpcPublisher<Ipc, T::Payload, Stamp>,
     ropes: Box<[Rope]>,
     next_sequence: Cell<u64>,
     epoch: u64,
@@ -138,7 +139,7 @@ impl<T: Topic> fmt::Debug for Publisher<T> {
 /// A sample that is being written; dropped unsent it leaves no trace.
 #[must_use = "a loan that is not sent reaches nobody"]
 pub struct Loan<'publisher, T: Topic> {
-    sample: SampleMut<ipc::Service, T::Payload, Stamp>,
+    sample: SampleMut<Ipc, T::Payload, Stamp>,
     publisher: &'publisher Publisher<T>,
     source_time_ns: u64,
 }

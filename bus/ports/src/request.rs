@@ -11,7 +11,7 @@ use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::ReceiveError as IpcReceiveError;
 use iceoryx2::port::client::Client as IpcClient;
 use iceoryx2::port::server::Server as IpcServer;
-use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, PortFactory, ipc};
+use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, PortFactory};
 use iceoryx2::service::port_factory::client::ClientCreateError;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 use lager_topics::Request;
@@ -20,13 +20,14 @@ use crate::bus::Bus;
 use crate::doorbell::Rope;
 use crate::error::{CallError, PortError, ReceiveError};
 use crate::service::{self, Fault, MAX_CLIENTS, MAX_SERVERS, RequestService, patiently};
+use crate::transport::Ipc;
 
 type Ask<R> = <R as Request>::Request;
 type Answer<R> = <R as Request>::Reply;
 
 /// The asking side of a request; stays in the thread that made it.
 pub struct Client<R: Request> {
-    inner: IpcClient<ipc::Service, Ask<R>, (), Answer<R>, ()>,
+    inner: IpcClient<Ipc, Ask<R>, (), Answer<R>, ()>,
     service: RequestService<R>,
     rope: Rope,
 }
@@ -111,7 +112,7 @@ impl<R: Request> Client<R> {
     fn ask(
         &self,
         request: Ask<R>,
-    ) -> Result<PendingResponse<ipc::Service, Ask<R>, (), Answer<R>, ()>, CallError> {
+    ) -> Result<PendingResponse<Ipc, Ask<R>, (), Answer<R>, ()>, CallError> {
         let question = self.inner.send_copy(request).map_err(transport::<R>)?;
         self.rope.ring();
         Ok(question)
@@ -146,7 +147,7 @@ impl<R: Request> fmt::Debug for Client<R> {
 /// The answering side of a request; stays in the thread that made it. Askers ring the waiter of
 /// the request's actor.
 pub struct Server<R: Request> {
-    inner: IpcServer<ipc::Service, Ask<R>, (), Answer<R>, ()>,
+    inner: IpcServer<Ipc, Ask<R>, (), Answer<R>, ()>,
 }
 
 impl<R: Request> Server<R> {

@@ -1,7 +1,7 @@
 //! Opening services: names, limits, the layout check, and what each refusal means.
 
 use iceoryx2::node::Node;
-use iceoryx2::prelude::{AttributeVerifier, SemanticString, ServiceName, ipc};
+use iceoryx2::prelude::{AttributeVerifier, SemanticString, ServiceName};
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
 use iceoryx2::service::builder::publish_subscribe::{
@@ -17,6 +17,7 @@ use crate::bus::Bus;
 use crate::error::PortError;
 use crate::name::{self, RobotName};
 pub(crate) use crate::patience::{Fault, patiently};
+use crate::transport::Ipc;
 
 /// Samples a subscriber may hold at the same time.
 pub(crate) const MAX_HELD: usize = 4;
@@ -38,18 +39,12 @@ const MAX_WAKE_NODES: usize = 128;
 
 const SCHEMA_KEY: &str = "lager.schema";
 
-pub(crate) type TopicService<T> =
-    publish_subscribe::PortFactory<ipc::Service, <T as Topic>::Payload, Stamp>;
+pub(crate) type TopicService<T> = publish_subscribe::PortFactory<Ipc, <T as Topic>::Payload, Stamp>;
 
-pub(crate) type RequestService<R> = request_response::PortFactory<
-    ipc::Service,
-    <R as Request>::Request,
-    (),
-    <R as Request>::Reply,
-    (),
->;
+pub(crate) type RequestService<R> =
+    request_response::PortFactory<Ipc, <R as Request>::Request, (), <R as Request>::Reply, ()>;
 
-pub(crate) type WakeService = event::PortFactory<ipc::Service>;
+pub(crate) type WakeService = event::PortFactory<Ipc>;
 
 /// Opens or creates the service of a topic with the limits of the table.
 pub(crate) fn topic<T: Topic>(bus: &Bus) -> Result<TopicService<T>, PortError> {
@@ -91,12 +86,9 @@ pub(crate) fn existing_topic<T: Topic>(
 }
 
 fn builder<T: Topic>(
-    node: &Node<ipc::Service>,
+    node: &Node<Ipc>,
     robot: &RobotName,
-) -> Result<
-    iceoryx2::service::builder::publish_subscribe::Builder<T::Payload, Stamp, ipc::Service>,
-    Fault,
-> {
+) -> Result<iceoryx2::service::builder::publish_subscribe::Builder<T::Payload, Stamp, Ipc>, Fault> {
     Ok(node
         .service_builder(&service_name(robot, T::NAME)?)
         .publish_subscribe::<T::Payload>()

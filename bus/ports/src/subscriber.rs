@@ -5,7 +5,7 @@ use core::ops::Deref;
 
 use iceoryx2::port::ReceiveError as IpcReceiveError;
 use iceoryx2::port::subscriber::{Subscriber as IpcSubscriber, SubscriberCreateError};
-use iceoryx2::prelude::{CallbackProgression, PortFactory, ipc};
+use iceoryx2::prelude::{CallbackProgression, PortFactory};
 use iceoryx2::sample::Sample as IpcSample;
 use lager_topics::{OBSERVERS, Stamp, Topic};
 
@@ -15,10 +15,11 @@ use crate::error::{PortError, ReceiveError};
 use crate::name;
 use crate::service::{self, Fault, MAX_HELD, TopicService, patiently};
 use crate::streams::Streams;
+use crate::transport::Ipc;
 
 /// The reading end of a topic; stays in the thread that made it.
 pub struct Subscriber<T: Topic> {
-    inner: IpcSubscriber<ipc::Service, T::Payload, Stamp>,
+    inner: IpcSubscriber<Ipc, T::Payload, Stamp>,
     streams: Streams,
     newest_ns: u64,
 }
@@ -121,7 +122,7 @@ impl<T: Topic> fmt::Debug for Subscriber<T> {
 
 /// A received sample, read where the writer wrote it. At most four may be held at a time.
 pub struct Sample<T: Topic> {
-    inner: IpcSample<ipc::Service, T::Payload, Stamp>,
+    inner: IpcSample<Ipc, T::Payload, Stamp>,
 }
 
 impl<T: Topic> Sample<T> {

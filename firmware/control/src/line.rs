@@ -34,9 +34,12 @@ pub const MAX_ERROR: i8 = 10;
 pub const ON_LINE_ERROR: i8 = 2;
 
 const LEFT_EDGE: u16 = 0b100_0000_0000;
-const RIGHT_EDGE: u16 = 0b000_0000_0001;
 const LEFT_MARK: u16 = 0b111_1100_0000;
 const RIGHT_MARK: u16 = 0b000_0001_1111;
+/// Readings after a FourWay in which no tape at all still means that the line ended there: the
+/// sensors leave a bar one after the other, and what they show meanwhile is no line. 20 readings
+/// are 100 ms, 7 mm at cruise speed.
+const END_READINGS: u8 = 20;
 const CENTRE: u16 = 0b000_0111_0000;
 
 /// What one reading of the sensors means.
@@ -59,10 +62,8 @@ pub fn centre_on_tape(bits: LineBits) -> bool {
 pub struct LineReader {
     /// The error reported last.
     error: i8,
-    /// A FourWay may have been the line's end.
-    at_end: bool,
-    /// The line has ended and no tape was seen since.
-    ended: bool,
+    /// For this many more readings of the line itself the FourWay before them may have been its end.
+    at_end: u8,
 }
 
 impl LineReader {
@@ -71,8 +72,7 @@ impl LineReader {
     pub const fn new() -> Self {
         Self {
             error: 0,
-            at_end: false,
-            ended: false,
+            at_end: 0,
         }
     }
 
@@ -100,8 +100,7 @@ impl LineReader {
         if self.error.abs() > ON_LINE_ERROR {
             self.error = MAX_ERROR * self.error.signum();
         }
-        self.ended = self.at_end;
-        if self.ended {
+        if self.at_end > 0 {
             LineState::DropStation
         } else {
             LineState::NotOnLine
@@ -109,25 +108,23 @@ impl LineReader {
     }
 
     fn with_tape(&mut self, bits: u16) -> LineState {
-        if self.ended {
-            self.ended = false;
-            self.at_end = false;
-        }
         let left = bits & LEFT_MARK == LEFT_MARK;
         let right = bits & RIGHT_MARK == RIGHT_MARK;
         match (left, right) {
             (true, true) => {
-                self.at_end = true;
+                self.at_end = END_READINGS;
                 LineState::FourWay
             }
             (true, false) => LineState::StationToLeft,
             (false, true) => LineState::StationToRight,
             (false, false) => {
-                if bits & (LEFT_EDGE | RIGHT_EDGE) == 0 {
-                    self.at_end = false;
+                let error = centroid(bits);
+                if self.at_end > 0 {
+                    self.at_end -= 1;
+                } else {
+                    self.error = error;
                 }
-                self.error = centroid(bits);
-                match self.error {
+                match error {
                     error if error > ON_LINE_ERROR => LineState::LeftOfLine,
                     error if error < -ON_LINE_ERROR => LineState::RightOfLine,
                     _ => LineState::OnLine,

@@ -149,8 +149,20 @@ fn the_end_is_latched_until_tape_is_seen() {
     assert_eq!(state(0x7FF), LineState::FourWay);
     assert_eq!(state(0), LineState::DropStation);
     assert_eq!(state(0), LineState::DropStation);
-    assert_eq!(state(0b00000000001), LineState::LeftOfLine);
-    assert_eq!(state(0), LineState::NotOnLine);
+    assert_eq!(
+        state(0b00000000001),
+        LineState::LeftOfLine,
+        "a last sensor leaves the bar"
+    );
+    assert_eq!(state(0), LineState::DropStation);
+    for _ in 0..20 {
+        assert_eq!(state(0b00000100000), LineState::OnLine);
+    }
+    assert_eq!(
+        state(0),
+        LineState::NotOnLine,
+        "a crossing, and a line that ended later"
+    );
 }
 
 #[test]

@@ -19,6 +19,8 @@
 
 pub mod arm;
 pub mod body;
+mod builtin;
+mod exit;
 pub mod goods;
 pub mod ir;
 pub mod line;
@@ -27,10 +29,12 @@ pub mod noise;
 pub mod scene;
 pub mod servo;
 pub mod tape;
+mod validate;
 pub mod warehouse;
 mod world;
 
 pub use body::Pose;
 pub use goods::{Good, GoodState};
-pub use warehouse::{Curve, Edge, Exit, Obstacle, Product, Side, Warehouse, WarehouseError};
+pub use validate::WarehouseError;
+pub use warehouse::{Curve, Edge, Exit, Obstacle, Product, Side, Warehouse};
 pub use world::{World, WorldState};

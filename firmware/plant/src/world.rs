@@ -16,7 +16,8 @@ use crate::noise::Noise;
 use crate::scene::{self, Block};
 use crate::servo::ServoBus;
 use crate::tape::Tape;
-use crate::warehouse::{Warehouse, WarehouseError};
+use crate::validate::WarehouseError;
+use crate::warehouse::Warehouse;
 
 /// How inexactly people put the robot down, in mm and rad.
 const PLACING: f64 = 3.0;
@@ -210,5 +211,62 @@ impl World {
         let claw = self.claw();
         self.goods.step(&self.pose, &claw, &self.tape);
         self.ir.step(self.now_ns, &self.pose, &self.blocks);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ARM: [u16; SERVOS] = [512, 600, 423, 400, 623, 512, 512, 512];
+
+    fn world(seed: u64) -> World {
+        World::new(&Warehouse::builtin("small").unwrap(), seed, ARM).unwrap()
+    }
+
+    fn drive(world: &mut World, step: Duration, end: Duration) -> Pose {
+        world.set_motors(100, 110);
+        let mut now = world.now();
+        while now < end {
+            now = (now + step).min(end);
+            world.advance_to(now);
+        }
+        world.pose()
+    }
+
+    #[test]
+    fn a_run_depends_on_the_seed_and_not_on_how_time_is_cut() {
+        let end = Duration::from_millis(2_000);
+        let run =
+            |seed, microseconds| drive(&mut world(seed), Duration::from_micros(microseconds), end);
+        assert_eq!(run(1, 2_000_000), run(1, 333));
+        assert_ne!(run(1, 2_000_000), run(2, 2_000_000));
+    }
+
+    #[test]
+    fn a_kept_world_goes_on_where_it_was() {
+        let mut first = world(1);
+        drive(&mut first, World::STEP, Duration::from_millis(1_500));
+        let mut second = world(1);
+        second.restore(&first.state());
+        assert_eq!(second.state(), first.state());
+        assert_eq!(second.duties(), [0, 0]);
+        let rest = second.now() + Duration::from_secs(1);
+        second.advance_to(rest);
+        let (from, to) = (first.pose(), second.pose());
+        let rolled = (to.x - from.x).hypot(to.y - from.y);
+        assert!((1.0..15.0).contains(&rolled), "it rolls out: {rolled} mm");
+    }
+
+    #[test]
+    fn a_robot_is_put_down_near_the_start() {
+        for seed in 0..20 {
+            let pose = world(seed).pose();
+            assert!(
+                pose.x.hypot(pose.y) < 5.0 && pose.heading.abs() < 0.02,
+                "{pose:?}"
+            );
+            assert_ne!(pose, Pose::default());
+        }
     }
 }

@@ -190,21 +190,28 @@ impl<'a> Reader<'a> {
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut link = HostLink::new();
         let mut buffer = [0; 512];
+        // When all that had come by then was read: only as of such a moment a board is silent. A
+        // reader that was kept from running finds the bytes first and then the time.
+        let mut heard = self.clock.now();
         while !self.stopped() {
-            let now = self.clock.now();
             let mut ring = false;
-            while let Some(event) = link.poll(now) {
+            while let Some(event) = link.poll(heard) {
                 ring |= self.take(&link, event, 0);
             }
             if ring {
                 self.ringer.ring();
             }
+            let now = self.clock.now();
             let due = self.clock.real(link.next_due().saturating_sub(now));
             if port.wait(due.min(LOOK))? == Waited::TimedOut {
+                heard = now;
                 continue;
             }
             let count = port.read(&mut buffer)?;
             let at_ns = Clock::monotonic_ns();
+            if count < buffer.len() {
+                heard = now;
+            }
             let now = self.clock.now();
             let mut ring = false;
             for byte in &buffer[..count] {

@@ -134,9 +134,13 @@ impl Settings {
         None
     }
 
-    /// When [`Settings::poll`] next has something to do.
-    pub fn next_due(&self) -> Option<Duration> {
-        self.slots.iter().filter_map(|slot| slot.next_try).min()
+    /// When [`Settings::poll`] next has something to do for `board`.
+    pub fn next_due(&self, board: Callsign) -> Option<Duration> {
+        self.slots
+            .iter()
+            .filter(|slot| home(slot.key) == board)
+            .filter_map(|slot| slot.next_try)
+            .min()
     }
 
     /// A board has answered. An answer that fits no question under way changes nothing.
@@ -222,12 +226,14 @@ mod tests {
         let first = settings.poll(ms(0), Callsign::Steering).unwrap();
         assert_eq!((first.key, first.value), (SettingKey::GainP, 5));
         assert_eq!(settings.poll(ms(59), Callsign::Steering), None);
+        assert_eq!(settings.next_due(Callsign::Steering), Some(ms(60)));
+        assert_eq!(settings.next_due(Callsign::Sensor), None);
         assert_eq!(settings.poll(ms(60), Callsign::Sensor), None);
         assert_eq!(settings.poll(ms(60), Callsign::Steering), Some(first));
         settings.answer(&reply(&first, SettingStatus::Accepted));
         assert_eq!(settings.progress(SettingKey::GainP), Progress::Accepted);
         assert_eq!(settings.in_force(SettingKey::GainP), Some(5));
-        assert_eq!(settings.next_due(), None);
+        assert_eq!(settings.next_due(Callsign::Steering), None);
         assert_eq!(settings.poll(ms(500), Callsign::Steering), None);
     }
 

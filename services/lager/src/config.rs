@@ -198,8 +198,8 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
             Warehouse::BUILTIN.join(", ")
         )
     })?;
-    let warehouse: Warehouse = toml::from_str(&text)
-        .with_context(|| format!("the warehouse file {name} is not valid"))?;
+    let warehouse: Warehouse =
+        toml::from_str(&text).with_context(|| format!("the warehouse file {name} is not valid"))?;
     warehouse
         .validate()
         .with_context(|| format!("the warehouse file {name} cannot be built"))?;

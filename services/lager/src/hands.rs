@@ -8,8 +8,8 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use lager_ports::{Bus, Client, Clock, Publisher};
 use lager_topics::{
-    Answer, Ask, BridgeRequest, Input, MissionOrder, NavMap, OperatorInput, Order,
-    SteeringCommand, SteeringOrder, WarehouseMap,
+    Answer, Ask, BridgeRequest, Input, MissionOrder, NavMap, OperatorInput, Order, SteeringCommand,
+    SteeringOrder, WarehouseMap,
 };
 
 use crate::operator::Act;

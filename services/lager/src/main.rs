@@ -70,10 +70,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         Command::Bridge(args) => {
             service(&config, Role::Bridge, &args, &shutdown, |bus, resume| {
                 let bridge = BridgeConfig {
-                    ports: [
-                        config.serial.sensor.clone(),
-                        config.serial.steering.clone(),
-                    ],
+                    ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
                     baud: config.serial.baud,
                     resume,
                     ..BridgeConfig::default()

@@ -211,12 +211,7 @@ impl ScriptedOperator {
     }
 
     /// The step that what is seen leads to, if it is another one.
-    fn advance(
-        &mut self,
-        health: &Health,
-        status: &NavigatorStatus,
-        seen: &Seen,
-    ) -> Option<Step> {
+    fn advance(&mut self, health: &Health, status: &NavigatorStatus, seen: &Seen) -> Option<Step> {
         let phase = status.phase.get()?;
         match &mut self.step {
             Step::TakeOver => {
@@ -225,11 +220,8 @@ impl ScriptedOperator {
                     && health.steering.up != 0;
                 ready.then(|| self.next_order())
             }
-            Step::Ordering { order } => {
-                (status.order_id == *order && accepted(phase)).then_some(Step::Underway {
-                    order: *order,
-                })
-            }
+            Step::Ordering { order } => (status.order_id == *order && accepted(phase))
+                .then_some(Step::Underway { order: *order }),
             Step::Underway { order } if phase == Phase::Picking => Some(Step::Picking {
                 order: *order,
                 picking: Picking::new(),

@@ -142,7 +142,6 @@ impl Narrator {
             writeln!(std::io::stdout(), "{line}")
         };
     }
-
 }
 
 impl Narrator {
@@ -159,7 +158,10 @@ impl Narrator {
             } else if now.up == 0 && was_up {
                 self.note(&format!("the {name} board is silent"));
             } else if before.is_some_and(|before| before.reboots < now.reboots) {
-                self.note(&format!("the {name} board has restarted ({})", now.reset_cause));
+                self.note(&format!(
+                    "the {name} board has restarted ({})",
+                    now.reset_cause
+                ));
             }
         }
         if before.map(|before| before.mode) != Some(now.mode) {

@@ -13,9 +13,7 @@ use lager_bridge::frames::{LineAssembler, ServoTable, steering_report};
 use lager_logic::{Input, Navigator};
 use lager_plant::{GoodState, Warehouse};
 use lager_simulator::{Robot, RobotOptions, Wire};
-use lager_topics::{
-    AskKind, EventKind, Health, InputKind, SteeringReport, WarehouseMap,
-};
+use lager_topics::{AskKind, EventKind, Health, InputKind, SteeringReport, WarehouseMap};
 use lager_wire::link::{HostEvent, HostLink, HostTransmitter, Up};
 use lager_wire::{Packet, Payload};
 use serde::Serialize;

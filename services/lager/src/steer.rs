@@ -69,7 +69,10 @@ impl Operator {
     pub fn arm(&mut self, command: &str, shutdown: &Shutdown) -> Result<String> {
         let command = parse(command, OperatorCommand::arm)?;
         if !matches!(command, OperatorCommand::Arm(_)) {
-            bail!("0x{:02X} drives the wheels; use `lager drive`", command.code());
+            bail!(
+                "0x{:02X} drives the wheels; use `lager drive`",
+                command.code()
+            );
         }
         self.carry_out(command, None, shutdown)
     }
@@ -215,9 +218,8 @@ impl Operator {
             self.hands.steer(order)?;
             std::thread::sleep(clock.real(RENEW));
             if let Some(report) = state.latest()? {
-                let own = |origin: Option<Origin>, id| {
-                    origin == Some(Origin::Operator) && id == order.id
-                };
+                let own =
+                    |origin: Option<Origin>, id| origin == Some(Origin::Operator) && id == order.id;
                 accepted |= own(report.current_origin.get(), report.current_id);
                 if own(report.finished_origin.get(), report.finished_id) {
                     return match report.finish.get() {
@@ -249,10 +251,7 @@ impl Operator {
 }
 
 /// A command by its name, as `by_name` knows them, or in one of the three forms of its code.
-fn parse(
-    text: &str,
-    by_name: fn(&str) -> Option<OperatorCommand>,
-) -> Result<OperatorCommand> {
+fn parse(text: &str, by_name: fn(&str) -> Option<OperatorCommand>) -> Result<OperatorCommand> {
     if let Some(command) = by_name(text) {
         return Ok(command);
     }

@@ -28,6 +28,7 @@ pub struct Supervisor {
     program: PathBuf,
     config: PathBuf,
     services: Vec<Service>,
+    restarts: u32,
 }
 
 /// One service as a child process.
@@ -44,7 +45,7 @@ struct Service {
     started: Instant,
     start_at: Instant,
     wait: Duration,
-    restarts: u32,
+    restarted: bool,
 }
 
 /// A child ended without being asked to.
@@ -63,6 +64,7 @@ impl Supervisor {
             program: std::env::current_exe().context("cannot find this program's own file")?,
             config,
             services: Vec::new(),
+            restarts: 0,
         })
     }
 
@@ -75,7 +77,7 @@ impl Supervisor {
             started: now,
             start_at: now,
             wait: Duration::ZERO,
-            restarts: 0,
+            restarted: false,
         };
         self.spawn(&mut service)?;
         self.services.push(service);
@@ -110,7 +112,8 @@ impl Supervisor {
             }
             if service.child.is_none() && now >= service.start_at {
                 hand_over(service.name)?;
-                service.restarts += 1;
+                service.restarted = true;
+                self.restarts += 1;
                 self.spawn(service)?;
             }
         }
@@ -120,7 +123,7 @@ impl Supervisor {
 
     /// How many restarts there were in all.
     pub fn restarts(&self) -> u32 {
-        self.services.iter().map(|service| service.restarts).sum()
+        self.restarts
     }
 
     /// Ends every child with SIGTERM, the last started first, each before the next.
@@ -157,7 +160,7 @@ impl Supervisor {
             // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
             // children in order.
             .process_group(0);
-        if service.restarts > 0 {
+        if service.restarted {
             command.arg("--resume");
         }
         let child = command

@@ -1,6 +1,5 @@
 //! The shell on a real bus: what goes out, in which order, and what a successor takes up.
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -46,7 +45,7 @@ impl Drop for Domain {
                 let _ = std::fs::remove_file(entry.path());
             }
         }
-        let _ = std::fs::remove_dir_all(self.0.root.clone().unwrap_or(PathBuf::new()));
+        let _ = std::fs::remove_dir_all(self.0.root.as_ref().unwrap());
     }
 }
 

@@ -9,9 +9,7 @@ mod rate;
 use std::io::{self, Write};
 use std::time::Duration;
 
-use lager_ports::{
-    Bus, IntrospectError, Layout, PortError, ReceiveError, Shutdown, Subscriber,
-};
+use lager_ports::{Bus, IntrospectError, Layout, PortError, ReceiveError, Shutdown, Subscriber};
 use lager_topics::{TOPICS, Topic, TopicVisitor, UnknownTopic, visit};
 use serde_json::json;
 
@@ -54,7 +52,10 @@ pub enum ToolError {
 pub fn list(bus: &Bus, as_json: bool, out: &mut impl Write) -> Result<(), ToolError> {
     let topics = bus.topics()?;
     if topics.is_empty() && !as_json {
-        writeln!(out, "no topic is open on this bus; `lager up` starts a robot")?;
+        writeln!(
+            out,
+            "no topic is open on this bus; `lager up` starts a robot"
+        )?;
     }
     for topic in topics {
         if as_json {
@@ -73,7 +74,10 @@ pub fn list(bus: &Bus, as_json: bool, out: &mut impl Write) -> Result<(), ToolEr
                 "{name:36} {:2} publishers {:2} subscribers, {} of them observers",
                 topic.publishers, topic.subscribers, topic.observers
             )?,
-            _ => writeln!(out, "{name:36} of another build: its layout is not this one's")?,
+            _ => writeln!(
+                out,
+                "{name:36} of another build: its layout is not this one's"
+            )?,
         }
     }
     Ok(())
@@ -145,7 +149,9 @@ pub fn info(bus: &Bus, name: &str, as_json: bool, out: &mut impl Write) -> Resul
         writers.chain(topic.readers.iter().map(|peer| ("read", peer)))
     });
     for (done, peer) in ends {
-        let role = peer.role.map_or("a stranger".into(), |role| role.to_string());
+        let role = peer
+            .role
+            .map_or("a stranger".into(), |role| role.to_string());
         writeln!(out, "    {done:7} by {role}, process {}", peer.pid)?;
     }
     Ok(())

@@ -15,6 +15,7 @@ mod boards;
 mod pty;
 mod robot;
 mod shell;
+mod station;
 mod truth;
 mod uart;
 

@@ -1,10 +1,10 @@
 //! The robot: world, both boards and their wires, driven by events in virtual time.
 //!
 //! ```text
-//!    Pi ==write/read==> serial line ==> sensor board ---- ExDe ----> steering board <== serial line <== Pi
-//!                                            |                         |       |
-//!                                       line, IR                    motors  servos
-//!                                            '---------- World --------'-------'
+//!   Pi <==serial line==> sensor board ---ExDe---> steering board <==serial line==> Pi
+//!                             |                      |      |
+//!                         line, IR                motors  servos
+//!                             '------- World --------'------'
 //! ```
 //! Between two events nothing changes that a board could notice, so time jumps from event to
 //! event: a step a board asked for, a byte that has arrived, the end of a transmission, an edge
@@ -23,16 +23,10 @@ use lager_plant::noise::Noise;
 use lager_plant::{Pose, Warehouse, WarehouseError, World, WorldState};
 use lager_wire::ResetCause;
 
-use crate::boards::{Chip, ExDe, SensorPins, SteeringPins};
+use crate::boards::{ExDe, SensorPins, SteeringPins};
+use crate::station::{START_UP_NS, Station};
 use crate::uart::Uart;
 
-/// A board is out of reset this long after its cause: the chip's start-up time with the fuses
-/// for slowly rising power.
-const START_UP_NS: u64 = 65_000_000;
-/// A board's loop takes at least this long, whatever it asks for.
-const SHORTEST_LOOP_NS: u64 = 10_000;
-/// The watchdog's time: the motors go off, then the board starts anew.
-const WATCHDOG_NS: u64 = 125_000_000;
 /// The middle of a servo's range.
 const REST: u16 = 512;
 /// The stream of noise that spreads the boards' first loops.
@@ -85,14 +79,6 @@ pub struct Truth {
     pub carrying: Option<i32>,
 }
 
-#[derive(Clone, Debug)]
-struct Station<Unit> {
-    unit: Option<Unit>,
-    chip: Chip,
-    due_ns: u64,
-    hung: bool,
-}
-
 /// A robot in its warehouse.
 #[derive(Debug)]
 pub struct Robot {
@@ -102,65 +88,6 @@ pub struct Robot {
     exde: ExDe,
     options: RobotOptions,
     now_ns: u64,
-}
-
-impl<Unit> Station<Unit> {
-    fn new(options: &RobotOptions, starts_ns: u64) -> Self {
-        Self {
-            unit: None,
-            chip: Chip {
-                uart: Uart::new(options.baud),
-                cause: options.cause,
-                boot_ns: starts_ns,
-                kicked_ns: starts_ns,
-                now_ns: 0,
-            },
-            due_ns: starts_ns,
-            hung: false,
-        }
-    }
-
-    fn next_event(&self, now: u64) -> u64 {
-        if self.hung {
-            self.chip.kicked_ns + WATCHDOG_NS
-        } else if self.unit.is_none() {
-            self.due_ns
-        } else {
-            self.due_ns.min(self.chip.uart.next_event(now))
-        }
-    }
-
-    /// Holds the board in reset and lets it start again.
-    fn reset(&mut self, now: u64, cause: ResetCause) {
-        self.unit = None;
-        self.hung = false;
-        self.chip.cause = cause;
-        self.chip.now_ns = now;
-        // The board's clock counts whole microseconds from its start.
-        self.chip.boot_ns = (now + START_UP_NS).next_multiple_of(1_000);
-        self.chip.kicked_ns = self.chip.boot_ns;
-        self.due_ns = self.chip.boot_ns;
-        self.chip.uart.restart_board(now);
-    }
-
-    /// The board's own clock; it runs while the board does.
-    fn clock_us(&self, now: u64) -> u32 {
-        (now.saturating_sub(self.chip.boot_ns) / 1_000) as u32
-    }
-
-    /// Whether the board's loop has something to do; `input` is what else its interrupts saw.
-    fn wants(&self, now: u64, input: bool) -> bool {
-        let arrived = self.chip.uart.next_event(self.chip.now_ns) <= now;
-        !self.hung && (now >= self.due_ns || self.unit.is_some() && (input || arrived))
-    }
-
-    /// Notes when the unit wants its next step.
-    fn plan(&mut self, wanted_us: u32) {
-        let ahead = wanted_us.wrapping_sub(self.clock_us(self.chip.now_ns)) as i32;
-        let ahead_ns = u64::from(ahead.max(0).unsigned_abs()) * 1_000;
-        let clock_ns = self.chip.boot_ns + (self.chip.now_ns - self.chip.boot_ns) / 1_000 * 1_000;
-        self.due_ns = (clock_ns + ahead_ns).max(self.chip.now_ns + SHORTEST_LOOP_NS);
-    }
 }
 
 impl Robot {
@@ -174,8 +101,8 @@ impl Robot {
         let pose = resting_arm(&options.steering.arm);
         Ok(Self {
             world: World::new(warehouse, options.seed, pose)?,
-            sensor: Station::new(&options, starts_ns()),
-            steering: Station::new(&options, starts_ns()),
+            sensor: Station::new(options.baud, options.cause, starts_ns()),
+            steering: Station::new(options.baud, options.cause, starts_ns()),
             exde: ExDe::default(),
             options,
             now_ns: 0,
@@ -198,7 +125,11 @@ impl Robot {
     /// Advances to `now`; what lies behind is ignored.
     pub fn advance_to(&mut self, now: Duration) {
         let target = now.as_nanos() as u64;
-        while let Some(next) = Some(self.next_ns()).filter(|next| *next <= target) {
+        loop {
+            let next = self.next_ns();
+            if next > target {
+                break;
+            }
             self.handle(next);
         }
         self.settle(target);
@@ -294,11 +225,6 @@ impl Robot {
         self.uart(wire).set_cut(cut, now);
     }
 
-    /// Noise on the way to the board.
-    pub fn disturb_board(&mut self, wire: Wire, bytes: &[u8]) {
-        self.write(wire, bytes);
-    }
-
     /// Noise on the way to the Pi; it arrives now.
     pub fn disturb_pi(&mut self, wire: Wire, bytes: &[u8]) {
         let now = self.now_ns;
@@ -355,11 +281,15 @@ impl Robot {
         }
     }
 
-    /// Everything that happens at `now`.
-    fn handle(&mut self, now: u64) {
+    /// Everything that happens at `at`, or at present where that lies behind.
+    fn handle(&mut self, at: u64) {
+        let now = at.max(self.now_ns);
         self.settle(now);
-        for wire in [Wire::Sensor, Wire::Steering] {
-            self.bite(wire, now);
+        if self.sensor.is_bitten(now) {
+            self.reset_board(Wire::Sensor, ResetCause::Watchdog);
+        }
+        if self.steering.is_bitten(now) {
+            self.reset_board(Wire::Steering, ResetCause::Watchdog);
         }
         if self.sensor.wants(now, self.exde.returned) {
             self.step_sensor(now);
@@ -373,25 +303,14 @@ impl Robot {
         }
     }
 
-    /// Resets a board whose watchdog has run out.
-    fn bite(&mut self, wire: Wire, now: u64) {
-        let (hung, kicked) = match wire {
-            Wire::Sensor => (self.sensor.hung, self.sensor.chip.kicked_ns),
-            Wire::Steering => (self.steering.hung, self.steering.chip.kicked_ns),
-        };
-        if hung && now >= kicked + WATCHDOG_NS {
-            self.reset_board(wire, ResetCause::Watchdog);
-        }
-    }
-
     fn step_sensor(&mut self, now: u64) {
         let receiver_us = self
             .steering
             .unit
             .is_some()
             .then(|| self.steering.clock_us(now));
+        self.sensor.come_to(now);
         let Station { unit, chip, .. } = &mut self.sensor;
-        chip.now_ns = now;
         let mut pins = SensorPins {
             chip,
             world: &mut self.world,
@@ -405,8 +324,8 @@ impl Robot {
 
     fn step_steering(&mut self, now: u64) {
         self.exde.rose = false;
+        self.steering.come_to(now);
         let Station { unit, chip, .. } = &mut self.steering;
-        chip.now_ns = now;
         let mut pins = SteeringPins {
             chip,
             world: &mut self.world,

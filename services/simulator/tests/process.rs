@@ -72,7 +72,21 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
+        let prefix = self.bus.prefix.as_deref().unwrap();
+        let mut left = Vec::new();
+        for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
+            let name = entry.file_name().into_string().unwrap_or_default();
+            if name.starts_with(prefix) {
+                let _ = std::fs::remove_file(entry.path());
+                left.push(name);
+            }
+        }
         let _ = std::fs::remove_dir_all(&self.folder);
+        // The transport keeps one small segment for each bus for ever.
+        left.retain(|name| !name.ends_with(".global_mgmt"));
+        if !std::thread::panicking() {
+            assert_eq!(left, Vec::<String>::new());
+        }
     }
 }
 

@@ -209,12 +209,13 @@ impl<'a> Core<'a> {
         self.waiter.wait(self.clock.real(left).min(LONGEST_WAIT));
     }
 
-    /// When a setting is due, if its board could take it.
+    /// When a setting is due to a board that could take it.
     fn settings_due(&self) -> Option<Duration> {
-        let either = [Callsign::Sensor, Callsign::Steering]
+        [Callsign::Sensor, Callsign::Steering]
             .into_iter()
-            .any(|board| self.boards.place(board).is_some());
-        self.settings.next_due().filter(|_| either)
+            .filter(|board| self.boards.place(*board).is_some())
+            .filter_map(|board| self.settings.next_due(board))
+            .min()
     }
 
     /// Drains orders and buttons completely.

@@ -25,9 +25,8 @@ impl Navigator {
     /// Takes a line frame.
     pub(super) fn line(&mut self, now: Duration, state: LineState, out: &mut Output) {
         self.frames = self.frames.wrapping_add(1);
-        self.sight = Some((now, state));
-        if self.blind {
-            self.blind = false;
+        let saw_before = self.sight.replace((now, state)).is_some();
+        if core::mem::take(&mut self.blind) && saw_before && self.is_active() {
             say!(out, "I see again and drive on.");
         }
         if self.mode == Some(Mode::Manual) || !self.follows_line() {

@@ -1,10 +1,10 @@
 //! What to do next: maps, orders, the pick signal, and the decision at each node.
 
-use lager_topics::{EventKind, Goal, Heading, Order, Phase, Route, Step, WarehouseMap};
+use lager_topics::{EventKind, Goal, Heading, Order, Phase, Route, RouteNode, Step, WarehouseMap};
 
 use super::{Navigator, Output, Pause, say};
 use crate::heading::Compass;
-use crate::map::{Map, Node, Station};
+use crate::map::{Map, Station};
 use crate::route::{Distances, nearer, write_route};
 
 impl Navigator {
@@ -120,7 +120,8 @@ impl Navigator {
 
     /// Begins the waiting order, if there is one, from the node it stands on.
     pub(super) fn begin_pending(&mut self, out: &mut Output) -> bool {
-        let (Some(order), Some(map)) = (self.pending.take(), &self.map) else {
+        let Some(map) = &self.map else { return false };
+        let Some(order) = self.pending.take() else {
             return false;
         };
         let reachable = map
@@ -279,7 +280,7 @@ impl Navigator {
         let Some((_, towards)) = best else {
             return self.get_stuck("There is no way to the delivery corner", out);
         };
-        let from: Node = station.other_end(towards).unwrap_or(towards);
+        let from = station.other_end(towards).unwrap_or(towards);
         let Some(heading) = station.heading_from(from) else {
             return;
         };
@@ -291,7 +292,7 @@ impl Navigator {
         write_route(map, &distances, towards, heading, &mut route);
         let length = usize::from(route.length);
         route.nodes.copy_within(0..length, 1);
-        route.nodes[0] = lager_topics::RouteNode {
+        route.nodes[0] = RouteNode {
             x: towards.x,
             y: towards.y,
         };

@@ -6,7 +6,8 @@ use lager_logic::map::Node;
 use lager_logic::{Input, LogicConfig, Navigator};
 use lager_topics::{EventKind, Phase, Side, WarehouseMap};
 
-use crate::double::{Body, Exit, Floor, Trouble};
+use crate::double::{Body, Trouble};
+use crate::floor::{Exit, Floor};
 use crate::trial::{Trial, warehouse};
 
 const EXIT: Exit = Exit::Straight(450.0);

@@ -5,7 +5,8 @@ use std::time::Duration;
 use lager_topics::{EventKind, Side};
 use proptest::prelude::*;
 
-use crate::double::{Exit, Trouble};
+use crate::double::Trouble;
+use crate::floor::Exit;
 use crate::trial::{SIDES, Trial, corners, warehouse};
 
 const STRAIGHT: Exit = Exit::Straight(600.0);

@@ -6,7 +6,8 @@ use lager_logic::{LogicConfig, Navigator};
 use lager_topics::{EventKind, NavigatorStatus, Phase, Side};
 use proptest::prelude::*;
 
-use crate::double::{Exit, STEP, Trouble};
+use crate::double::{STEP, Trouble};
+use crate::floor::Exit;
 use crate::trial::{SIDES, Trial, corners, warehouse};
 
 const EXIT: Exit = Exit::Straight(450.0);
@@ -105,6 +106,32 @@ fn a_waiting_order_survives() {
             .any(|(kind, order, _)| *kind == EventKind::ItemDelivered && *order == id)
     };
     assert!(delivered(1) && delivered(2), "{}", trial.story());
+}
+
+#[test]
+fn an_order_that_waits_for_its_mode_survives_whatever_is_told_first() {
+    for mode_first in [false, true] {
+        let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
+        trial.navigator = Navigator::resume(
+            LogicConfig::default(),
+            &NavigatorStatus {
+                phase: Phase::WaitingForOrder.into(),
+                heading: lager_topics::Heading::Right.into(),
+                pending: 1,
+                pending_id: 4,
+                pending_product: 1,
+                command_id: trial.status.command_id,
+                ..NavigatorStatus::default()
+            },
+        );
+        if mode_first {
+            trial.tell_mode();
+        }
+        let map = trial.published;
+        trial.tell(lager_logic::Input::Map(&map));
+        trial.tell_mode();
+        assert_eq!(trial.status.order_id, 4, "{}", trial.story());
+    }
 }
 
 #[test]

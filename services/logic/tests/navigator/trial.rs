@@ -9,7 +9,8 @@ use lager_topics::{
     EventKind, MapProduct, Mode, NavigatorStatus, Order, Phase, Side, WarehouseMap,
 };
 
-use crate::double::{Body, Exit, STEP, Trouble};
+use crate::double::{Body, STEP, Trouble};
+use crate::floor::Exit;
 
 const RENEWAL: Duration = Duration::from_millis(40);
 const STATUS_PERIOD: Duration = Duration::from_millis(50);

@@ -108,7 +108,7 @@ fn noise_on_the_cable_moves_nothing_and_is_counted() {
     let mut noise = lager_plant::noise::Noise::new(4, 4);
     for _ in 0..2_000 {
         let bytes: Vec<u8> = (0..16).map(|_| noise.bits() as u8).collect();
-        pi.robot.disturb_board(Wire::Steering, &bytes);
+        pi.robot.write(Wire::Steering, &bytes);
         pi.robot.disturb_pi(Wire::Sensor, &bytes);
         pi.run(ms(1));
         assert_eq!(pi.robot.truth().duties, [0, 0]);

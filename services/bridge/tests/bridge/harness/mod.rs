@@ -211,7 +211,7 @@ impl<T: Topic> Seen<T> {
     /// Everything that has come since the last look.
     pub(crate) fn drain(&mut self) -> Vec<T::Payload> {
         let mut all = Vec::new();
-        while let Ok(Some(sample)) = self.subscriber.receive() {
+        while let Some(sample) = self.subscriber.receive().unwrap() {
             self.count += 1;
             self.sent = sample.stamp().sequence + 1;
             all.push(*sample);
@@ -291,10 +291,17 @@ impl Hands {
         what: &str,
         condition: impl Fn(&Health) -> bool,
     ) -> Health {
-        wait_until(what, || {
-            self.health.look().is_some_and(|health| condition(&health))
-        });
-        self.health.last.unwrap()
+        let start = Instant::now();
+        loop {
+            match self.health.look() {
+                Some(health) if condition(&health) => return health,
+                last => assert!(
+                    start.elapsed() < PATIENCE,
+                    "waited in vain until {what}: {last:?}"
+                ),
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
     }
 
     pub(crate) fn wait_for_state(

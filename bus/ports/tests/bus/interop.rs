@@ -1,0 +1,250 @@
+//! Stock iceoryx2 meets us: tools, bindings and other programs use its `ipc::Service`, not our
+//! service type, and must notice no difference.
+
+use std::time::Duration;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::NodeView;
+use iceoryx2::prelude::{
+    AttributeVerifier, CallbackProgression, FileName, Node, NodeBuilder, NodeState, Path,
+    PortFactory, SemanticString, Service, ServiceName, SignalHandlingMode, ipc,
+};
+use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
+use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
+use lager_ports::{Clock, Policy, Wake};
+use lager_topics::{
+    Answer, Ask, BridgeRequest, LineFrame, Qos, Request, Role, Schema, SensorLine, Stamp, Topic,
+};
+
+use crate::domain::{Domain, frame, send};
+use crate::process::Player;
+
+fn config(domain: &Domain) -> Config {
+    let mut config = Config::default();
+    let prefix = domain.config.prefix.as_deref().unwrap();
+    let root = domain.config.root.as_deref().unwrap();
+    config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
+    config
+        .global
+        .set_root_path(&Path::new(root.as_os_str().as_encoded_bytes()).unwrap());
+    config
+}
+
+fn stock(domain: &Domain) -> Node<ipc::Service> {
+    NodeBuilder::new()
+        .config(&config(domain))
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .unwrap()
+}
+
+fn name(relative: &str) -> ServiceName {
+    ServiceName::new(&format!("lager/r1/{relative}")).unwrap()
+}
+
+fn line(node: &Node<ipc::Service>) -> Builder<LineFrame, Stamp, ipc::Service> {
+    node.service_builder(&name(SensorLine::NAME))
+        .publish_subscribe::<LineFrame>()
+        .user_header::<Stamp>()
+}
+
+fn schema<A: Schema, B: Schema>() -> AttributeVerifier {
+    let key = AttributeKey::new(b"lager.schema").unwrap();
+    let value = format!("{:016x}.{:016x}", A::HASH, B::HASH);
+    let value = AttributeValue::new(value.as_bytes()).unwrap();
+    AttributeVerifier::new().require(&key, &value).unwrap()
+}
+
+#[test]
+fn a_stock_subscriber_gets_our_samples_with_their_stamps() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+
+    let node = stock(&domain);
+    let service = line(&node)
+        .open_with_attributes(&schema::<LineFrame, Stamp>())
+        .unwrap();
+    let limits = service.static_config();
+    let qos: Qos = SensorLine::QOS;
+    assert_eq!(limits.max_publishers(), qos.max_publishers());
+    assert_eq!(limits.max_subscribers(), qos.max_subscribers());
+    assert_eq!(limits.subscriber_max_buffer_size(), qos.buffer);
+    let subscriber = service.subscriber_builder().create().unwrap();
+
+    let before = Clock::monotonic_ns();
+    for number in 0..500 {
+        let mut loan = publisher.loan().unwrap();
+        *loan = frame(number);
+        loan.source_time_ns(u64::from(number) + 1);
+        loan.send().unwrap();
+        let sample = subscriber.receive().unwrap().unwrap();
+        assert_eq!(*sample.payload(), frame(number));
+        let stamp = sample.user_header();
+        assert_eq!(stamp.sequence, u64::from(number));
+        assert_eq!(stamp.source_time_ns, u64::from(number) + 1);
+        assert!((before..=Clock::monotonic_ns()).contains(&stamp.publish_time_ns));
+        assert_eq!(stamp.epoch, publisher.epoch());
+        assert_eq!(stamp.writer, std::process::id());
+    }
+    assert!(subscriber.receive().unwrap().is_none());
+}
+
+#[test]
+fn our_subscriber_gets_the_samples_of_a_stock_publisher() {
+    let domain = Domain::new();
+    let node = stock(&domain);
+    let bus = domain.open(Role::Logic);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = line(&node)
+        .open_with_attributes(&schema::<LineFrame, Stamp>())
+        .unwrap()
+        .publisher_builder()
+        .create()
+        .unwrap();
+    for number in 0..500 {
+        let mut sample = publisher.loan().unwrap();
+        *sample.payload_mut() = frame(number);
+        *sample.user_header_mut() = Stamp {
+            // Every third is missing.
+            sequence: u64::from(number) * 3 / 2,
+            epoch: 1,
+            writer: 7,
+            ..Stamp::default()
+        };
+        assert_eq!(sample.send().unwrap(), 1);
+        let received = subscriber.receive().unwrap().unwrap();
+        assert_eq!(*received, frame(number));
+        assert_eq!(received.stamp().writer, 7);
+    }
+    assert_eq!(subscriber.received(), 500);
+    assert_eq!(subscriber.lost(), 249);
+}
+
+#[test]
+fn a_topic_that_stock_made_is_ours_too() {
+    let domain = Domain::new();
+    let node = stock(&domain);
+    let qos = SensorLine::QOS;
+    let key = AttributeKey::new(b"lager.schema").unwrap();
+    let made = line(&node)
+        .max_publishers(qos.max_publishers())
+        .max_subscribers(qos.max_subscribers())
+        .max_nodes(qos.max_nodes())
+        .subscriber_max_buffer_size(qos.buffer)
+        .subscriber_max_borrowed_samples(4)
+        .history_size(qos.history)
+        .open_or_create_with_attributes(&schema::<LineFrame, Stamp>())
+        .unwrap();
+    let subscriber = made.subscriber_builder().create().unwrap();
+    let bus = domain.open(Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    send(&publisher, 5);
+    let sample = subscriber.receive().unwrap().unwrap();
+    assert_eq!(sample.payload().link_epoch, 5);
+    assert_eq!(made.attributes().number_of_key_values(&key), 1);
+}
+
+#[test]
+fn stock_is_refused_with_another_layout() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let _publisher = bus.publisher::<SensorLine>().unwrap();
+    let node = stock(&domain);
+    let other = line(&node).open_with_attributes(&schema::<Stamp, Stamp>());
+    assert_eq!(
+        other.unwrap_err(),
+        PublishSubscribeOpenError::IncompatibleAttributes
+    );
+    let without_header = node
+        .service_builder(&name(SensorLine::NAME))
+        .publish_subscribe::<LineFrame>()
+        .open();
+    assert_eq!(
+        without_header.unwrap_err(),
+        PublishSubscribeOpenError::IncompatibleTypes
+    );
+}
+
+#[test]
+fn stock_rings_our_waiter() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Logic);
+    let waiter = bus.waiter(Policy::Block).unwrap();
+    let node = stock(&domain);
+    let wake = node
+        .service_builder(&name("wake/logic"))
+        .event()
+        .open()
+        .unwrap();
+    let notifier = wake.notifier_builder().create().unwrap();
+    notifier.notify().unwrap();
+    assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
+}
+
+#[test]
+fn stock_asks_and_our_server_answers() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let server = bus.server::<BridgeRequest>().unwrap();
+    let node = stock(&domain);
+    let service = node
+        .service_builder(&name(BridgeRequest::NAME))
+        .request_response::<Ask, Answer>()
+        .open_with_attributes(&schema::<Ask, Answer>())
+        .unwrap();
+    let client = service.client_builder().create().unwrap();
+    let pending = client
+        .send_copy(Ask {
+            gain_p: 9,
+            ..Ask::default()
+        })
+        .unwrap();
+    let answer = |ask: &Ask| Answer {
+        gain_p: ask.gain_p,
+        ..Answer::default()
+    };
+    assert_eq!(server.serve(answer).unwrap(), 1);
+    assert_eq!(pending.receive().unwrap().unwrap().payload().gain_p, 9);
+}
+
+#[test]
+fn stock_sees_our_nodes_and_topics_and_sweeps_the_killed() {
+    let domain = Domain::new();
+    let player = Player::start(&domain, "line-writer");
+    let pid = player.pid();
+    let node = stock(&domain);
+
+    let mut topics = Vec::new();
+    ipc::Service::list(node.config(), |details| {
+        topics.push(details.static_details.name().to_string());
+        CallbackProgression::Continue
+    })
+    .unwrap();
+    assert!(
+        topics.contains(&name(SensorLine::NAME).to_string()),
+        "{topics:?}"
+    );
+
+    let alive = |wanted: bool| {
+        let mut found = false;
+        Node::<ipc::Service>::list(node.config(), |state| {
+            let details = match &state {
+                NodeState::Alive(view) if wanted => view.details().clone(),
+                NodeState::Dead(view) if !wanted => view.details().clone(),
+                _ => None,
+            };
+            found |= details
+                .is_some_and(|details| details.name().as_str() == format!("lager/r1/bridge/{pid}"));
+            CallbackProgression::Continue
+        })
+        .unwrap();
+        found
+    };
+    assert!(alive(true));
+    player.kill();
+    assert!(alive(false));
+    let swept = node.blocking_cleanup_dead_nodes(Duration::from_secs(60));
+    assert_eq!((swept.cleanups, swept.failed_cleanups), (1, 0));
+    assert!(!alive(false));
+}

@@ -1,0 +1,145 @@
+//! The map against the plane, and the law that every open way leads back.
+
+use lager_topics::MapProduct;
+use proptest::prelude::*;
+
+use super::*;
+
+fn published(width: u8, height: u8, delivery: (u8, u8)) -> WarehouseMap {
+    WarehouseMap {
+        width,
+        height,
+        delivery_x: delivery.0,
+        delivery_y: delivery.1,
+        side_length_cm: 50,
+        ..WarehouseMap::default()
+    }
+}
+
+fn with_product(square: (u8, u8), side: Side) -> WarehouseMap {
+    let mut map = published(3, 2, (0, 0));
+    map.product_count = 1;
+    map.products[0] = MapProduct {
+        id: 7,
+        x: square.0,
+        y: square.1,
+        side: side.into(),
+        ..MapProduct::default()
+    };
+    map
+}
+
+#[test]
+fn border_nodes_have_only_the_ways_that_exist() {
+    let map = Map::new(&published(2, 2, (0, 0))).unwrap();
+    let ways = |x, y| HEADINGS.map(|heading| map.is_open(Node::new(x, y), heading));
+    assert_eq!(ways(0, 0), [false, true, true, false]);
+    assert_eq!(ways(1, 0), [true, true, true, false]);
+    assert_eq!(ways(2, 2), [true, false, false, true]);
+    assert_eq!(ways(1, 1), [true; 4]);
+}
+
+#[test]
+fn each_side_of_a_square_is_its_edge() {
+    let table = [
+        (Side::Left, (1, 1), (1, 2), Heading::Right),
+        (Side::Up, (1, 2), (2, 2), Heading::Down),
+        (Side::Right, (2, 1), (2, 2), Heading::Left),
+        (Side::Down, (1, 1), (2, 1), Heading::Up),
+    ];
+    for (side, first, second, into) in table {
+        let map = Map::new(&with_product((1, 1), side)).unwrap();
+        let ends = [Node::new(first.0, first.1), Node::new(second.0, second.1)];
+        assert_eq!(
+            map.station(7).map(|found| (found.ends, found.into)),
+            Some((ends, into))
+        );
+    }
+}
+
+#[test]
+fn a_station_is_on_the_left_one_way_and_on_the_right_the_other() {
+    let map = Map::new(&with_product((1, 1), Side::Right)).unwrap();
+    let [below, above] = map.station(7).unwrap().ends;
+    assert_eq!(map.station_sides(below, Heading::Up), Sides::LEFT);
+    assert_eq!(map.station_sides(above, Heading::Down), Sides::RIGHT);
+    assert_eq!(map.station_sides(below, Heading::Down), Sides::NONE);
+    assert_eq!(map.station_sides(below, Heading::Left), Sides::NONE);
+}
+
+#[test]
+fn the_way_out_leaves_each_corner_outwards_along_x() {
+    for (corner, exit) in [
+        ((0, 0), Heading::Left),
+        ((0, 2), Heading::Left),
+        ((3, 0), Heading::Right),
+        ((3, 2), Heading::Right),
+    ] {
+        let map = Map::new(&published(3, 2, corner)).unwrap();
+        assert_eq!(map.exit(), exit);
+        assert!(map.has_tape(map.delivery(), exit));
+        assert!(!map.is_open(map.delivery(), exit));
+        assert!(map.has_tape(map.delivery(), exit.back()));
+    }
+}
+
+#[test]
+fn what_cannot_be_driven_in_is_refused() {
+    let refused = |map: &WarehouseMap| Map::new(map).unwrap_err();
+    assert_eq!(
+        refused(&published(0, 2, (0, 0))),
+        MapError::NoSquares {
+            width: 0,
+            height: 2
+        }
+    );
+    assert_eq!(
+        refused(&published(255, 255, (0, 0))),
+        MapError::TooLarge {
+            width: 255,
+            height: 255
+        }
+    );
+    assert_eq!(
+        refused(&published(3, 2, (1, 0))),
+        MapError::DeliveryNotAtCorner { x: 1, y: 0 }
+    );
+    let mut map = published(1, 1, (0, 0));
+    map.side_length_cm = 0;
+    assert_eq!(refused(&map), MapError::NoSideLength);
+    map.side_length_cm = 39;
+    assert_eq!(refused(&map), MapError::SideTooShort(39));
+    assert_eq!(
+        refused(&with_product((3, 0), Side::Left)),
+        MapError::ProductOutside(7)
+    );
+    let mut twice = with_product((0, 0), Side::Left);
+    twice.products[1] = twice.products[0];
+    twice.product_count = 2;
+    assert_eq!(refused(&twice), MapError::ProductTwice(7));
+}
+
+proptest! {
+    #[test]
+    fn every_open_way_leads_back_whatever_is_blocked(
+        (width, height) in (1u8..8, 1u8..8),
+        blocks in prop::collection::vec((0u8..9, 0u8..9, 0usize..4), 0..40),
+    ) {
+        let mut map = Map::new(&published(width, height, (0, 0))).unwrap();
+        for (x, y, heading) in blocks {
+            let was_open = map.is_open(Node::new(x, y), HEADINGS[heading]);
+            prop_assert_eq!(map.block(Node::new(x, y), HEADINGS[heading]), was_open);
+            prop_assert!(!map.is_open(Node::new(x, y), HEADINGS[heading]));
+        }
+        for index in 0..map.node_count() {
+            let node = map.node(index);
+            prop_assert_eq!(map.index(node), index);
+            for heading in HEADINGS {
+                if map.is_open(node, heading) {
+                    let next = map.neighbour(node, heading).unwrap();
+                    prop_assert!(map.is_open(next, heading.back()));
+                }
+            }
+        }
+    }
+}
