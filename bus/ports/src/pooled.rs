@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_leaves_the_spare_blocks_alone() {
-        assert!(Counted::<[u8; 56]>::FITS && !Counted::<[u8; 57]>::FITS);
+        const { assert!(Counted::<[u8; 56]>::FITS && !Counted::<[u8; 57]>::FITS) };
         let large = Pooled::new([0_u8; 57]);
         assert_eq!(spares(), SPARES);
         drop(large);
@@ -360,7 +360,7 @@ mod tests {
         check([5_u64; 8]);
         check(String::from("sex"));
         check(vec![7; 1000]);
-        assert!(Counted::<u128>::FITS && !Counted::<Aligned>::FITS);
+        const { assert!(Counted::<u128>::FITS && !Counted::<Aligned>::FITS) };
     }
 
     #[test]

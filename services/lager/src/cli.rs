@@ -92,6 +92,17 @@ pub enum Command {
     },
     /// Tell the robot that the product has been picked up
     Picked,
+    /// Tell the robot that it has been put on the delivery node, looking into the warehouse
+    Reset,
+    /// Set the gains of the line following (PD)
+    Gains {
+        /// Proportional gain, 2 unless set
+        p: u8,
+        /// Derivative gain over 10 ms, 2 unless set
+        d: u8,
+    },
+    /// Calibrate the line sensors: move the robot over tape and floor by hand for five seconds
+    Calibrate,
     /// Find out what is wrong with this machine and how to mend it
     Doctor {
         /// Remove what dead processes left on the bus

@@ -121,6 +121,9 @@ fn run(cli: Cli) -> Result<ExitCode> {
         })?,
         Command::Fetch { product } => Operator::new(&config)?.fetch(product)?,
         Command::Picked => Operator::new(&config)?.picked()?,
+        Command::Reset => Operator::new(&config)?.reset()?,
+        Command::Gains { p, d } => Operator::new(&config)?.gains(p, d)?,
+        Command::Calibrate => Operator::new(&config)?.calibrate()?,
     };
     println!("{said}");
     Ok(ExitCode::SUCCESS)

@@ -335,14 +335,12 @@ impl Whole {
             Some(Act::Steer(order)) => {
                 self.arbiter.order(self.now, &order);
             }
-            Some(Act::Press(input)) => {
-                if input.kind.get() == Some(InputKind::PickupDone) {
-                    self.tell_logic(Input::PickupDone {
-                        order_id: input.order_id,
-                    });
-                }
+            Some(Act::Press(input)) if input.kind.get() == Some(InputKind::PickupDone) => {
+                self.tell_logic(Input::PickupDone {
+                    order_id: input.order_id,
+                });
             }
-            None => {}
+            Some(Act::Press(_)) | None => {}
         }
     }
 

@@ -1,4 +1,5 @@
-//! The one-shot commands: `drive`, `arm`, `stop`, `resume`, `mode`, `fetch`, `picked`.
+//! The one-shot commands: `drive`, `arm`, `stop`, `resume`, `mode`, `fetch`, `picked`, `reset`,
+//! `gains`, `calibrate`.
 //!
 //! Each opens the bus as an operator, does one thing through the same [`Hands`] as `up`, waits
 //! until the robot shows the effect, and says what came of it.
@@ -6,10 +7,10 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use lager_ports::{Bus, Shutdown, Subscriber};
+use lager_ports::{Bus, Clock, Shutdown, Subscriber};
 use lager_topics::{
     Answer, Ask, AskKind, Finish, Health, Input, InputKind, LinkHealth, Mode, NavStatus, Order,
-    OrderKind, Origin, Outcome, Role, SteeringOrder, SteeringState,
+    OrderKind, Origin, Outcome, Phase, Role, SteeringOrder, SteeringState, Topic,
 };
 use lager_wire::{Command, OperatorCommand, WheelCommand, parse_code};
 
@@ -104,7 +105,7 @@ impl Operator {
     }
 
     /// `lager resume`.
-    pub fn resume(&mut self) -> Result<String> {
+    pub fn resume(&self) -> Result<String> {
         self.ask(Ask {
             kind: AskKind::Resume.into(),
             ..Ask::default()
@@ -113,7 +114,7 @@ impl Operator {
     }
 
     /// `lager mode`.
-    pub fn mode(&mut self, mode: Mode) -> Result<String> {
+    pub fn mode(&self, mode: Mode) -> Result<String> {
         self.ask(Ask {
             kind: AskKind::SetMode.into(),
             mode: mode.into(),
@@ -126,7 +127,7 @@ impl Operator {
     }
 
     /// `lager fetch`: ordered until logic shows that it took the order.
-    pub fn fetch(&mut self, product: i32) -> Result<String> {
+    pub fn fetch(&self, product: i32) -> Result<String> {
         let mut status = self.bus.subscriber::<NavStatus>()?;
         let order = Order {
             id: Hands::fresh_id(),
@@ -150,16 +151,76 @@ impl Operator {
         }
     }
 
-    /// `lager picked`.
-    pub fn picked(&mut self) -> Result<String> {
-        self.hands.press(Input {
-            kind: InputKind::PickupDone.into(),
-            ..Input::default()
-        })?;
-        Ok("told the robot that the product has been picked up".into())
+    /// `lager picked`: repeated until logic goes on.
+    pub fn picked(&self) -> Result<String> {
+        let mut status = self.bus.subscriber::<NavStatus>()?;
+        let waits = |phase| phase == Some(Phase::Picking);
+        if !waits(first(&mut status, &self.bus)?.phase.get()) {
+            bail!("the robot does not wait at a pick station; nothing is to be picked up now");
+        }
+        self.press_until(InputKind::PickupDone, &mut status, |phase| !waits(phase))?;
+        Ok("the robot takes the product to delivery".into())
     }
 
-    fn ask(&mut self, ask: Ask) -> Result<Answer> {
+    /// `lager reset`: repeated until logic has taken it.
+    pub fn reset(&self) -> Result<String> {
+        let mut status = self.bus.subscriber::<NavStatus>()?;
+        self.press_until(InputKind::ResetPressed, &mut status, |phase| {
+            matches!(phase, Some(Phase::WaitingForOrder | Phase::WaitingForMap))
+        })?;
+        Ok("the robot takes it that it stands on the delivery node".into())
+    }
+
+    /// Presses a button until logic shows the effect.
+    fn press_until(
+        &self,
+        kind: InputKind,
+        status: &mut Subscriber<NavStatus>,
+        done: impl Fn(Option<Phase>) -> bool,
+    ) -> Result<()> {
+        let pressed = Clock::monotonic_ns();
+        let give_up = Instant::now() + PATIENCE;
+        loop {
+            self.hands.press(Input {
+                kind: kind.into(),
+                ..Input::default()
+            })?;
+            std::thread::sleep(Duration::from_millis(50));
+            if status.latest()?.is_some_and(|status| {
+                status.stamp().publish_time_ns > pressed && done(status.phase.get())
+            }) {
+                return Ok(());
+            }
+            if Instant::now() >= give_up {
+                bail!("logic does not react; `lager topic echo log/thought` shows what it thinks");
+            }
+        }
+    }
+
+    /// `lager gains`.
+    pub fn gains(&self, gain_p: u8, gain_d: u8) -> Result<String> {
+        let answer = self.ask(Ask {
+            kind: AskKind::SetGains.into(),
+            gain_p,
+            gain_d,
+            ..Ask::default()
+        })?;
+        Ok(format!(
+            "the gains in force are {} and {}",
+            answer.gain_p, answer.gain_d
+        ))
+    }
+
+    /// `lager calibrate`.
+    pub fn calibrate(&self) -> Result<String> {
+        self.ask(Ask {
+            kind: AskKind::Calibrate.into(),
+            ..Ask::default()
+        })?;
+        Ok("calibrating for five seconds: move the robot over tape and floor".into())
+    }
+
+    fn ask(&self, ask: Ask) -> Result<Answer> {
         let answer = self.hands.ask(ask)?;
         match answer.outcome.get() {
             Some(Outcome::Done) => Ok(answer),
@@ -171,19 +232,7 @@ impl Operator {
     }
 
     fn health(&mut self) -> Result<Health> {
-        let give_up = Instant::now() + PATIENCE;
-        loop {
-            if let Some(health) = self.health.latest()? {
-                return Ok(*health);
-            }
-            if Instant::now() >= give_up {
-                bail!(
-                    "no bridge of the robot `{}` is on the bus; is it up? (`lager up`)",
-                    self.bus.robot()
-                );
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        first(&mut self.health, &self.bus)
     }
 
     /// Gives an order and renews it until it has finished or its time is over.
@@ -247,6 +296,24 @@ impl Operator {
             }
         }
         Ok(format!("let go of `{name}`"))
+    }
+}
+
+/// The state a topic holds; the services publish theirs several times a second.
+fn first<T: Topic>(subscriber: &mut Subscriber<T>, bus: &Bus) -> Result<T::Payload> {
+    let give_up = Instant::now() + PATIENCE;
+    loop {
+        if let Some(sample) = subscriber.latest()? {
+            return Ok(*sample);
+        }
+        if Instant::now() >= give_up {
+            bail!(
+                "nobody publishes {} of the robot `{}`; is it up? (`lager up`)",
+                T::NAME,
+                bus.robot()
+            );
+        }
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lager_logic::{LogicConfig, Navigator};
+use lager_logic::{Input, LogicConfig, Navigator};
 use lager_topics::{EventKind, NavigatorStatus, Phase, Side};
 use proptest::prelude::*;
 
@@ -111,24 +111,18 @@ fn a_waiting_order_survives() {
 #[test]
 fn an_order_that_waits_for_its_mode_survives_whatever_is_told_first() {
     for mode_first in [false, true] {
-        let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
-        trial.navigator = Navigator::resume(
-            LogicConfig::default(),
-            &NavigatorStatus {
-                phase: Phase::WaitingForOrder.into(),
-                heading: lager_topics::Heading::Right.into(),
-                pending: 1,
-                pending_id: 4,
-                pending_product: 1,
-                command_id: trial.status.command_id,
-                ..NavigatorStatus::default()
-            },
-        );
+        let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Up)]);
+        let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
+        trial.body.autonomous = false;
+        trial.tell_mode();
+        trial.order(4, 1);
+        assert_eq!((trial.status.pending, trial.status.order_id), (1, 0));
+        trial.navigator = Navigator::resume(LogicConfig::default(), &trial.status);
+        trial.body.autonomous = true;
         if mode_first {
             trial.tell_mode();
         }
-        let map = trial.published;
-        trial.tell(lager_logic::Input::Map(&map));
+        trial.tell(Input::Map(&map));
         trial.tell_mode();
         assert_eq!(trial.status.order_id, 4, "{}", trial.story());
     }
