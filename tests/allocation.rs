@@ -114,8 +114,13 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
         // The first frames may still fill caches below: let a second pass.
         std::thread::sleep(Duration::from_secs(1));
 
+        // Counting begins with the first sample that is received.
         let mut line = operator.subscriber::<SensorLine>().expect("a topic");
         let mut state = operator.subscriber::<SteeringState>().expect("a topic");
+        wait_for("a line frame", || {
+            line.latest().expect("readable").map(|_| ())
+        });
+        wait_for("a report", || state.latest().expect("readable").map(|_| ()));
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         // From driving over the next crossing to the station: decisions are made, not only frames
         // passed on.

@@ -143,11 +143,13 @@ impl Settings {
             .min()
     }
 
-    /// A board has answered. An answer that fits no question under way changes nothing.
-    pub fn answer(&mut self, reply: &SettingReply) {
+    /// A board has answered; whether that was the answer to a question under way. Any other
+    /// changes nothing: it comes twice, or tells how a calibration ended that had been answered
+    /// when it began.
+    pub fn answer(&mut self, reply: &SettingReply) -> bool {
         let slot = self.slot(reply.key);
         if slot.next_try.is_none() || slot.seq != reply.seq {
-            return;
+            return false;
         }
         slot.next_try = None;
         slot.in_force = Some(reply.value);
@@ -160,6 +162,7 @@ impl Settings {
         } else {
             slot.progress = Progress::Refused;
         }
+        true
     }
 
     /// How far the last wish for a key has come.
@@ -230,7 +233,8 @@ mod tests {
         assert_eq!(settings.next_due(Callsign::Sensor), None);
         assert_eq!(settings.poll(ms(60), Callsign::Sensor), None);
         assert_eq!(settings.poll(ms(60), Callsign::Steering), Some(first));
-        settings.answer(&reply(&first, SettingStatus::Accepted));
+        assert!(settings.answer(&reply(&first, SettingStatus::Accepted)));
+        assert!(!settings.answer(&reply(&first, SettingStatus::Accepted)));
         assert_eq!(settings.progress(SettingKey::GainP), Progress::Accepted);
         assert_eq!(settings.in_force(SettingKey::GainP), Some(5));
         assert_eq!(settings.next_due(Callsign::Steering), None);
@@ -257,7 +261,7 @@ mod tests {
         settings.want(ms(0), SettingKey::GainP, 5);
         let old = settings.poll(ms(0), Callsign::Steering).unwrap();
         settings.want(ms(1), SettingKey::GainP, 6);
-        settings.answer(&reply(&old, SettingStatus::Accepted));
+        assert!(!settings.answer(&reply(&old, SettingStatus::Accepted)));
         assert_eq!(settings.progress(SettingKey::GainP), Progress::Pending);
         assert_eq!(
             settings

@@ -142,7 +142,7 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
     for round in 1..=6_u32 {
         // A turn takes 300 ms: the bridge dies before, in the middle and after it.
         let turn = logic(round * 10, LEFT_PERP);
-        let delay = Duration::from_millis(u64::from(round - 1) * 70);
+        let delay = Duration::from_millis(u64::from(round - 1) * 70).div_f64(harness::SPEED);
         let start = Instant::now();
         scene.renew_until(turn, "it is time to die", |scene| {
             scene.turns() == round as usize && start.elapsed() >= delay

@@ -1,7 +1,7 @@
 //! The links' side of the main loop: what the readers bring, and boards that come and go.
 
 use lager_wire::link::HostTransmitter;
-use lager_wire::{Callsign, SteerData, Version};
+use lager_wire::{Callsign, SettingKey, SettingReply, SettingStatus, SteerData, Version};
 
 use super::Core;
 use crate::frames::ServoTable;
@@ -63,7 +63,11 @@ impl Core<'_> {
             PortEvent::Steer { data, at_ns } => self.take_report(place, data, at_ns),
             PortEvent::Arm(data) => self.servos.hear(&data),
             PortEvent::Status(status) => self.boards.status(place, &status),
-            PortEvent::Setting(reply) => self.settings.answer(&reply),
+            PortEvent::Setting(reply) => {
+                if !self.settings.answer(&reply) && reply.key == SettingKey::Calibrate {
+                    calibrated(&reply);
+                }
+            }
         }
     }
 
@@ -113,5 +117,18 @@ impl Core<'_> {
             }
         }
         self.publish_state(at_ns);
+    }
+}
+
+/// Says how a calibration has ended: the sensor board answers once when it begins, with the value
+/// 1, and once when it ends, with the number of sensors that have seen both floor and tape.
+fn calibrated(reply: &SettingReply) {
+    match (reply.status, reply.value) {
+        (SettingStatus::Accepted, 1) => (),
+        (SettingStatus::Accepted, _) => tracing::info!("the line sensors are calibrated"),
+        (_, sensors) => tracing::warn!(
+            "only {sensors} of the line sensors have seen both floor and tape; the others keep \
+             their thresholds: calibrate again and move the robot over the tape meanwhile"
+        ),
     }
 }

@@ -29,6 +29,7 @@ impl Core<'_> {
                     (SettingKey::GainD, ask.gain_d.into()),
                 ],
             ),
+            // Done means that it has begun; its end is told in the log.
             (Some(AskKind::Calibrate), _) => {
                 self.set(Callsign::Sensor, &[(SettingKey::Calibrate, 1)])
             }

@@ -53,9 +53,14 @@ fn a_reset_steering_board_drives_on_but_does_not_repeat_a_turn() {
         });
     assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 1);
 
-    robot.hands.give_until(logic(2, FOLLOW), "it drives", |_| {
-        steering.with(|board| board.moves())
-    });
+    robot
+        .hands
+        .give_until(logic(2, FOLLOW), "it drives and says so", |hands| {
+            hands
+                .state
+                .look()
+                .is_some_and(|state| state.link_epoch == 2 && state.left_duty == 100)
+        });
     steering.with(|board| board.restart(ResetCause::Panic));
     robot
         .hands

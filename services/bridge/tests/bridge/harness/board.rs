@@ -169,8 +169,9 @@ fn run<P: Peer>(inner: &Mutex<Inner<P>>) {
     }
 }
 
+/// The board's clock, at the robot's speed.
 fn micros(start: Instant) -> u32 {
-    start.elapsed().as_micros() as u32
+    start.elapsed().mul_f64(super::SPEED).as_micros() as u32
 }
 
 /// A sensor board: line and distance by turns, every 10 ms one of them.
@@ -190,6 +191,8 @@ pub(crate) struct SensorBoard {
     flip_flop: bool,
     reset: ResetCause,
     answers: Vec<Payload>,
+    /// Number of the last calibration: asked again with the same one, it is answered again.
+    calibration: Option<u8>,
 }
 
 impl SensorBoard {
@@ -208,6 +211,7 @@ impl SensorBoard {
             flip_flop: false,
             reset: ResetCause::PowerOn,
             answers: Vec::new(),
+            calibration: None,
         }
     }
 
@@ -231,7 +235,9 @@ impl SensorBoard {
                 SettingStatus::Accepted
             }
             SettingKey::Calibrate => {
-                self.calibrations += 1;
+                if self.calibration.replace(setting.seq) != Some(setting.seq) {
+                    self.calibrations += 1;
+                }
                 SettingStatus::Accepted
             }
             SettingKey::GainP | SettingKey::GainD => SettingStatus::NotHere,
