@@ -156,9 +156,16 @@ fn a_person_can_do_by_hand_what_the_script_does() {
         );
         (output.status.success(), text)
     };
+    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
     wait_for("the script to have taken over", || {
-        said(&["mode", "manual"]).0.then_some(())
+        status
+            .latest()
+            .expect("readable")
+            .filter(|status| status.phase.get() == Some(Phase::Driving))
+            .map(|_| ())
     });
+    let (fine, text) = said(&["mode", "manual"]);
+    assert!(fine, "{text}");
     let (fine, text) = said(&["drive", "0x02", "--seconds", "0.5"]);
     assert!(fine, "{text}");
     let (fine, text) = said(&["drive", "left-45"]);
@@ -168,8 +175,16 @@ fn a_person_can_do_by_hand_what_the_script_does() {
     let (fine, text) = said(&["drive", "00001111"]);
     assert!(!fine && text.contains("no command"), "{text}");
     let (fine, text) = said(&["arm", "forward"]);
+    assert!(!fine && text.contains("no command"), "{text}");
+    let (fine, text) = said(&["arm", "2"]);
     assert!(!fine && text.contains("lager drive"), "{text}");
-    drop((state, observer));
+    let (fine, text) = said(&["picked"]);
+    assert!(!fine && text.contains("pick station"), "{text}");
+    let (fine, text) = said(&["gains", "3", "1"]);
+    assert!(fine && text.contains("3 and 1"), "{text}");
+    let (fine, text) = said(&["reset"]);
+    assert!(fine, "{text}");
+    drop((state, status, observer));
 }
 
 #[test]

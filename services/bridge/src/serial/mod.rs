@@ -285,3 +285,29 @@ fn put(port: &SerialPort, bytes: &[u8]) -> Result<usize, PortGone> {
         Err(errno) => Err(PortGone { errno }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_refusal_of_the_system_says_what_to_do() {
+        let path = Path::new("/dev/ttyUSB7");
+        for (errno, advice) in [
+            (Errno::NOENT, "plug in the board's USB cable"),
+            (Errno::NXIO, "plug in the board's USB cable"),
+            (Errno::ACCESS, "usermod -aG dialout"),
+            (Errno::BUSY, "stop that one"),
+            (Errno::AGAIN, "stop that one"),
+            (Errno::NOTTY, "is not a serial port"),
+        ] {
+            let text = OpenPortError::from_errno(path, errno).to_string();
+            assert!(
+                text.contains("/dev/ttyUSB7") && text.contains(advice),
+                "{text}"
+            );
+        }
+        let other = OpenPortError::from_errno(path, Errno::IO);
+        assert!(matches!(other, OpenPortError::System { .. }));
+    }
+}
