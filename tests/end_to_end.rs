@@ -168,7 +168,7 @@ fn a_person_can_do_by_hand_what_the_script_does() {
     assert!(fine, "{text}");
     let (fine, text) = said(&["drive", "0x02", "--seconds", "0.5"]);
     assert!(fine, "{text}");
-    let (fine, text) = said(&["drive", "left-45"]);
+    let (fine, text) = said(&["drive", "left-diag"]);
     assert!(fine && text.contains("done"), "{text}");
     let (fine, text) = said(&["arm", "up"]);
     assert!(fine && text.contains("done"), "{text}");

@@ -14,6 +14,9 @@ use rustix::fs::{FlockOperation, flock};
 
 use crate::config::Config;
 
+/// The effective configuration's file.
+const CONFIG: &str = "lager.toml";
+
 /// The folder of one robot on one bus.
 #[derive(Clone, Debug)]
 pub struct RuntimeFolder(PathBuf);
@@ -24,13 +27,8 @@ impl RuntimeFolder {
     /// It is below `$XDG_RUNTIME_DIR`, or below `/tmp/lager-<uid>` where that is not set.
     pub fn create(config: &Config) -> Result<Self> {
         let uid = rustix::process::getuid().as_raw();
-        let base = match std::env::var_os("XDG_RUNTIME_DIR") {
-            Some(folder) if Path::new(&folder).is_dir() => PathBuf::from(folder).join("lager"),
-            _ => PathBuf::from(format!("/tmp/lager-{uid}")),
-        };
-        let folder = base
-            .join(config.bus.prefix.as_deref().unwrap_or("bus"))
-            .join(&config.name);
+        let base = base();
+        let folder = below(&base, config);
         fs::DirBuilder::new()
             .recursive(true)
             .mode(0o700)
@@ -45,6 +43,16 @@ impl RuntimeFolder {
         Ok(Self(folder))
     }
 
+    /// The configuration that the running robot of `config`'s name was started with, `None` if
+    /// none was started here.
+    pub fn running(config: &Config) -> Result<Option<Config>> {
+        let file = below(&base(), config).join(CONFIG);
+        if !file.is_file() {
+            return Ok(None);
+        }
+        Config::load(Some(&file)).map(Some)
+    }
+
     /// Where the simulated port of the sensor board is linked.
     pub fn sensor_port(&self) -> PathBuf {
         self.0.join("sensor.tty")
@@ -57,7 +65,7 @@ impl RuntimeFolder {
 
     /// Writes the effective configuration for the children and returns its path.
     pub fn write_config(&self, config: &Config) -> Result<PathBuf> {
-        let path = self.0.join("lager.toml");
+        let path = self.0.join(CONFIG);
         fs::write(&path, toml::to_string(config)?)
             .with_context(|| format!("cannot write {}", path.display()))?;
         Ok(path)
@@ -72,7 +80,12 @@ impl RuntimeFolder {
             .create(true)
             .truncate(false)
             .open(&path)
-            .with_context(|| format!("cannot open {}", path.display()))?;
+            .with_context(|| {
+                format!(
+                    "cannot open {}; was it just removed? Try again",
+                    path.display()
+                )
+            })?;
         if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
             let mut owner = String::new();
             file.read_to_string(&mut owner)?;
@@ -90,6 +103,19 @@ impl RuntimeFolder {
             folder: self.clone(),
         })
     }
+}
+
+/// The folder of all of this user's robots.
+fn base() -> PathBuf {
+    match std::env::var_os("XDG_RUNTIME_DIR") {
+        Some(folder) if Path::new(&folder).is_dir() => PathBuf::from(folder).join("lager"),
+        _ => PathBuf::from(format!("/tmp/lager-{}", rustix::process::getuid().as_raw())),
+    }
+}
+
+fn below(base: &Path, config: &Config) -> PathBuf {
+    base.join(config.bus.prefix.as_deref().unwrap_or("bus"))
+        .join(&config.name)
 }
 
 /// Held by the one supervisor of a robot.

@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use lager_ports::{Bus, Clock, Shutdown, Subscriber};
+use lager_ports::{Bus, BusConfig, Clock, Shutdown, Subscriber};
 use lager_topics::{
     Answer, Ask, AskKind, Finish, Health, Input, InputKind, LinkHealth, Mode, NavStatus, Order,
     OrderKind, Origin, Outcome, Phase, Role, SteeringOrder, SteeringState, Topic,
@@ -16,6 +16,7 @@ use lager_wire::{Command, OperatorCommand, WheelCommand, parse_code};
 
 use crate::config::Config;
 use crate::hands::Hands;
+use crate::runtime::RuntimeFolder;
 
 /// How often an order is renewed, in robot time; its lease is 120 ms.
 const RENEW: Duration = Duration::from_millis(40);
@@ -35,7 +36,13 @@ impl Operator {
     /// # Errors
     /// When no bridge of this robot answers.
     pub fn new(config: &Config) -> Result<Self> {
-        let bus = Bus::open(&config.bus()?, Role::Operator)?;
+        // The robot's clock may run faster than this command's configuration says.
+        let running = RuntimeFolder::running(config)?;
+        let bus = BusConfig {
+            speed: running.map_or(config.speed, |running| running.speed),
+            ..config.bus()?
+        };
+        let bus = Bus::open(&bus, Role::Operator)?;
         let operator = Self {
             hands: Hands::new(&bus)?,
             health: bus.subscriber()?,
@@ -247,7 +254,7 @@ impl Operator {
         if health.stopped != 0 {
             bail!("the robot is stopped; `lager resume` releases the stop");
         }
-        let refused_before = health.orders_refused;
+        let (refused_before, mode) = (health.orders_refused, health.mode.get());
         let mut state = self.bus.subscriber::<SteeringState>()?;
         let order = SteeringOrder {
             id: Hands::fresh_id(),
@@ -270,7 +277,9 @@ impl Operator {
                 let own =
                     |origin: Option<Origin>, id| origin == Some(Origin::Operator) && id == order.id;
                 accepted |= own(report.current_origin.get(), report.current_id);
-                if own(report.finished_origin.get(), report.finished_id) {
+                // A setpoint that lapsed is taken up again with the next renewal.
+                let is_over = own(report.finished_origin.get(), report.finished_id);
+                if is_over && command.firmware().is_one_shot() {
                     return match report.finish.get() {
                         Some(Finish::Done) => Ok(format!("`{name}` is done")),
                         Some(Finish::Aborted) => Err(anyhow!("`{name}` was cut short")),
@@ -284,6 +293,9 @@ impl Operator {
             if let Some(health) = health {
                 if health.stopped != 0 {
                     bail!("the robot has been stopped");
+                }
+                if health.mode.get() != mode {
+                    bail!("the mode has been changed; somebody else steers now");
                 }
                 if !accepted && health.orders_refused > refused_before {
                     bail!(
