@@ -162,6 +162,66 @@ impl Config {
         Ok(())
     }
 
+    /// The configuration as a file with every key explained: what `lager config` prints.
+    pub fn documented(&self) -> String {
+        let quoted = |text: &str| toml::Value::from(text).to_string();
+        let unset = |name: &str, value: Option<&str>| match value {
+            Some(value) => format!("{name} = {}", quoted(value)),
+            None => format!("# {name} = \"...\""),
+        };
+        let root = self.bus.root.as_ref().map(|root| root.to_string_lossy());
+        format!(
+            "\
+# The robot's name: the middle part of every topic's name.
+name = {name}
+# How many times as fast as real time the robot's clock runs; real boards need 1.
+speed = {speed:?}
+# What the services drive: \"sim\", the simulated robot, or \"serial\", the boards at [serial].
+body = {body}
+# A built-in warehouse (small, curved, large) or the path of a warehouse file.
+warehouse = {warehouse}
+
+[bus]
+# Only to keep a bus apart from others on the machine: prefix of its shared-memory files ...
+{prefix}
+# ... and folder of its bookkeeping files.
+{root}
+
+[serial]
+# The ports of the boards; given the wrong way round they work all the same.
+sensor = {sensor}
+steering = {steering}
+# 500000, or 9600 for boards of the original build.
+baud = {baud}
+
+[logic]
+# Speed in mm/s when both motors run at the standard duty of 100.
+cruise_mm_per_s = {cruise:?}
+# How far the line sensors are ahead of the wheels' axle, in mm.
+sensor_ahead_mm = {ahead:?}
+
+[simulator]
+# Seed of all noise: the same seed is the same robot.
+seed = {seed}
+",
+            name = quoted(&self.name),
+            speed = self.speed,
+            body = match self.body {
+                Body::Sim => "\"sim\"",
+                Body::Serial => "\"serial\"",
+            },
+            warehouse = quoted(&self.warehouse),
+            prefix = unset("prefix", self.bus.prefix.as_deref()),
+            root = unset("root", root.as_deref()),
+            sensor = quoted(&self.serial.sensor.to_string_lossy()),
+            steering = quoted(&self.serial.steering.to_string_lossy()),
+            baud = self.serial.baud,
+            cruise = self.logic.cruise_mm_per_s,
+            ahead = self.logic.sensor_ahead_mm,
+            seed = self.simulator.seed,
+        )
+    }
+
     /// The bus this configuration names.
     pub fn bus(&self) -> Result<BusConfig> {
         Ok(BusConfig {
@@ -204,4 +264,86 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
         .validate()
         .with_context(|| format!("the warehouse file {name} cannot be built"))?;
     Ok(warehouse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_documented_file_reads_back_with_every_key() {
+        let config = Config {
+            name: "r7".into(),
+            speed: 2.5,
+            body: Body::Serial,
+            warehouse: "a \"quoted\" name".into(),
+            bus: BusSection {
+                prefix: Some("p_".into()),
+                root: Some("/tmp/root".into()),
+            },
+            ..Config::default()
+        };
+        for config in [config, Config::default()] {
+            let text = config.documented();
+            let read: Config = toml::from_str(&text).expect("valid TOML");
+            let plain = |config: &Config| toml::to_string(config).expect("serialisable");
+            assert_eq!(plain(&read), plain(&config));
+            for line in plain(&config).lines().filter(|line| !line.is_empty()) {
+                let key = line.split(" = ").next().expect("a key");
+                assert!(text.contains(key), "{key} is not explained");
+            }
+        }
+    }
+
+    #[test]
+    fn an_unknown_key_is_an_error_that_names_it() {
+        let error = toml::from_str::<Config>("sped = 2").expect_err("a typing error");
+        assert!(error.to_string().contains("sped"), "{error}");
+    }
+
+    #[test]
+    fn impossible_values_are_refused_with_a_sentence() {
+        for (config, word) in [
+            (
+                Config {
+                    speed: 0.0,
+                    ..Config::default()
+                },
+                "speed",
+            ),
+            (
+                Config {
+                    name: "R 1".into(),
+                    ..Config::default()
+                },
+                "name",
+            ),
+            (
+                Config {
+                    body: Body::Serial,
+                    speed: 2.0,
+                    ..Config::default()
+                },
+                "simulated",
+            ),
+        ] {
+            let error = config.validate().expect_err("impossible");
+            assert!(error.to_string().contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_built_in_warehouse_can_be_had_by_name() {
+        for name in Warehouse::BUILTIN {
+            warehouse(name)
+                .expect("built in")
+                .validate()
+                .expect("sound");
+        }
+        let error = warehouse("medium").expect_err("no such warehouse");
+        assert!(
+            error.to_string().contains("small, curved, large"),
+            "{error}"
+        );
+    }
 }

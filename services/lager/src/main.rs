@@ -108,7 +108,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Doctor { fix } => return doctor::run(&config, fix),
-        Command::Config => toml::to_string(&config)?.trim_end().to_owned(),
+        Command::Config => config.documented().trim_end().to_owned(),
         Command::Drive { command, seconds } => {
             Operator::new(&config)?.drive(&command, seconds, &shutdown)?
         }

@@ -20,7 +20,7 @@ use crate::heading::Spin;
 /// Below this a turn has not found the tape it was to find: the tape behind is seen up to 15
 /// degrees, the tape ahead from 75.
 const FRAGMENT_DEG: f32 = 60.0;
-/// From here the rest is small enough for the line control, whatever the sensors see.
+/// From here the rest is small enough for the line control, if it has the tape in sight.
 const QUARTER_DEG: f32 = 80.0;
 /// From here tape under the sensors is that of the second quarter.
 const BEYOND_DEG: f32 = 150.0;
@@ -50,14 +50,17 @@ pub fn done(turned_deg: f32, seen: LineState) -> Turned {
 /// Judges a turn that was cut short, once the robot stands and `seen` is under its sensors.
 ///
 /// Turning again from the new tape would lead past it to the next one, so the tape counts when
-/// it is in the middle or already on the far side.
+/// it is in the middle or already on the far side. Where no tape is in sight the turn goes on,
+/// whatever dead reckoning says: after several interruptions it is the less reliable of the two,
+/// and a turn given again ends on tape, at the first quarter or at the second.
 pub fn interrupted(turned_deg: f32, spin: Spin, seen: LineState) -> Turned {
     let beyond = match spin {
         Spin::Left => LineState::LeftOfLine,
         Spin::Right => LineState::RightOfLine,
     };
     let on_it = seen == LineState::OnLine || seen == beyond;
-    if turned_deg >= QUARTER_DEG || (turned_deg >= FRAGMENT_DEG && on_it) {
+    let in_sight = !matches!(seen, LineState::NotOnLine | LineState::DropStation);
+    if (turned_deg >= QUARTER_DEG && in_sight) || (turned_deg >= FRAGMENT_DEG && on_it) {
         done(turned_deg, seen)
     } else {
         Turned::Fragment
@@ -94,7 +97,9 @@ mod tests {
             (78.0, OnLine, Turned::Quarters(1)),
             (78.0, RightOfLine, Turned::Quarters(1)),
             (85.0, LeftOfLine, Turned::Quarters(1)),
-            (88.0, NotOnLine, Turned::Quarters(1)),
+            (88.0, NotOnLine, Turned::Fragment),
+            (168.0, NotOnLine, Turned::Fragment),
+            (168.0, OnLine, Turned::Quarters(2)),
         ];
         for (angle, seen, expected) in table {
             assert_eq!(
