@@ -4,13 +4,16 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Subscriber};
-use lager_tests::{Domain, Running, children, pid, wait_for};
+use lager_ports::{BusConfig, Clock, NodeState, Subscriber};
+use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, pid, wait_for};
 use lager_topics::{LinkHealth, NavStatus, Stamp, TruthPose};
-use rustix::process::{Signal, kill_process, test_kill_process};
+use rustix::process::{Signal, kill_process};
 
 /// The safe bound on driving without being steered.
 const UNSTEERED: Duration = Duration::from_millis(200);
+
+/// The bound on coming back.
+const BACK: Duration = Duration::from_secs(1);
 
 /// How often each service is killed: 5 in `tests/run`, more in `tests/soak`.
 fn kills() -> u32 {
@@ -20,8 +23,13 @@ fn kills() -> u32 {
         .unwrap_or(5)
 }
 
+fn is_soak() -> bool {
+    std::env::var_os("LAGER_SOAK_KILLS").is_some()
+}
+
 /// What an observer sees of the robot.
 struct Watch {
+    config: BusConfig,
     truth: Subscriber<TruthPose>,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
@@ -33,13 +41,14 @@ struct Kill {
     /// From the signal until the successor was at work again.
     back: Duration,
     /// How long after the signal the last duty other than 0 was seen while nobody steered.
-    unsteered: Duration,
+    unsteered: Option<Duration>,
 }
 
 impl Watch {
     fn new(domain: &Domain) -> Self {
         let bus = domain.observe("r1", 1.0);
         Self {
+            config: domain.bus("r1", 1.0),
             truth: bus.subscriber().expect("a topic"),
             health: bus.subscriber().expect("a topic"),
             status: bus.subscriber().expect("a topic"),
@@ -49,7 +58,9 @@ impl Watch {
     /// Waits until all three services are at work and both boards are connected.
     fn wait_until_whole(&mut self, up: &mut Running) -> bool {
         let mut seen = (false, false, false);
+        let give_up = Instant::now() + WATCHDOG;
         loop {
+            assert!(Instant::now() < give_up, "never whole:\n{}", up.log());
             if !up.is_running() {
                 return false;
             }
@@ -78,6 +89,11 @@ impl Watch {
         let mut driven = Vec::new();
         let mut steered_again = None;
         loop {
+            assert!(
+                start.elapsed() < WATCHDOG,
+                "{service} does not come back:\n{}",
+                up.log()
+            );
             if !up.is_running() {
                 return None;
             }
@@ -114,20 +130,31 @@ impl Watch {
             std::thread::sleep(Duration::from_millis(1));
         }
         let back = start.elapsed();
+        wait_for("the dead to be swept", || {
+            let nodes = lager_ports::nodes(&self.config).expect("a bus");
+            let stale = nodes.iter().any(|node| node.state == NodeState::Stale);
+            (!stale).then_some(())
+        });
         let unsteered = driven
             .into_iter()
             .filter(|at| steered_again.is_some_and(|steered| *at < steered))
             .map(|at| Duration::from_nanos(at.saturating_sub(killed)))
             .max()
             .unwrap_or_default();
-        assert!(
-            unsteered <= UNSTEERED,
-            "there was duty {unsteered:?} after the {service} had been killed"
-        );
+        if is_soak() {
+            // Measured, so only where nothing else runs; the bound itself is held in virtual
+            // time, by the boards' and the simulator's tests.
+            assert!(
+                unsteered <= UNSTEERED,
+                "there was duty {unsteered:?} after the {service} had been killed"
+            );
+            assert!(back <= BACK, "the {service} took {back:?} to come back");
+        }
         Some(Kill {
             service,
             back,
-            unsteered,
+            // A killed simulator takes the motors with it: there is nothing to see.
+            unsteered: (service != "simulator").then_some(unsteered),
         })
     }
 }
@@ -179,6 +206,11 @@ fn a_killed_service_comes_back_and_the_mission_still_ends() {
         let told = up.json();
         assert_eq!(told["delivered"], serde_json::json!([1]), "{}", up.log());
         assert_eq!(told["restarts"], of_this_mission, "{}", up.log());
+        assert!(
+            of_this_mission > 0,
+            "the mission met no kill:\n{}",
+            up.log()
+        );
         missions += 1;
         drop(watch);
         domain.assert_clean();
@@ -192,45 +224,72 @@ fn report(kills: &[Kill], missions: u32) {
     println!("service      kills   back: median    longest   last duty after");
     for service in ["bridge", "logic", "simulator"] {
         let mut back: Vec<Duration> = Vec::new();
-        let mut unsteered = Duration::ZERO;
+        let mut unsteered = None;
         for kill in kills.iter().filter(|kill| kill.service == service) {
             back.push(kill.back);
             unsteered = unsteered.max(kill.unsteered);
         }
         back.sort();
         println!(
-            "{service:12} {:5} {:12.1} ms {:7.1} ms {:9.1} ms",
+            "{service:12} {:5} {:12.1} ms {:7.1} ms {:>9}",
             back.len(),
             back[back.len() / 2].as_secs_f64() * 1e3,
             back[back.len() - 1].as_secs_f64() * 1e3,
-            unsteered.as_secs_f64() * 1e3,
+            unsteered.map_or("-".into(), |after| format!(
+                "{:.1} ms",
+                after.as_secs_f64() * 1e3
+            )),
         );
     }
 }
 
 #[test]
-fn a_killed_supervisor_takes_its_children_along() {
+fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
     let domain = Domain::new();
-    let mut up = domain.start(&["up", "--headless"]);
+    // The robot is a process of its own, as real boards are, and lives on.
+    let [sensor, steering] = ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
+    let config = domain.folder().join("robot.toml");
+    std::fs::write(
+        &config,
+        format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n"),
+    )
+    .expect("a configuration file");
+    let config = config.to_str().expect("a path in UTF-8");
+    let body = domain.start(&["--config", config, "simulator"]);
+    let up = ["--config", config, "up", "--headless"];
+    let mut first = domain.start(&up);
     let mut watch = Watch::new(&domain);
-    assert!(watch.wait_until_whole(&mut up), "{}", up.log());
-    let services = children(up.pid());
-    assert_eq!(services.len(), 3, "{services:?}");
-    up.signal(Signal::KILL);
-    up.wait();
-    for service in services {
-        wait_for("the child to end", || {
-            test_kill_process(pid(service)).is_err().then_some(())
+    let driving = |watch: &mut Watch| {
+        wait_for("the robot to drive", || {
+            watch
+                .truth
+                .latest()
+                .expect("readable")
+                .filter(|truth| truth.left_duty > 0)
+                .map(|_| ())
         });
+    };
+    driving(&mut watch);
+    let services = children(first.pid());
+    assert_eq!(services.len(), 2, "{services:?}");
+
+    first.signal(Signal::KILL);
+    first.wait();
+    wait_for("the motors to stop", || {
+        watch
+            .truth
+            .latest()
+            .expect("readable")
+            .filter(|truth| truth.left_duty == 0 && truth.right_duty == 0)
+            .map(|_| ())
+    });
+    for service in services {
+        wait_for("the child to end", || has_ended(service).then_some(()));
     }
-    drop(watch);
-    // What the killed supervisor held is swept by its last child, or by whoever starts next.
-    let next = domain.run(&["doctor", "--fix"]);
-    assert!(next.status.success(), "{next:?}");
-    let left: Vec<_> = domain
-        .leftovers()
-        .into_iter()
-        .filter(|file| !file.contains("lager/"))
-        .collect();
-    assert!(left.is_empty(), "{left:#?}");
+
+    // Nothing has to be cleaned by hand: the same name starts again beside the running boards.
+    let second = domain.start(&up);
+    driving(&mut watch);
+    drop((second, watch, body));
+    domain.assert_clean();
 }

@@ -323,6 +323,17 @@ fn arguments(process: u32) -> Vec<String> {
         .collect()
 }
 
+/// Whether a process has ended; one that nobody has waited for yet counts.
+#[must_use]
+pub fn has_ended(process: u32) -> bool {
+    fs::read_to_string(format!("/proc/{process}/stat")).map_or(true, |stat| {
+        // The state follows the name, which is in parentheses and may contain anything.
+        stat.rsplit(") ")
+            .next()
+            .is_some_and(|rest| rest.starts_with('Z'))
+    })
+}
+
 /// Waits until `done` gives something.
 ///
 /// # Panics

@@ -55,6 +55,31 @@ pub struct BusSection {
     /// Folder of the bus's bookkeeping files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub root: Option<PathBuf>,
+    /// How bridge and logic wait for samples.
+    pub waiting: Waiting,
+}
+
+/// How a service waits: `lager_ports::Policy` as a word of the configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Waiting {
+    /// Sleep until something comes.
+    #[default]
+    Block,
+    /// Look without pause; costs a core for each service.
+    Spin,
+    /// Look for a short time after each sample, then sleep.
+    Adaptive,
+}
+
+impl From<Waiting> for lager_ports::Policy {
+    fn from(waiting: Waiting) -> Self {
+        match waiting {
+            Waiting::Block => Self::Block,
+            Waiting::Spin => Self::Spin,
+            Waiting::Adaptive => Self::Adaptive,
+        }
+    }
 }
 
 /// `[serial]`: the cables to the boards.
@@ -68,6 +93,8 @@ pub struct SerialSection {
     pub steering: PathBuf,
     /// Baud rate of both: 500000, or 9600 for boards built with the original's UBRR 103.
     pub baud: u32,
+    /// Whether the sensor board sends the raw reading of all eleven sensors as well.
+    pub raw_line: bool,
 }
 
 /// `[logic]`: the measures dead reckoning needs.
@@ -109,6 +136,7 @@ impl Default for SerialSection {
             sensor: "/dev/lager-sensor".into(),
             steering: "/dev/lager-steering".into(),
             baud: 500_000,
+            raw_line: false,
         }
     }
 }
@@ -150,8 +178,11 @@ impl Config {
     /// Refuses values no process could work with, each with a sentence.
     pub fn validate(&self) -> Result<()> {
         self.name.parse::<RobotName>()?;
-        if !(0.01..=100.0).contains(&self.speed) {
-            bail!("speed is {}; it must be from 0.01 to 100", self.speed);
+        if !(0.01..=20.0).contains(&self.speed) {
+            bail!(
+                "speed is {}; it must be from 0.01 to 20 (`lager simulate` runs faster)",
+                self.speed
+            );
         }
         if self.body == Body::Serial && self.speed != 1.0 {
             bail!(
@@ -186,6 +217,8 @@ warehouse = {warehouse}
 {prefix}
 # ... and folder of its bookkeeping files.
 {root}
+# How bridge and logic wait for samples: \"block\", \"spin\" (a core for each) or \"adaptive\".
+waiting = {waiting}
 
 [serial]
 # The ports of the boards; given the wrong way round they work all the same.
@@ -193,6 +226,8 @@ sensor = {sensor}
 steering = {steering}
 # 500000, or 9600 for boards of the original build.
 baud = {baud}
+# Whether the sensor board sends the raw reading of all eleven sensors as well.
+raw_line = {raw_line}
 
 [logic]
 # Speed in mm/s when both motors run at the standard duty of 100.
@@ -216,6 +251,12 @@ seed = {seed}
             sensor = quoted(&self.serial.sensor.to_string_lossy()),
             steering = quoted(&self.serial.steering.to_string_lossy()),
             baud = self.serial.baud,
+            raw_line = self.serial.raw_line,
+            waiting = match self.bus.waiting {
+                Waiting::Block => "\"block\"",
+                Waiting::Spin => "\"spin\"",
+                Waiting::Adaptive => "\"adaptive\"",
+            },
             cruise = self.logic.cruise_mm_per_s,
             ahead = self.logic.sensor_ahead_mm,
             seed = self.simulator.seed,
@@ -242,6 +283,7 @@ seed = {seed}
         lager_logic::LogicConfig {
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
             sensor_ahead_mm: self.logic.sensor_ahead_mm,
+            waiting: self.bus.waiting.into(),
             ..lager_logic::LogicConfig::default()
         }
     }
@@ -280,6 +322,7 @@ mod tests {
             bus: BusSection {
                 prefix: Some("p_".into()),
                 root: Some("/tmp/root".into()),
+                waiting: Waiting::Adaptive,
             },
             ..Config::default()
         };

@@ -15,8 +15,8 @@ use rustix::process::{Resource, getrlimit};
 use crate::config::{Body, Config};
 use crate::exit;
 
-/// Shared memory that one robot with 64 observers needs, with room to spare.
-const SHARED_MEMORY_MIB: u64 = 64;
+/// Shared memory that a robot needs: 1 MiB when it runs alone, more with every observer.
+const SHARED_MEMORY_MIB: u64 = 16;
 /// Open files that one process of the bus may need: each port and connection holds some.
 const OPEN_FILES: u64 = 4096;
 
@@ -53,7 +53,7 @@ pub fn run(config: &Config, fix: bool) -> Result<ExitCode> {
                 ("BAD ", text)
             }
         };
-        println!("{mark}  {what:16}  {text}");
+        crate::say(&format!("{mark}  {what:16}  {text}"))?;
     }
     Ok(if bad == 0 {
         ExitCode::SUCCESS
@@ -156,7 +156,7 @@ fn serial(config: &Config) -> Finding {
         let name = port.display();
         let Ok(metadata) = fs::metadata(port) else {
             return Bad(format!(
-                "{name} does not exist; plug the board in, or name the port with --sensor and --steering"
+                "{name} does not exist; plug the board in, or name the port in the configuration's [serial]"
             ));
         };
         if !metadata.file_type().is_char_device() {

@@ -61,7 +61,7 @@ impl Hands {
     pub fn carry_out(&self, act: Act) -> Result<()> {
         match act {
             Act::Ask(ask) => {
-                if let Err(silence) = self.ask.call(ask, Duration::from_millis(50)) {
+                if let Err(silence) = self.ask.call(ask, Duration::from_millis(20)) {
                     tracing::debug!(%silence, "the bridge does not answer yet");
                 }
             }

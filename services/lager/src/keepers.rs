@@ -37,6 +37,8 @@ impl Keepers {
 
     /// Offers what `service` was doing to its successor.
     pub fn hand_over(&mut self, service: &str) -> Result<()> {
+        // Its last word may have come since the last look.
+        self.remember()?;
         match service {
             "bridge" => self.bridge.hand_over()?,
             "logic" => self.logic.hand_over()?,

@@ -72,8 +72,9 @@ fn run(cli: Cli) -> Result<ExitCode> {
                 let bridge = BridgeConfig {
                     ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
                     baud: config.serial.baud,
+                    raw_line: config.serial.raw_line,
+                    waiting: config.bus.waiting.into(),
                     resume,
-                    ..BridgeConfig::default()
                 };
                 Ok(lager_bridge::run(bus, &bridge, &shutdown)?)
             })?;
@@ -125,8 +126,16 @@ fn run(cli: Cli) -> Result<ExitCode> {
         Command::Gains { p, d } => Operator::new(&config)?.gains(p, d)?,
         Command::Calibrate => Operator::new(&config)?.calibrate()?,
     };
-    println!("{said}");
+    say(&said)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A line on standard output. A reader that has gone, as after `| head`, is no error.
+fn say(line: &str) -> Result<()> {
+    match writeln!(std::io::stdout(), "{line}") {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
 }
 
 /// The configuration file with the flags of every subcommand on top.
@@ -145,13 +154,15 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
     Ok(config)
 }
 
-/// Ctrl-C and SIGTERM ask for an orderly end.
+/// Ctrl-C, SIGTERM and a closed terminal ask for an orderly end.
 fn stop_on_signals(shutdown: &Shutdown) -> Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let flag: Arc<AtomicBool> = shutdown.flag();
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // A second signal ends the process at once, should the orderly end hang.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
+    // A second Ctrl-C ends the process at once, should the orderly end hang.
+    signal_hook::flag::register_conditional_shutdown(SIGINT, 130, Arc::clone(&flag))
+        .context("cannot listen to signals")?;
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        signal_hook::flag::register(signal, Arc::clone(&flag))
             .context("cannot listen to signals")?;
     }
     Ok(())

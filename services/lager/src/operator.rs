@@ -93,7 +93,7 @@ const AIMS: [u16; 5] = [512, 533, 491, 554, 470];
 const ATTEMPTS: usize = AIMS.len();
 
 /// What the operator sees: the last of each, nothing before the first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Seen {
     /// The links and who steers.
     pub health: Option<Health>,
@@ -101,6 +101,10 @@ pub struct Seen {
     pub status: Option<NavigatorStatus>,
     /// The steering board's last report.
     pub report: Option<SteeringReport>,
+    /// The order that logic refused last.
+    pub refused: Option<u32>,
+    /// What was last said in words.
+    pub thought: String,
 }
 
 /// One thing the operator does.
@@ -188,10 +192,10 @@ impl ScriptedOperator {
     pub fn step(&mut self, now: Duration, seen: &Seen) -> Option<Act> {
         let (health, status) = (seen.health?, seen.status?);
         if self.is_stuck(now, &status) && self.outcome().is_none() {
-            self.step = Step::Failed(
-                "logic is stuck and waits for a person; `lager topic echo log/thought` tells why"
-                    .into(),
-            );
+            self.step = Step::Failed(format!(
+                "logic is stuck and waits for a person: {}",
+                seen.thought
+            ));
         }
         if let Some(next) = self.advance(&health, &status, seen) {
             self.step = next;
@@ -222,6 +226,7 @@ impl ScriptedOperator {
             }
             Step::Ordering { order } => (status.order_id == *order && accepted(phase))
                 .then_some(Step::Underway { order: *order }),
+            Step::Underway { .. } if phase == Phase::WaitingForOrder => Some(given_up(seen)),
             Step::Underway { order } if phase == Phase::Picking => Some(Step::Picking {
                 order: *order,
                 picking: Picking::new(),
@@ -248,6 +253,7 @@ impl ScriptedOperator {
                 self.delivered.push(self.mission[self.delivered.len()]);
                 Some(self.next_order())
             }
+            Step::Carried { .. } if phase == Phase::WaitingForOrder => Some(given_up(seen)),
             _ => None,
         }
     }
@@ -298,6 +304,10 @@ impl ScriptedOperator {
         self.next_id += 1;
         self.next_id
     }
+}
+
+fn given_up(seen: &Seen) -> Step {
+    Step::Failed(format!("logic has given the order up: {}", seen.thought))
 }
 
 /// Whether logic is at work on the order it shows.

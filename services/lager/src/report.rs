@@ -94,6 +94,7 @@ impl Narrator {
         while let Some(thought) = self.thought.receive()?.map(|thought| *thought) {
             let from = thought.from.to_string().to_lowercase();
             self.note(&format!("{from}: \"{}\"", thought.text));
+            thought.text.as_str().clone_into(&mut self.seen.thought);
         }
         if let Some(truth) = self.truth.latest()? {
             let goods: Vec<_> = truth
@@ -107,8 +108,8 @@ impl Narrator {
     }
 
     /// What the operator sees.
-    pub fn seen(&self) -> Seen {
-        self.seen
+    pub fn seen(&self) -> &Seen {
+        &self.seen
     }
 
     /// Whether a simulated world agrees that `product` lies at the delivery station; `None` on a
@@ -215,7 +216,10 @@ impl Narrator {
         match event.kind.get() {
             Some(EventKind::GettingItem) => self.note(&format!("fetches product {product}")),
             Some(EventKind::ItemDelivered) => self.note(&format!("DELIVERED product {product}")),
-            Some(EventKind::Refused) => self.note(&format!("refuses to fetch product {product}")),
+            Some(EventKind::Refused) => {
+                self.seen.refused = Some(event.order_id);
+                self.note(&format!("refuses to fetch product {product}"));
+            }
             // What logic is doing tells these already.
             Some(EventKind::InPosition | EventKind::NextNode) | None => {}
         }
@@ -224,8 +228,7 @@ impl Narrator {
     /// The last words: a sentence, or the one line of JSON.
     pub fn finish(&self, outcome: &Outcome, as_json: bool) -> Result<()> {
         if as_json {
-            println!("{}", serde_json::to_string(outcome)?);
-            return Ok(());
+            return crate::say(&serde_json::to_string(outcome)?);
         }
         let said = match &outcome.failure {
             Some(why) => format!("the mission failed: {why}"),

@@ -34,7 +34,7 @@ impl RuntimeFolder {
             .mode(0o700)
             .create(&folder)
             .with_context(|| format!("cannot make the runtime folder {}", folder.display()))?;
-        if fs::metadata(&base)?.uid() != uid {
+        if fs::symlink_metadata(&base)?.uid() != uid {
             bail!(
                 "{} belongs to another user; remove it or set XDG_RUNTIME_DIR",
                 base.display()
@@ -66,8 +66,13 @@ impl RuntimeFolder {
     /// Writes the effective configuration for the children and returns its path.
     pub fn write_config(&self, config: &Config) -> Result<PathBuf> {
         let path = self.0.join(CONFIG);
-        fs::write(&path, toml::to_string(config)?)
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        let whole = || -> Result<()> {
+            let new = self.0.join("lager.toml.new");
+            fs::write(&new, toml::to_string(config)?)?;
+            // Whoever reads it at this moment reads all of the old one or all of the new one.
+            Ok(fs::rename(&new, &path)?)
+        };
+        whole().with_context(|| format!("cannot write {}", path.display()))?;
         Ok(path)
     }
 
@@ -94,6 +99,12 @@ impl RuntimeFolder {
                 pid: owner.trim().to_owned(),
             }
             .into());
+        }
+        // An `up` that was just ending may have removed the file between opening and locking.
+        let still_there = fs::metadata(&path)
+            .is_ok_and(|there| file.metadata().is_ok_and(|held| held.ino() == there.ino()));
+        if !still_there {
+            bail!("the robot `{name}` was just going down; try again");
         }
         file.set_len(0)?;
         file.rewind()?;

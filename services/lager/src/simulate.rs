@@ -13,7 +13,7 @@ use lager_bridge::frames::{LineAssembler, ServoTable, steering_report};
 use lager_logic::{Input, Navigator};
 use lager_plant::{GoodState, Warehouse};
 use lager_simulator::{Robot, RobotOptions, Wire};
-use lager_topics::{AskKind, EventKind, Health, InputKind, SteeringReport, WarehouseMap};
+use lager_topics::{AskKind, EventKind, Health, InputKind, WarehouseMap};
 use lager_wire::link::{HostEvent, HostLink, HostTransmitter, Up};
 use lager_wire::{Packet, Payload};
 use serde::Serialize;
@@ -93,18 +93,16 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
 
 fn tell(line: &Line<'_>, as_json: bool) -> Result<()> {
     if as_json {
-        println!("{}", serde_json::to_string(line)?);
-        return Ok(());
+        return crate::say(&serde_json::to_string(line)?);
     }
     let end = match &line.failure {
         Some(why) => format!("FAILED: {why}"),
         None => format!("delivered {:?}", line.delivered),
     };
-    println!(
+    crate::say(&format!(
         "{:8} seed {:3}: {end} in {:.1} s, {:.0} times as fast as real, {} frames, {} lost",
         line.warehouse, line.seed, line.sim_seconds, line.times_real, line.frames, line.lost
-    );
-    Ok(())
+    ))
 }
 
 /// `7`, or `1..20` with both ends.
@@ -143,7 +141,7 @@ struct Whole {
     navigator: Navigator,
     operator: ScriptedOperator,
     map: WarehouseMap,
-    report: Option<SteeringReport>,
+    seen: Seen,
     renewed: Duration,
     looked: Duration,
     frames: u64,
@@ -173,7 +171,7 @@ impl Whole {
             navigator: Navigator::new(config.navigator()),
             operator: ScriptedOperator::new(mission.to_vec(), 0),
             map: bus_map(warehouse),
-            report: None,
+            seen: Seen::default(),
             renewed: Duration::ZERO,
             looked: Duration::ZERO,
             frames: 0,
@@ -278,7 +276,7 @@ impl Whole {
             Payload::SteerData(data) => {
                 self.arbiter.observe(self.now, &data);
                 let report = steering_report(0, &data, &self.servos, &self.arbiter);
-                self.report = Some(report);
+                self.seen.report = Some(report);
                 self.tell_logic(Input::Steering(&report));
             }
             _ => {}
@@ -296,11 +294,12 @@ impl Whole {
         let said = self.navigator.handle(self.now, input);
         for event in &said.events {
             if event.kind.get() == Some(EventKind::Refused) {
-                tracing::warn!(product = event.product, "logic refuses the order");
+                self.seen.refused = Some(event.order_id);
             }
         }
         if let Some(thought) = &said.thought {
             tracing::info!(at = ?self.now, "{}", thought.text);
+            thought.text.as_str().clone_into(&mut self.seen.thought);
         }
         if self.navigator.current_order() != before {
             self.renew();
@@ -320,12 +319,9 @@ impl Whole {
         self.arbiter.fill(self.now, &mut health);
         health.sensor.up = self.ports[0].up.is_some().into();
         health.steering.up = self.ports[1].up.is_some().into();
-        let seen = Seen {
-            health: Some(health),
-            status: Some(self.navigator.status()),
-            report: self.report,
-        };
-        match self.operator.step(self.now, &seen) {
+        self.seen.health = Some(health);
+        self.seen.status = Some(self.navigator.status());
+        match self.operator.step(self.now, &self.seen) {
             Some(Act::Ask(ask)) => {
                 if let (Some(AskKind::SetMode), Some(mode)) = (ask.kind.get(), ask.mode.get()) {
                     self.arbiter.set_mode(mode);

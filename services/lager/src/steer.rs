@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use lager_ports::{Bus, BusConfig, Clock, Shutdown, Subscriber};
 use lager_topics::{
-    Answer, Ask, AskKind, Finish, Health, Input, InputKind, LinkHealth, Mode, NavStatus, Order,
-    OrderKind, Origin, Outcome, Phase, Role, SteeringOrder, SteeringState, Topic,
+    Answer, Ask, AskKind, EventKind, Finish, Health, Input, InputKind, LinkHealth, LogThought,
+    MissionEvent, Mode, NavStatus, Order, OrderKind, Origin, Outcome, Phase, Role, SteeringOrder,
+    SteeringState, Topic,
 };
 use lager_wire::{Command, OperatorCommand, WheelCommand, parse_code};
 
@@ -136,6 +137,9 @@ impl Operator {
     /// `lager fetch`: ordered until logic shows that it took the order.
     pub fn fetch(&self, product: i32) -> Result<String> {
         let mut status = self.bus.subscriber::<NavStatus>()?;
+        let mut events = self.bus.subscriber::<MissionEvent>()?;
+        let mut thoughts = self.bus.subscriber::<LogThought>()?;
+        let mut why = String::from("it is not up, or does not say why");
         let order = Order {
             id: Hands::fresh_id(),
             product,
@@ -144,16 +148,24 @@ impl Operator {
         loop {
             self.hands.fetch(order)?;
             std::thread::sleep(Duration::from_millis(50));
-            if status
-                .latest()?
-                .is_some_and(|status| status.order_id == order.id)
-            {
-                return Ok(format!("logic fetches product {product}"));
+            if let Some(thought) = thoughts.latest()? {
+                thought.text.as_str().clone_into(&mut why);
+            }
+            while let Some(event) = events.receive()? {
+                if event.kind.get() == Some(EventKind::Refused) && event.order_id == order.id {
+                    bail!("logic refuses to fetch product {product}: {why}");
+                }
+            }
+            if let Some(status) = status.latest()? {
+                if status.order_id == order.id {
+                    return Ok(format!("logic fetches product {product}"));
+                }
+                if status.pending != 0 && status.pending_id == order.id {
+                    return Ok(format!("logic fetches product {product} next"));
+                }
             }
             if Instant::now() >= give_up {
-                bail!(
-                    "logic does not take the order: it is not up, busy with another one, or knows no product {product}; `lager topic echo log/thought` shows its reasons"
-                );
+                bail!("logic does not take the order: {why}");
             }
         }
     }
@@ -199,7 +211,7 @@ impl Operator {
                 return Ok(());
             }
             if Instant::now() >= give_up {
-                bail!("logic does not react; `lager topic echo log/thought` shows what it thinks");
+                bail!("logic does not react; is the robot up? (`lager up`)");
             }
         }
     }
@@ -234,7 +246,9 @@ impl Operator {
             Some(Outcome::NoBoard) => Err(anyhow!(
                 "the board that would have to do it is not connected; `lager topic echo link/health` shows the links"
             )),
-            _ => Err(anyhow!("the bridge refuses it")),
+            _ => Err(anyhow!(
+                "it is refused: the value is out of range, or the board is an original one without settings"
+            )),
         }
     }
 
@@ -269,6 +283,7 @@ impl Operator {
             None => None,
         };
         let mut accepted = false;
+        let mut heard = Instant::now();
         let give_up = Instant::now() + PATIENCE;
         while !shutdown.is_requested() && end.is_none_or(|end| clock.now() < end) {
             self.hands.steer(order)?;
@@ -289,8 +304,8 @@ impl Operator {
                     };
                 }
             }
-            let health = self.health.latest()?.map(|health| *health);
-            if let Some(health) = health {
+            if let Some(health) = self.health.latest()?.map(|health| *health) {
+                heard = Instant::now();
                 if health.stopped != 0 {
                     bail!("the robot has been stopped");
                 }
@@ -302,6 +317,9 @@ impl Operator {
                         "the bridge refuses `{name}` now: somebody else steers, or the mode does not allow it"
                     );
                 }
+            }
+            if heard.elapsed() >= PATIENCE {
+                bail!("the bridge has fallen silent; the robot stands by itself");
             }
             if !accepted && Instant::now() >= give_up {
                 bail!("the robot does not carry out `{name}`; `lager doctor` looks for the cause");

@@ -6,7 +6,7 @@
 //! even `kill -9` of the supervisor leaves no child.
 
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -79,46 +79,46 @@ impl Supervisor {
             wait: Duration::ZERO,
             restarted: false,
         };
-        self.spawn(&mut service)?;
+        service.spawn(&self.program, &self.config)?;
         self.services.push(service);
         Ok(())
     }
 
-    /// Restarts what has ended and is due again; `hand_over` runs before each restart.
+    /// Restarts what has ended and is due again; `hand_over` runs before each restart. A child
+    /// that cannot be started counts as one that ended at once.
     ///
     /// Returns the children found ended by this call.
-    pub fn poll(
-        &mut self,
-        mut hand_over: impl FnMut(&'static str) -> Result<()>,
-    ) -> Result<Vec<Ended>> {
+    pub fn poll(&mut self, mut hand_over: impl FnMut(&'static str)) -> Vec<Ended> {
         let now = Instant::now();
         let mut ended = Vec::new();
-        let mut services = std::mem::take(&mut self.services);
-        for service in &mut services {
-            if let Some(child) = &mut service.child
-                && let Some(status) = child.try_wait()?
-            {
+        for service in &mut self.services {
+            let how = match service.child.as_mut().map(Child::try_wait) {
+                Some(Ok(Some(status))) => Some(status.to_string()),
+                Some(Err(error)) => Some(error.to_string()),
+                Some(Ok(None)) | None => None,
+            };
+            if let Some(how) = how {
                 service.child = None;
-                service.wait = if now - service.started >= HEALTHY {
-                    Duration::ZERO
-                } else {
-                    (service.wait * 2).clamp(FIRST_WAIT, LONGEST_WAIT)
-                };
-                service.start_at = now + service.wait;
+                service.back_off(now);
                 ended.push(Ended {
                     service: service.name,
-                    how: status.to_string(),
+                    how,
                 });
             }
             if service.child.is_none() && now >= service.start_at {
-                hand_over(service.name)?;
+                hand_over(service.name);
                 service.restarted = true;
                 self.restarts += 1;
-                self.spawn(service)?;
+                if let Err(error) = service.spawn(&self.program, &self.config) {
+                    service.back_off(now);
+                    ended.push(Ended {
+                        service: service.name,
+                        how: format!("{error:#}"),
+                    });
+                }
             }
         }
-        self.services = services;
-        Ok(ended)
+        ended
     }
 
     /// How many restarts there were in all.
@@ -145,13 +145,25 @@ impl Supervisor {
             }
         }
     }
+}
 
-    fn spawn(&self, service: &mut Service) -> Result<()> {
-        let mut command = Command::new(&self.program);
+impl Service {
+    /// Sets the next start after an end found at `now`.
+    fn back_off(&mut self, now: Instant) {
+        self.wait = if now - self.started >= HEALTHY {
+            Duration::ZERO
+        } else {
+            (self.wait * 2).clamp(FIRST_WAIT, LONGEST_WAIT)
+        };
+        self.start_at = now + self.wait;
+    }
+
+    fn spawn(&mut self, program: &Path, config: &Path) -> Result<()> {
+        let mut command = Command::new(program);
         command
             .arg("--config")
-            .arg(&self.config)
-            .arg(service.name)
+            .arg(config)
+            .arg(self.name)
             .arg("--parent")
             .arg(std::process::id().to_string())
             .stdin(Stdio::null())
@@ -160,15 +172,15 @@ impl Supervisor {
             // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
             // children in order.
             .process_group(0);
-        if service.restarted {
+        if self.restarted {
             command.arg("--resume");
         }
+        self.started = Instant::now();
         let child = command
             .spawn()
-            .with_context(|| format!("cannot start the service `{}`", service.name))?;
-        tracing::info!(service = service.name, pid = child.id(), "started");
-        service.child = Some(child);
-        service.started = Instant::now();
+            .with_context(|| format!("cannot start the service `{}`", self.name))?;
+        tracing::info!(service = self.name, pid = child.id(), "started");
+        self.child = Some(child);
         Ok(())
     }
 }

@@ -36,6 +36,9 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     let mission = mission(&warehouse, &args.mission)?;
     // A real robot does not move off by itself: there somebody has to ask for the script.
     let scripted = args.headless || config.body == Body::Sim;
+    if !scripted && (args.exit_when_done || !args.mission.is_empty()) {
+        bail!("on a real robot a mission needs --headless: there the script is the operator");
+    }
 
     let folder = RuntimeFolder::create(&config)?;
     let _lock = folder.lock(&config.name)?;
@@ -62,20 +65,22 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     let robot_start = bus.clock().now();
     let mut operator = scripted.then(|| ScriptedOperator::new(mission, Hands::fresh_id()));
     let mut swept = started;
+    let mut complaints = Complaints::default();
     while !shutdown.is_requested() {
-        keepers.remember()?;
-        for ended in supervisor.poll(|service| keepers.hand_over(service))? {
+        complaints.hear(keepers.remember());
+        let ended = supervisor.poll(|service| complaints.hear(keepers.hand_over(service)));
+        for ended in ended {
             narrator.note(&format!("the {} ended ({})", ended.service, ended.how));
         }
         if swept.elapsed() >= SWEEP {
             bus.sweep();
             swept = Instant::now();
         }
-        narrator.look(bus.clock().now() - robot_start)?;
+        complaints.hear(narrator.look(bus.clock().now() - robot_start));
         hands.tick();
         if let Some(operator) = &mut operator {
-            if let Some(act) = operator.step(bus.clock().now(), &narrator.seen()) {
-                hands.carry_out(act)?;
+            if let Some(act) = operator.step(bus.clock().now(), narrator.seen()) {
+                complaints.hear(hands.carry_out(act));
             }
             if operator.outcome().is_some() && args.exit_when_done {
                 break;
@@ -86,12 +91,13 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
 
     // The robot is stopped before anything else is looked at.
     supervisor.stop();
-    narrator.look(bus.clock().now() - robot_start)?;
+    complaints.hear(narrator.look(bus.clock().now() - robot_start));
     let delivered = operator
         .as_ref()
         .map_or_else(Vec::new, |operator| operator.delivered().to_vec());
     let failure = match operator.as_ref().and_then(ScriptedOperator::outcome) {
         Some(Err(why)) => Some(why.to_owned()),
+        None if args.exit_when_done => Some("interrupted before the mission was delivered".into()),
         _ => delivered
             .iter()
             .find(|product| narrator.truly_delivered(**product) == Some(false))
@@ -113,6 +119,23 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// Errors of the bus that pass: the next attempt may succeed, and the robot must not end with
+/// them.
+#[derive(Default)]
+struct Complaints(u32);
+
+impl Complaints {
+    /// Says what went wrong, but not for ever.
+    fn hear(&mut self, result: Result<()>) {
+        if let Err(error) = result {
+            self.0 = self.0.wrapping_add(1);
+            if self.0.is_power_of_two() {
+                tracing::warn!(times = self.0, "{error:#}");
+            }
+        }
+    }
 }
 
 /// The products to fetch: those asked for, or the warehouse's first.
