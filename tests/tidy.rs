@@ -258,6 +258,28 @@ fn every_file_opens_with_what_it_is() {
 }
 
 #[test]
+fn the_documents_are_finished_and_name_files_that_exist() {
+    for document in ["README.md", "ARCHITECTURE.md"] {
+        let text = std::fs::read_to_string(root().join(document)).expect("a document");
+        for mark in ["TODO", "FIXME", "UP_SAMPLE", "MEASURED", "TBD"] {
+            assert!(!text.contains(mark), "{document}: {mark}");
+        }
+        // Whatever stands in backticks and looks like a path of ours is one.
+        for quoted in text.split('`').skip(1).step_by(2) {
+            let ours = ["bus/", "services/", "firmware/", "tests/", "benches/"]
+                .iter()
+                .any(|top| quoted.starts_with(top));
+            if ours && !quoted.contains(char::is_whitespace) {
+                assert!(
+                    root().join(quoted).exists(),
+                    "{document}: there is no {quoted}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn the_lower_floors_forbid_unsafe_code() {
     for folder in [
         "bus/wire",
