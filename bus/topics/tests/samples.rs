@@ -110,6 +110,8 @@ fn what_has_not_been_heard_is_marked_as_unknown() {
     assert_eq!(report.servo_position, [SERVO_UNKNOWN; 8]);
     assert_eq!(report.finish, Finish::None);
     assert_eq!(BoardHealth::default().version, BoardHealth::UNKNOWN);
+    assert_eq!(Health::default().gain_p, Health::NEVER_SET);
+    assert_eq!(Health::default().gain_d, Health::NEVER_SET);
     assert_eq!(Truth::default().carrying, -1);
 }
 

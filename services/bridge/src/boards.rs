@@ -1,7 +1,7 @@
 //! What is known of the two boards, in the form in which `link/health` shows it.
 //!
 //! It is apart from the main loop because it outlives links and ports: a board keeps its counts
-//! of restarts and epochs when it changes its port or the bridge is restarted.
+//! of restarts, epochs and losses when it changes its port or the bridge is restarted.
 
 use std::sync::atomic::Ordering;
 
@@ -39,6 +39,7 @@ impl Boards {
         let board = |earlier: Option<&BoardHealth>, index: usize| {
             let earlier = earlier.copied().unwrap_or_default();
             shared.epochs[index].store(earlier.epoch, Ordering::Relaxed);
+            shared.lost[index].store(earlier.lost_total, Ordering::Relaxed);
             Board {
                 health: BoardHealth {
                     epoch: earlier.epoch,
@@ -148,7 +149,8 @@ impl Boards {
 
     /// Takes over what the readers have counted.
     pub(crate) fn measure(&mut self, shared: &Shared) {
-        for board in &mut self.boards {
+        for (board, lost) in self.boards.iter_mut().zip(&shared.lost) {
+            board.health.lost_total = lost.load(Ordering::Relaxed);
             let Some(place) = board.place else {
                 continue;
             };

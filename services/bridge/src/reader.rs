@@ -26,6 +26,7 @@ use lager_wire::{
     ArmData, BoardStatus, Callsign, Packet, Payload, SettingReply, SteerData, Version,
 };
 
+use crate::boards;
 use crate::frames::LineAssembler;
 use crate::serial::{OpenPortError, PortGone, SerialPort, Waited};
 
@@ -80,6 +81,11 @@ pub(crate) struct Shared {
     pub(crate) meters: [Meter; 2],
     /// The present link epoch of each board: sensor, steering. Grows over the bridge's lives.
     pub(crate) epochs: [AtomicU32; 2],
+    /// Packets each board's links have missed: sensor, steering. Grows over the bridge's lives,
+    /// unlike a meter's count, which begins at 0 with each epoch.
+    pub(crate) lost: [AtomicU32; 2],
+    /// Board data dropped because the main loop was behind.
+    pub(crate) dropped: AtomicU32,
     /// Set when the readers are to end.
     pub(crate) stop: AtomicBool,
 }
@@ -108,6 +114,8 @@ pub(crate) struct Reader<'a> {
     ringer: Ringer,
     shared: &'a Shared,
     sensor: Option<SensorOut>,
+    /// How much of the present epoch's loss has been added to the board's total.
+    lost_told: u32,
 }
 
 /// The sensor board's way to the bus.
@@ -143,6 +151,7 @@ impl<'a> Reader<'a> {
             ringer,
             shared,
             sensor: None,
+            lost_told: 0,
         }
     }
 
@@ -189,6 +198,7 @@ impl<'a> Reader<'a> {
     /// Reads until the port has gone or the bridge stops.
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut link = HostLink::new();
+        self.lost_told = 0;
         let mut buffer = [0; 512];
         // When all that had come by then was read: only as of such a moment a board is silent. A
         // reader that was kept from running finds the bytes first and then the time.
@@ -244,13 +254,18 @@ impl<'a> Reader<'a> {
                 self.sensor = None;
                 self.hand(PortEvent::Silent);
             }
-            HostEvent::Packet(packet) => return self.take_packet(link, &packet, at_ns),
+            HostEvent::Packet(packet) => {
+                self.add_loss(link);
+                return self.take_packet(link, &packet, at_ns);
+            }
         }
         true
     }
 
     /// Counts a new epoch of a board, over all lives of the bridge.
     fn come_up(&mut self, up: Up) -> BoardUp {
+        // The link counts from 0 again.
+        self.lost_told = 0;
         let epoch = &self.shared.epochs[usize::from(up.callsign == Callsign::Steering)];
         let link_epoch = epoch.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
         // The publishers stay through a reboot of the board, so that observers keep their count.
@@ -287,9 +302,22 @@ impl<'a> Reader<'a> {
             // A board does not send what is the Pi's to send.
             _ => return false,
         };
-        // Data may be dropped when the main loop is stuck: the next report repeats it.
-        let _ = self.events.enqueue(event);
+        offer(&mut self.events, event, &self.shared.dropped);
         true
+    }
+
+    /// Adds to the board's total what its link has found missing. A link finds that out with a
+    /// packet, so nothing is forgotten when it begins a new epoch.
+    fn add_loss(&mut self, link: &HostLink) {
+        let Some(board) = link.callsign().and_then(boards::index) else {
+            return;
+        };
+        let lost = link.health().lost;
+        let more = lost.wrapping_sub(self.lost_told);
+        if more != 0 {
+            self.shared.lost[board].fetch_add(more, Ordering::Relaxed);
+            self.lost_told = lost;
+        }
     }
 
     /// Hands over what must not be lost; waits while the main loop is behind.
@@ -329,6 +357,14 @@ impl<'a> Reader<'a> {
             std::thread::sleep(step);
             left -= step;
         }
+    }
+}
+
+/// Hands over data that may be dropped when the main loop is stuck, since the next report repeats
+/// it; what is dropped is counted.
+fn offer(events: &mut Producer<'_, PortEvent>, event: PortEvent, dropped: &AtomicU32) {
+    if events.enqueue(event).is_err() {
+        dropped.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -394,5 +430,27 @@ impl SensorPorts {
             line: bus.publisher()?,
             distance: bus.publisher()?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use heapless::spsc::Queue;
+
+    use super::*;
+
+    #[test]
+    fn data_for_a_main_loop_that_is_behind_is_dropped_and_counted() {
+        let mut queue: Queue<PortEvent, QUEUE> = Queue::new();
+        let (mut events, mut taken) = queue.split();
+        let dropped = AtomicU32::new(0);
+        // The queue holds one less than its size.
+        for _ in 0..QUEUE + 2 {
+            offer(&mut events, PortEvent::Silent, &dropped);
+        }
+        assert_eq!(dropped.load(Ordering::Relaxed), 3);
+        assert!(taken.dequeue().is_some());
+        offer(&mut events, PortEvent::Silent, &dropped);
+        assert_eq!(dropped.load(Ordering::Relaxed), 3);
     }
 }

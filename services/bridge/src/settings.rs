@@ -6,6 +6,7 @@
 
 use core::time::Duration;
 
+use lager_topics::Health;
 use lager_wire::{Callsign, Setting, SettingKey, SettingReply, SettingStatus};
 
 /// Time for a board to answer before it is asked again.
@@ -85,6 +86,25 @@ pub fn home(key: SettingKey) -> Callsign {
 }
 
 impl Settings {
+    /// Takes up the gains that were set in an earlier life of the bridge.
+    pub fn resume(&mut self, kept: &Health) {
+        for (key, gain) in [
+            (SettingKey::GainP, kept.gain_p),
+            (SettingKey::GainD, kept.gain_d),
+        ] {
+            if gain >= 0 {
+                self.keep(key, gain);
+            }
+        }
+    }
+
+    /// Writes the settings' part of `link/health`: all that [`Settings::resume`] needs.
+    pub fn fill(&self, health: &mut Health) {
+        let gain = |key| self.find(key).kept.unwrap_or(Health::NEVER_SET);
+        health.gain_p = gain(SettingKey::GainP);
+        health.gain_d = gain(SettingKey::GainD);
+    }
+
     /// Wishes a value, over any earlier wish for the same key.
     pub fn want(&mut self, now: Duration, key: SettingKey, value: i16) {
         self.start(now, key, value);
@@ -291,6 +311,27 @@ mod tests {
         settings.board_up(ms(30), Callsign::Steering);
         let again = settings.poll(ms(30), Callsign::Steering).unwrap();
         assert_eq!((again.key, again.value), (SettingKey::GainD, 3));
+    }
+
+    #[test]
+    fn gains_outlive_the_bridge_and_those_never_set_stay_so() {
+        let mut settings = Settings::default();
+        let mut health = Health::default();
+        settings.want(ms(0), SettingKey::GainD, 0);
+        let sent = settings.poll(ms(0), Callsign::Steering).unwrap();
+        settings.fill(&mut health);
+        assert_eq!(health, Health::default(), "the board has not answered");
+        settings.answer(&reply(&sent, SettingStatus::Accepted));
+        settings.fill(&mut health);
+        assert_eq!((health.gain_p, health.gain_d), (Health::NEVER_SET, 0));
+
+        let mut settings = Settings::default();
+        settings.resume(&health);
+        assert_eq!(settings.poll(ms(0), Callsign::Steering), None);
+        settings.board_up(ms(5), Callsign::Steering);
+        let told = settings.poll(ms(5), Callsign::Steering).unwrap();
+        assert_eq!((told.key, told.value), (SettingKey::GainD, 0));
+        assert_eq!(settings.poll(ms(5), Callsign::Steering), None);
     }
 
     #[test]

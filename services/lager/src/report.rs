@@ -128,7 +128,7 @@ impl Narrator {
     pub fn lost(&self) -> u64 {
         let own = self.line.lost() + self.distance.lost() + self.state.lost();
         let health = self.seen.health.unwrap_or_default();
-        let wires = u64::from(health.sensor.lost) + u64::from(health.steering.lost);
+        let wires = u64::from(health.sensor.lost_total) + u64::from(health.steering.lost_total);
         let logic = self.seen.status.map_or(0, |status| status.frames_lost);
         own + wires + health.bus_lost + logic
     }

@@ -274,11 +274,20 @@ impl Shell {
         self.status_due = now + STATUS_PERIOD;
         self.sent_status = self.navigator.status();
         let status = NavigatorStatus {
-            frames_lost: self.lost_before + self.line.lost(),
+            frames_lost: self.lost_before + self.lost(),
             ..self.sent_status
         };
         let sent = self.status.send(Clock::monotonic_ns(), status);
         self.check(sent);
+    }
+
+    /// Samples missed of the topics on which each one counts; of the others only the last does.
+    fn lost(&self) -> u64 {
+        self.line.lost()
+            + self.distance.lost()
+            + self.steering.lost()
+            + self.orders.lost()
+            + self.inputs.lost()
     }
 
     fn check(&mut self, sent: Result<(), SendError>) {

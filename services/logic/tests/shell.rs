@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use lager_logic::{LogicConfig, run};
 use lager_ports::{Bus, BusConfig, Publisher, Shutdown, Subscriber, remove_stale_nodes};
 use lager_topics::{
-    EventKind, Health, LineFrame, LinkHealth, LogThought, MapProduct, MissionEvent, MissionOrder,
-    Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, Order, Phase, Role, SensorLine, Side,
-    SteeringCommand, SteeringOrder, SteeringReport, SteeringState, WarehouseMap,
+    DistanceFrame, EventKind, Health, Input, LineFrame, LinkHealth, LogThought, MapProduct,
+    MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
+    Order, Phase, Role, SensorDistance, SensorLine, Side, SteeringCommand, SteeringOrder,
+    SteeringReport, SteeringState, WarehouseMap,
 };
 use lager_wire::LineState;
 
@@ -141,6 +142,31 @@ impl World {
         }
     }
 
+    /// Sends samples faster than they are read until the status counts some as missed.
+    #[track_caller]
+    fn miss(&mut self, topic: &str, send: impl Fn(&Self)) {
+        let frames_lost = |world: &Self| world.seen.map_or(0, |status| status.frames_lost);
+        let start = Instant::now();
+        // What the telling before this has cost is told by now.
+        let settled = Instant::now() + Duration::from_millis(150);
+        while Instant::now() < settled {
+            std::thread::sleep(Duration::from_millis(5));
+            self.look();
+        }
+        let before = frames_lost(self);
+        while frames_lost(self) == before {
+            assert!(
+                start.elapsed() < Duration::from_secs(60),
+                "gave up waiting until {topic} is missed"
+            );
+            for _ in 0..2_000 {
+                send(self);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+            self.look();
+        }
+    }
+
     fn phase(&self) -> Option<Phase> {
         self.seen.and_then(|status| status.phase.get())
     }
@@ -255,5 +281,35 @@ fn a_successor_takes_up_the_kept_state() {
         assert_eq!(status.phase.get(), Some(Phase::Approaching));
         assert!(status.frames > before.frames);
         assert!(world.given.iter().all(|order| order.id > before.command_id));
+    });
+}
+
+#[test]
+fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Supervisor);
+    let mut world = World::new(&bus);
+    let distance = bus.publisher::<SensorDistance>().unwrap();
+    let inputs = bus.publisher::<OperatorInput>().unwrap();
+    with_logic(&domain, false, || {
+        world.until("logic has its map", false, |world| {
+            world.phase() == Some(Phase::WaitingForOrder)
+        });
+        // Bursts of one topic at a time, far beyond what a subscriber holds.
+        world.miss("sensor/line", |world| {
+            world.line.send(0, LineFrame::default()).unwrap();
+        });
+        world.miss("sensor/distance", |_| {
+            distance.send(0, DistanceFrame::default()).unwrap();
+        });
+        world.miss("steering/state", |world| {
+            world.state.send(0, SteeringReport::default()).unwrap();
+        });
+        world.miss("mission/order", |world| {
+            world.orders.send(0, Order { id: 7, product: 9 }).unwrap();
+        });
+        world.miss("operator/input", |_| {
+            inputs.send(0, Input::default()).unwrap();
+        });
     });
 }

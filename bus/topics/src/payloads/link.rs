@@ -28,13 +28,15 @@ coded! {
 
 payload! {
     /// One board's link, as the bridge sees it. Counters wrap.
-    pub struct BoardHealth: 44 bytes {
+    pub struct BoardHealth: 48 bytes {
         /// Life of the link: grows with each handshake.
         pub epoch: u32,
         /// Good packets received in this epoch.
         pub packets: u32,
-        /// Packets missing by their ids, a lower bound.
+        /// Packets missing by their ids in this epoch, a lower bound.
         pub lost: u32,
+        /// Packets missing by their ids in all epochs, over ports and lives of the bridge.
+        pub lost_total: u32,
         /// Packets refused by their CRC.
         pub bad_crc: u32,
         /// Bytes passed over while looking for a packet.
@@ -78,12 +80,13 @@ impl BoardHealth {
 
 payload! {
     /// Both links and the arbiter: all that a restarted bridge needs to go on.
-    pub struct Health: 128 bytes {
+    pub struct Health: 136 bytes {
         /// The sensor board's link.
         pub sensor: BoardHealth,
         /// The steering board's link.
         pub steering: BoardHealth,
-        /// Samples of the bus the bridge itself has missed.
+        /// Samples of the bus the bridge itself has missed, and board data that it dropped
+        /// because its main loop was behind.
         pub bus_lost: u64,
         /// The order in force.
         pub current_id: u32,
@@ -95,6 +98,10 @@ payload! {
         pub leases_expired: u32,
         /// Until the lease of the order in force ends, in ms; 0 = none runs.
         pub next_lease_ms: u16,
+        /// Gain on the error that was set by request, -1 = never set.
+        pub gain_p: i16 = Self::NEVER_SET,
+        /// Gain on the change of the error that was set by request, -1 = never set.
+        pub gain_d: i16 = Self::NEVER_SET,
         /// Who may drive.
         pub mode: Tag<Mode>,
         /// 1 = a stop is latched.
@@ -111,6 +118,11 @@ payload! {
         pub finish: Tag<Finish>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 7],
+        pub reserved: [u8; 3],
     }
+}
+
+impl Health {
+    /// `gain_p` and `gain_d` before a request has set them. 0 is a gain.
+    pub const NEVER_SET: i16 = -1;
 }

@@ -100,7 +100,8 @@ coded! {
 payload! {
     /// The navigator's state: what observers want to see and a restarted navigator needs.
     pub struct NavigatorStatus: 72 bytes {
-        /// Samples of `sensor/line` the navigator has missed.
+        /// Samples the navigator has missed, of `sensor/line`, `sensor/distance`,
+        /// `steering/state`, `mission/order` and `operator/input`.
         pub frames_lost: u64,
         /// Samples of `sensor/line` the navigator has read.
         pub frames: u64,

@@ -64,7 +64,10 @@ impl Core<'_> {
             PortEvent::Arm(data) => self.servos.hear(&data),
             PortEvent::Status(status) => self.boards.status(place, &status),
             PortEvent::Setting(reply) => {
-                if !self.settings.answer(&reply) && reply.key == SettingKey::Calibrate {
+                if self.settings.answer(&reply) {
+                    // Before the request is answered: a gain in force outlives this bridge.
+                    self.publish_health(self.clock.now());
+                } else if reply.key == SettingKey::Calibrate {
                     calibrated(&reply);
                 }
             }

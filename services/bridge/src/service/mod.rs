@@ -157,6 +157,7 @@ impl<'a> Core<'a> {
             settings.keep(SettingKey::RawLine, 1);
         }
         if let Some(kept) = kept {
+            settings.resume(kept);
             tracing::info!(
                 mode = ?arbiter.mode(),
                 stopped = arbiter.is_stopped(),
@@ -319,10 +320,12 @@ impl<'a> Core<'a> {
 
     fn publish_health(&mut self, now: Duration) {
         self.boards.measure(self.shared);
-        let lost = self.orders.lost() + self.inputs.lost();
+        let dropped = self.shared.dropped.load(Ordering::Relaxed);
+        let lost = self.orders.lost() + self.inputs.lost() + u64::from(dropped);
         let sent = self.health.loan().and_then(|mut loan| {
             self.boards.fill(&mut loan);
             self.arbiter.fill(now, &mut loan);
+            self.settings.fill(&mut loan);
             loan.bus_lost = self.lost_before + lost;
             loan.send()
         });

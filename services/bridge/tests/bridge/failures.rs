@@ -1,7 +1,8 @@
 //! What goes wrong on a robot: restarts, cables, noise, ports the wrong way round.
 
-use lager_topics::{Finish, LinkHealth, Mode, Role};
-use lager_wire::{LineState, ResetCause};
+use lager_ports::Keeper;
+use lager_topics::{Ask, AskKind, Finish, Health, LinkHealth, Mode, Outcome, Role};
+use lager_wire::{Centimetres, LineState, Payload, ResetCause};
 
 use crate::harness::{
     Bridge, FOLLOW, FORWARD, LEFT_PERP, Robot, SensorBoard, SteeringBoard, logic, operator,
@@ -223,7 +224,7 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
             })
         });
     robot.hands.stop();
-    let before = robot
+    robot
         .hands
         .wait_for_health("the stop is latched", |health| health.stopped == 1);
     wait_until("the keeper has it", || {
@@ -233,22 +234,7 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
             .is_some_and(|(health, _)| health.stopped == 1)
     });
 
-    robot.bridge.take().unwrap().stop();
-    keeper.remember().unwrap();
-    keeper.hand_over().unwrap();
-    robot.bridge_config.resume = true;
-    robot.bridge = Some(Bridge::start(&robot.isolation, robot.bridge_config.clone()));
-    wait_until("both links have a new epoch", || {
-        // A late joiner gets the kept value at the keeper's next tick.
-        keeper.remember().unwrap();
-        robot.hands.health.look().is_some_and(|health| {
-            health.sensor.epoch == before.sensor.epoch + 1
-                && health.steering.epoch == before.steering.epoch + 1
-                && health.sensor.up == 1
-                && health.steering.up == 1
-        })
-    });
-    let after = robot.hands.health.last.unwrap();
+    let after = restart_bridge(&mut robot, &mut keeper);
     assert_eq!(after.mode.get(), Some(Mode::Autonomous));
     assert_eq!(after.stopped, 1);
     assert_eq!((after.sensor.reboots, after.steering.reboots), (0, 0));
@@ -277,4 +263,102 @@ fn a_restarted_bridge_goes_on_beside_running_boards() {
             })
         });
     assert_eq!(steering.with(|board| board.count(LEFT_PERP)), 2);
+}
+
+#[test]
+fn the_total_of_losses_outlives_resets_cables_and_bridges() {
+    let mut robot = Robot::up();
+    let supervisor = robot.isolation.open(Role::Supervisor);
+    let mut keeper = supervisor.keeper::<LinkHealth>().unwrap();
+    let mut total = lose(&mut robot, 0, 5);
+
+    robot
+        .sensor
+        .with(|board| board.restart(ResetCause::Watchdog));
+    robot
+        .hands
+        .wait_for_health("the board has restarted", |health| {
+            health.sensor.epoch == 2 && health.sensor.lost == 0 && health.sensor.lost_total >= total
+        });
+    total = lose(&mut robot, total, 3);
+
+    robot.sensor.unplug();
+    robot
+        .hands
+        .wait_for_health("the board is gone", |health| health.sensor.up == 0);
+    robot.sensor.plug();
+    let health = robot
+        .hands
+        .wait_for_health("the board is back", |health| health.sensor.up == 1);
+    assert!(health.sensor.lost_total >= total, "{health:?}");
+    total = lose(&mut robot, total, 4);
+
+    let health = restart_bridge(&mut robot, &mut keeper);
+    assert!(health.sensor.lost_total >= total, "{health:?}");
+    total = lose(&mut robot, total, 2);
+    assert!(total >= 5 + 3 + 4 + 2);
+}
+
+#[test]
+fn gains_set_by_request_outlive_the_bridge() {
+    let mut robot = Robot::up();
+    let supervisor = robot.isolation.open(Role::Supervisor);
+    let mut keeper = supervisor.keeper::<LinkHealth>().unwrap();
+    let health = robot.hands.health.look().unwrap();
+    assert_eq!((health.gain_p, health.gain_d), (Health::NEVER_SET, -1));
+    let answer = robot.hands.ask(Ask {
+        kind: AskKind::SetGains.into(),
+        gain_p: 5,
+        gain_d: 0,
+        ..Ask::default()
+    });
+    assert_eq!(answer.outcome.get(), Some(Outcome::Done));
+
+    let health = restart_bridge(&mut robot, &mut keeper);
+    assert_eq!((health.gain_p, health.gain_d), (5, 0));
+    robot
+        .steering
+        .with(|board| board.restart(ResetCause::BrownOut));
+    wait_until("the restarted board is told the gains", || {
+        robot.steering.with(|board| board.gains) == [5, 0]
+    });
+}
+
+/// Ends the bridge, and starts one that takes up its state; the health with both boards up again.
+fn restart_bridge(robot: &mut Robot, keeper: &mut Keeper<LinkHealth>) -> Health {
+    robot.bridge.take().unwrap().stop();
+    let before = robot.hands.health.look().unwrap();
+    keeper.remember().unwrap();
+    keeper.hand_over().unwrap();
+    robot.bridge_config.resume = true;
+    robot.bridge = Some(Bridge::start(&robot.isolation, robot.bridge_config.clone()));
+    wait_until("both links have a new epoch", || {
+        // A late joiner gets the kept value at the keeper's next tick.
+        keeper.remember().unwrap();
+        robot.hands.health.look().is_some_and(|health| {
+            health.sensor.epoch == before.sensor.epoch + 1
+                && health.steering.epoch == before.steering.epoch + 1
+                && health.sensor.up == 1
+                && health.steering.up == 1
+        })
+    });
+    robot.hands.health.last.unwrap()
+}
+
+/// Loses `count` packets of the sensor board beyond those already lost; the new total.
+fn lose(robot: &mut Robot, before: u32, count: u32) -> u32 {
+    wait_until("the board is up", || {
+        robot.sensor.with(|board| {
+            let lost = Payload::Distance(Centimetres(1));
+            // Packets that use up ids and are never sent.
+            (0..count).all(|_| board.link.encode(lost).is_some())
+        })
+    });
+    let health = robot
+        .hands
+        .wait_for_health("the loss is counted", |health| {
+            health.sensor.lost_total >= before + count
+        });
+    assert!(health.sensor.lost >= count);
+    health.sensor.lost_total
 }
