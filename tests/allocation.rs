@@ -11,7 +11,7 @@ use std::time::Duration;
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
 use lager_plant::Warehouse;
-use lager_ports::{Bus, Shutdown};
+use lager_ports::{Bus, Cause, Shutdown};
 use lager_tests::{Domain, wait_for};
 use lager_topics::{
     Ask, AskKind, BridgeRequest, LinkHealth, MapProduct, MissionOrder, Mode, NavMap, NavStatus,
@@ -68,7 +68,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
     let shutdown = Shutdown::new();
     let operator = bus(Role::Operator);
     let map = operator.publisher::<NavMap>().expect("a topic");
-    map.send(0, small_map()).expect("sent");
+    map.send(Cause::OWN, small_map()).expect("sent");
     let orders = operator.publisher::<MissionOrder>().expect("a topic");
     let client = operator.client::<BridgeRequest>().expect("a request");
     let mut health = operator.subscriber::<LinkHealth>().expect("a topic");
@@ -103,7 +103,9 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
             ..Ask::default()
         };
         client.call(ask, Duration::from_secs(5)).expect("an answer");
-        orders.send(0, Order { id: 1, product: 1 }).expect("sent");
+        orders
+            .send(Cause::OWN, Order { id: 1, product: 1 })
+            .expect("sent");
         wait_for("the robot to drive", || {
             status
                 .latest()
@@ -133,7 +135,10 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert_eq!(after - before, 0, "allocations over {frames} frames");
     });
-    drop((robot, map, orders, client, health, status, operator));
+    // The shutdown rings the services, so it has the bells open.
+    drop((
+        robot, map, orders, client, health, status, operator, shutdown,
+    ));
     domain.assert_clean();
 }
 

@@ -13,6 +13,7 @@ use lager_topics::{Request, Role, Topic};
 
 use crate::clock::Clock;
 use crate::config::BusConfig;
+use crate::doorbell::{self, Board};
 use crate::error::{IntrospectError, OpenError, PortError};
 use crate::introspect::{self, NodeInfo, TopicInfo};
 use crate::keeper::{self, Keeper};
@@ -39,6 +40,7 @@ struct Shared {
     role: Role,
     clock: Clock,
     port_name: PortName,
+    board: Board,
 }
 
 impl Bus {
@@ -53,6 +55,7 @@ impl Bus {
         set_log_level(log_level());
         let node = make_node(&transport, &config.robot, role)?;
         node.blocking_cleanup_dead_nodes(OTHERS_SWEEP);
+        doorbell::sweep_all(&transport);
         let port_name = PortName::new(&name::port(role, std::process::id()))
             .expect("a role and a number fit into a port's name");
         Ok(Self {
@@ -63,6 +66,7 @@ impl Bus {
                 role,
                 clock: Clock::new(config.speed),
                 port_name,
+                board: Board::default(),
             }),
         })
     }
@@ -88,6 +92,7 @@ impl Bus {
     /// Samples a killed writer has sent stay with subscribers that have received from it before,
     /// until they are drained; a keeper should still drain first ([`Keeper::remember`]).
     pub fn sweep(&self) -> usize {
+        doorbell::sweep(&self.shared.config, &self.shared.robot);
         // The count is of processes on one machine.
         self.shared
             .node
@@ -181,6 +186,10 @@ impl Bus {
 
     pub(crate) fn transport(&self) -> &Config {
         &self.shared.config
+    }
+
+    pub(crate) fn board(&self) -> &Board {
+        &self.shared.board
     }
 
     pub(crate) fn port_name(&self) -> &PortName {

@@ -21,7 +21,12 @@ impl Clock {
 
     /// Robot time since the clock's origin, which all processes of a machine share.
     pub fn now(&self) -> Duration {
-        let real = Duration::from_nanos(Self::monotonic_ns());
+        self.at(Self::monotonic_ns())
+    }
+
+    /// Robot time at a moment of real time, in ns of `CLOCK_MONOTONIC`.
+    pub fn at(&self, monotonic_ns: u64) -> Duration {
+        let real = Duration::from_nanos(monotonic_ns);
         if self.speed == 1.0 {
             real
         } else {
@@ -62,6 +67,7 @@ mod tests {
         let now = clock.now();
         let after = Duration::from_nanos(Clock::monotonic_ns());
         assert!(now >= before * 8 && now <= after * 8 + Duration::from_micros(1));
+        assert_eq!(clock.at(1_000), Duration::from_micros(8));
         assert_eq!(
             clock.real(Duration::from_millis(40)),
             Duration::from_millis(5)

@@ -69,6 +69,16 @@ pub enum PortError {
         /// Places for readers.
         limit: usize,
     },
+    /// All places on the bell board are taken.
+    #[error(
+        "{role} is already waited for {limit} times, which is the limit; stop a {role} that runs twice and try again"
+    )]
+    TooManyWaiters {
+        /// The role.
+        role: Role,
+        /// Places for waiters of one role.
+        limit: usize,
+    },
     /// All places for writers are taken.
     #[error(
         "`{topic}` already has {limit} writers, which is the limit; stop one of them and try again"

@@ -10,6 +10,7 @@ use lager_topics::{Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
 
 use crate::bus::{Bus, OTHERS_SWEEP};
 use crate::config::BusConfig;
+use crate::doorbell;
 use crate::error::IntrospectError;
 use crate::name::{self, RobotName};
 use crate::service;
@@ -70,6 +71,8 @@ pub struct TopicInfo {
     pub writers: Vec<Peer>,
     /// The readers.
     pub readers: Vec<Peer>,
+    /// The waiters that each sample wakes, once for each; a killed one is not among them.
+    pub woken: Vec<Peer>,
 }
 
 impl TopicInfo {
@@ -84,6 +87,7 @@ impl TopicInfo {
             observers: 0,
             writers: Vec::new(),
             readers: Vec::new(),
+            woken: Vec::new(),
         }
     }
 }
@@ -130,14 +134,16 @@ pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
 /// # Errors
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
+    let config = config.transport()?;
     let mut removed = 0;
-    Node::<Ipc>::list(&config.transport()?, |state| {
+    Node::<Ipc>::list(&config, |state| {
         if let IpcNodeState::Dead(dead) = state {
             removed += usize::from(dead.blocking_remove_stale_resources(OTHERS_SWEEP).is_ok());
         }
         CallbackProgression::Continue
     })
     .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    doorbell::sweep_all(&config);
     Ok(removed)
 }
 
@@ -237,6 +243,13 @@ impl TopicVisitor for Look<'_> {
                 .push(Peer::of(details.subscriber_name.as_str()));
             CallbackProgression::Continue
         });
+        for actor in T::QOS.actors {
+            let pids = doorbell::woken(self.bus.transport(), self.robot, *actor);
+            info.woken.extend(pids.into_iter().map(|pid| Peer {
+                role: Some(*actor),
+                pid,
+            }));
+        }
         info.publishers = info.writers.len();
         info.subscribers = info.readers.len();
         info.observers = info

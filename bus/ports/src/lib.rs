@@ -18,7 +18,7 @@
 //!     while let Some(frame) = line.receive()? {
 //!         let mut order = orders.loan()?;
 //!         order.code = 2;
-//!         order.source_time_ns(frame.stamp().source_time_ns);
+//!         order.cause(frame.cause());
 //!         order.send()?;
 //!     }
 //! }
@@ -34,6 +34,7 @@
 //! about the robot; sending and receiving do not allocate after start-up.
 
 mod bus;
+mod cause;
 mod clock;
 mod config;
 mod doorbell;
@@ -53,6 +54,7 @@ mod transport;
 mod waiter;
 
 pub use bus::Bus;
+pub use cause::Cause;
 pub use clock::Clock;
 pub use config::BusConfig;
 pub use error::{CallError, IntrospectError, OpenError, PortError, ReceiveError, SendError};

@@ -13,8 +13,9 @@ use iceoryx2::sample_mut::SampleMut;
 use lager_topics::{Stamp, Topic};
 
 use crate::bus::Bus;
+use crate::cause::Cause;
 use crate::clock::Clock;
-use crate::doorbell::Rope;
+use crate::doorbell::{Rope, StandardListeners};
 use crate::error::{PortError, SendError};
 use crate::service::{self, Fault, MAX_LOANS, patiently};
 use crate::transport::Ipc;
@@ -25,6 +26,7 @@ use crate::transport::Ipc;
 pub struct Publisher<T: Topic> {
     inner: IpcPublisher<Ipc, T::Payload, Stamp>,
     ropes: Box<[Rope]>,
+    standard: StandardListeners,
     next_sequence: Cell<u64>,
     epoch: u64,
     writer: u32,
@@ -42,6 +44,7 @@ impl<T: Topic> Publisher<T> {
         let ropes = actors
             .map(|actor| Rope::to(bus, actor))
             .collect::<Result<_, _>>()?;
+        let standard = StandardListeners::of::<T>(bus)?;
         let service = service::topic::<T>(bus)?;
         let inner = patiently(bus, T::NAME, || {
             service
@@ -64,6 +67,7 @@ impl<T: Topic> Publisher<T> {
         Ok(Self {
             inner,
             ropes,
+            standard,
             next_sequence: Cell::new(0),
             // After the port exists: a subscriber that is older than the epoch has been there
             // for every sample, and may count what it missed from 0 on.
@@ -81,21 +85,21 @@ impl<T: Topic> Publisher<T> {
             Ok(sample) => Ok(Loan {
                 sample,
                 publisher: self,
-                source_time_ns: 0,
+                cause: Cause::OWN,
             }),
             Err(LoanError::ExceedsMaxLoans) => Err(SendError::TooManyLoans { limit: MAX_LOANS }),
             Err(other) => Err(SendError::Transport(format!("{other:?}"))),
         }
     }
 
-    /// Sends a copy of `payload` about an event at `source_time_ns` (real, `CLOCK_MONOTONIC`).
+    /// Sends a copy of `payload`, which follows from `cause`.
     ///
     /// # Errors
     /// As [`Publisher::loan`] and [`Loan::send`].
-    pub fn send(&self, source_time_ns: u64, payload: T::Payload) -> Result<(), SendError> {
+    pub fn send(&self, cause: Cause, payload: T::Payload) -> Result<(), SendError> {
         let mut loan = self.loan()?;
         *loan = payload;
-        loan.source_time_ns(source_time_ns);
+        loan.cause(cause);
         loan.send()
     }
 
@@ -120,8 +124,8 @@ impl<T: Topic> Publisher<T> {
     pub(crate) fn resend(&self, payload: T::Payload, original: &Stamp) -> Result<(), SendError> {
         let mut loan = self.loan()?;
         *loan = payload;
-        loan.source_time_ns(original.source_time_ns);
-        loan.deliver(original.publish_time_ns)
+        loan.cause(Cause::of(original));
+        loan.deliver(original.publish_time_ns, Ring::Actors)
     }
 }
 
@@ -141,14 +145,20 @@ impl<T: Topic> fmt::Debug for Publisher<T> {
 pub struct Loan<'publisher, T: Topic> {
     sample: SampleMut<Ipc, T::Payload, Stamp>,
     publisher: &'publisher Publisher<T>,
-    source_time_ns: u64,
+    cause: Cause,
+}
+
+/// Who is told of a sample.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ring {
+    Actors,
+    Nobody,
 }
 
 impl<T: Topic> Loan<'_, T> {
-    /// Says when the event happened that the sample reports: real ns of `CLOCK_MONOTONIC`.
-    /// Unsaid, it is the time of sending.
-    pub fn source_time_ns(&mut self, source_time_ns: u64) {
-        self.source_time_ns = source_time_ns;
+    /// Says from what the sample follows; unsaid it is [`Cause::OWN`].
+    pub fn cause(&mut self, cause: Cause) {
+        self.cause = cause;
     }
 
     /// Sends the sample and rings the topic's actors.
@@ -156,29 +166,36 @@ impl<T: Topic> Loan<'_, T> {
     /// # Errors
     /// The transport failed; the sample's number is used up, so readers count it as lost.
     pub fn send(self) -> Result<(), SendError> {
-        self.deliver(Clock::monotonic_ns())
+        self.deliver(Clock::monotonic_ns(), Ring::Actors)
     }
 
-    fn deliver(mut self, publish_time_ns: u64) -> Result<(), SendError> {
+    /// Sends the sample and rings nobody: actors find it when they look the next time. For what
+    /// no actor has to act upon at once, so that nobody is woken in vain.
+    ///
+    /// # Errors
+    /// As [`Loan::send`].
+    pub fn send_quietly(self) -> Result<(), SendError> {
+        self.deliver(Clock::monotonic_ns(), Ring::Nobody)
+    }
+
+    fn deliver(mut self, publish_time_ns: u64, ring: Ring) -> Result<(), SendError> {
         let publisher = self.publisher;
         let sequence = publisher.next_sequence.get();
         publisher.next_sequence.set(sequence + 1);
-        *self.sample.user_header_mut() = Stamp {
+        *self.sample.user_header_mut() = self.cause.stamp(Stamp {
             sequence,
-            source_time_ns: if self.source_time_ns == 0 {
-                publish_time_ns
-            } else {
-                self.source_time_ns
-            },
             publish_time_ns,
             epoch: publisher.epoch,
             writer: publisher.writer,
-            reserved: 0,
-        };
+            ..Stamp::default()
+        });
         let sent = self.sample.send();
-        for rope in &publisher.ropes {
-            rope.ring();
+        if ring == Ring::Actors {
+            for rope in &publisher.ropes {
+                rope.ring();
+            }
         }
+        publisher.standard.notify();
         match sent {
             Ok(_) => Ok(()),
             Err(error) => Err(SendError::Transport(format!("{error:?}"))),

@@ -11,7 +11,7 @@ use iceoryx2::service::builder::request_response::{
     RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
-use lager_topics::{Payload, Qos, Request, Role, Schema, Stamp, Topic};
+use lager_topics::{Payload, Qos, Request, Schema, Stamp, Topic};
 
 use crate::bus::Bus;
 use crate::error::PortError;
@@ -30,12 +30,10 @@ pub(crate) const MAX_CLIENTS: usize = 32;
 pub(crate) const MAX_SERVERS: usize = 4;
 const MAX_REQUEST_NODES: usize = MAX_CLIENTS + MAX_SERVERS + 16;
 
-/// Ends of one wake service: two waiters, since a killed one keeps its place until swept, and two
-/// more for a role that is started twice by mistake; every publisher of every topic the role acts
-/// on, from every process.
-pub(crate) const MAX_LISTENERS: usize = 4;
-pub(crate) const MAX_NOTIFIERS: usize = 256;
-const MAX_WAKE_NODES: usize = 128;
+/// Listeners of plain iceoryx2 on one topic, and the highest number an event may have there: each
+/// number costs a listener time, and writers use 0 only.
+const MAX_STANDARD_LISTENERS: usize = 16;
+const MAX_EVENT_ID: usize = 3;
 
 const SCHEMA_KEY: &str = "lager.schema";
 
@@ -44,7 +42,7 @@ pub(crate) type TopicService<T> = publish_subscribe::PortFactory<Ipc, <T as Topi
 pub(crate) type RequestService<R> =
     request_response::PortFactory<Ipc, <R as Request>::Request, (), <R as Request>::Reply, ()>;
 
-pub(crate) type WakeService = event::PortFactory<Ipc>;
+pub(crate) type EventService = event::PortFactory<Ipc>;
 
 /// Opens or creates the service of a topic with the limits of the table.
 pub(crate) fn topic<T: Topic>(bus: &Bus) -> Result<TopicService<T>, PortError> {
@@ -117,26 +115,19 @@ pub(crate) fn request<R: Request>(bus: &Bus) -> Result<RequestService<R>, PortEr
     })
 }
 
-/// Opens or creates the service through which `role` is woken.
-pub(crate) fn wake(bus: &Bus, role: Role) -> Result<WakeService, PortError> {
-    let name = wake_name(role);
-    patiently(bus, &name, || {
+/// Opens or creates the event service beside a topic, for listeners of plain iceoryx2.
+pub(crate) fn event<T: Topic>(bus: &Bus) -> Result<EventService, PortError> {
+    patiently(bus, T::NAME, || {
         bus.node()
-            .service_builder(&service_name(bus.robot(), &name)?)
+            .service_builder(&service_name(bus.robot(), T::NAME)?)
             .event()
-            .max_listeners(MAX_LISTENERS)
-            .max_notifiers(MAX_NOTIFIERS)
-            .max_nodes(MAX_WAKE_NODES)
-            // Each drain looks at every id, and a wake is only a hint.
-            .event_id_max_value(0)
+            .max_listeners(MAX_STANDARD_LISTENERS)
+            .max_notifiers(T::QOS.max_publishers())
+            .max_nodes(T::QOS.max_nodes())
+            .event_id_max_value(MAX_EVENT_ID)
             .open_or_create()
-            .map_err(|error| wake_fault(&name, error))
+            .map_err(|error| event_fault(T::NAME, &T::QOS, error))
     })
-}
-
-/// The relative name of the service through which `role` is woken.
-pub(crate) fn wake_name(role: Role) -> String {
-    format!("wake/{role}")
 }
 
 /// The layout both sides must share: a difference refuses the service.
@@ -218,7 +209,7 @@ fn request_fault(request: &str, error: RequestResponseOpenOrCreateError) -> Faul
     Fault::Passing(detail)
 }
 
-fn wake_fault(name: &str, error: EventOpenOrCreateError) -> Fault {
+fn event_fault(name: &str, qos: &Qos, error: EventOpenOrCreateError) -> Fault {
     use EventCreateError as Create;
     use EventOpenError as Open;
     use EventOpenOrCreateError as Either;
@@ -226,7 +217,7 @@ fn wake_fault(name: &str, error: EventOpenOrCreateError) -> Fault {
         Either::EventOpenError(open) => match open {
             Open::InsufficientPermissions => return no_permission(name),
             Open::VersionMismatch => return other_version(name),
-            Open::ExceedsMaxNumberOfNodes => return crowded(name, MAX_WAKE_NODES),
+            Open::ExceedsMaxNumberOfNodes => return crowded(name, qos.max_nodes()),
             Open::Interrupt
             | Open::DoesNotExist
             | Open::HangsInCreation

@@ -10,6 +10,7 @@ use iceoryx2::sample::Sample as IpcSample;
 use lager_topics::{OBSERVERS, Stamp, Topic};
 
 use crate::bus::Bus;
+use crate::cause::Cause;
 use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError};
 use crate::name;
@@ -126,9 +127,15 @@ pub struct Sample<T: Topic> {
 }
 
 impl<T: Topic> Sample<T> {
-    /// When, by whom and as which one it was published.
+    /// When, why, by whom and as which one it was published.
     pub fn stamp(&self) -> &Stamp {
         self.inner.user_header()
+    }
+
+    /// This sample as the reason for others, received now: call it right after receiving. It
+    /// reads the clock, so whoever only looks at samples should not ask for it.
+    pub fn cause(&self) -> Cause {
+        Cause::sample::<T>(self.stamp(), Clock::monotonic_ns())
     }
 }
 

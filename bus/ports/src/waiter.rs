@@ -1,31 +1,41 @@
 //! How a service that acts on topics waits for them.
 
+use core::cell::{Cell, RefCell};
 use core::fmt;
 use core::str::FromStr;
 use core::time::Duration;
-use std::time::Instant;
 
 use lager_topics::{BridgeRequest, Request, Role, TOPICS};
 
 use crate::bus::Bus;
-use crate::doorbell::{Bell, InsideRope};
+use crate::clock::Clock;
+use crate::doorbell::{Bell, InsideRope, Pace, Plan};
 use crate::error::PortError;
 
 /// How to wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Policy {
-    /// Sleep until rung: no processor time, some ten microseconds to wake.
+    /// Sleep until rung: no processor time, some microseconds to wake on the ringer's core and
+    /// some ten on another.
     #[default]
     Block,
     /// Look without pause: a whole core, for the shortest wake.
     Spin,
-    /// Look without pause for [`Policy::STAY_AWAKE`], then sleep.
-    Adaptive,
+    /// Look without pause around the time when a ring is due, if rings come close enough to each
+    /// other, and sleep otherwise. Of all waiters of a robot at most as many look at a time as the
+    /// machine has cores, less one; the others sleep.
+    Adaptive {
+        /// The longest time after a ring to look for the next one. Rings that are farther apart
+        /// are slept for.
+        longest_spin: Duration,
+    },
 }
 
 impl Policy {
-    /// How long `Adaptive` looks without pause before it sleeps.
-    pub const STAY_AWAKE: Duration = Duration::from_micros(50);
+    /// `Adaptive` with a bound that takes in sensor frames a millisecond apart.
+    pub const ADAPTIVE: Self = Self::Adaptive {
+        longest_spin: Duration::from_millis(2),
+    };
 }
 
 impl fmt::Display for Policy {
@@ -33,7 +43,7 @@ impl fmt::Display for Policy {
         formatter.write_str(match self {
             Self::Block => "block",
             Self::Spin => "spin",
-            Self::Adaptive => "adaptive",
+            Self::Adaptive { .. } => "adaptive",
         })
     }
 }
@@ -50,7 +60,7 @@ impl FromStr for Policy {
         match text {
             "block" => Ok(Self::Block),
             "spin" => Ok(Self::Spin),
-            "adaptive" => Ok(Self::Adaptive),
+            "adaptive" => Ok(Self::ADAPTIVE),
             other => Err(PolicyError(other.to_owned())),
         }
     }
@@ -66,11 +76,28 @@ pub enum Wake {
     TimedOut,
 }
 
-/// What a service that acts on topics waits on; stays in the thread that made it.
+/// Looks between two of the clock: reading it costs as much as some looks.
+const LOOKS: u32 = 64;
+
+/// What a service that acts on topics waits on: one for all of them. It stays in the thread that
+/// made it.
 pub struct Waiter {
     bell: Bell,
     policy: Policy,
     role: Role,
+    adaptive: RefCell<Adaptive>,
+    sleeps: Cell<u64>,
+}
+
+/// What `Policy::Adaptive` keeps.
+struct Adaptive {
+    pace: Pace,
+    /// How many of a board may look without pause.
+    limit: usize,
+    /// This one is among them.
+    spinning: bool,
+    /// It had rung before anybody looked at the clock.
+    untimed: bool,
 }
 
 impl Waiter {
@@ -79,48 +106,185 @@ impl Waiter {
         if !is_actor(role) {
             return Err(PortError::NotAnActor { role });
         }
+        let longest_spin = match policy {
+            Policy::Adaptive { longest_spin } => longest_spin,
+            Policy::Block | Policy::Spin => Duration::ZERO,
+        };
         Ok(Self {
             bell: Bell::hang(bus)?,
             policy,
             role,
+            adaptive: RefCell::new(Adaptive {
+                pace: Pace::new(nanoseconds(longest_spin)),
+                limit: cores().saturating_sub(1),
+                spinning: false,
+                untimed: false,
+            }),
+            sleeps: Cell::new(0),
         })
     }
 
     /// Waits until rung, at most `timeout` of real time (see [`crate::Clock::real`]).
     pub fn wait(&self, timeout: Duration) -> Wake {
-        let rung = match self.policy {
-            Policy::Block => self.bell.wait(timeout),
-            Policy::Spin => self.look(timeout),
-            Policy::Adaptive => {
-                let awake = timeout.min(Policy::STAY_AWAKE);
-                self.look(awake) || (timeout > awake && self.bell.wait(timeout - awake))
-            }
-        };
-        if rung { Wake::Rung } else { Wake::TimedOut }
+        if self.wait_while_not(timeout, || self.bell.rung()) {
+            Wake::Rung
+        } else {
+            Wake::TimedOut
+        }
+    }
+
+    /// Waits until `look` finds something, at most `timeout` of real time, and returns that. A
+    /// ring for which it finds nothing also ends the wait, with `None`.
+    ///
+    /// For a thread that reads one topic: it is the faster way where the waiter spins, because the
+    /// sample itself is looked for and not the ring that follows it. `look` should be short, such
+    /// as one [`crate::Subscriber::receive`].
+    pub fn wait_for<R>(&self, timeout: Duration, mut look: impl FnMut() -> Option<R>) -> Option<R> {
+        let mut found = None;
+        self.wait_while_not(timeout, || {
+            found = look();
+            found.is_some() || self.bell.rung()
+        });
+        // The ring that ended the wait has been noticed, so what it was for is there.
+        found.or_else(look)
+    }
+
+    /// How many times it has gone to sleep: each is a system call, and one for who wakes it.
+    pub fn sleeps(&self) -> u64 {
+        self.sleeps.get()
     }
 
     /// What wakes this waiter from other threads of the process.
     ///
     /// # Errors
-    /// No resources.
+    /// None at present.
     pub fn ringer(&self) -> Result<Ringer, PortError> {
         Ok(Ringer {
-            rope: self.bell.inside_rope(self.role)?,
+            rope: self.bell.inside_rope(),
         })
     }
 
-    fn look(&self, timeout: Duration) -> bool {
-        let start = Instant::now();
-        loop {
-            if self.bell.rung() {
-                return true;
+    /// Waits until `done` or a ring.
+    #[inline]
+    fn wait_while_not(&self, timeout: Duration, mut done: impl FnMut() -> bool) -> bool {
+        if done() {
+            if let Policy::Adaptive { .. } = self.policy {
+                self.adaptive.borrow_mut().untimed = true;
             }
-            if start.elapsed() >= timeout {
-                return false;
+            return true;
+        }
+        if timeout.is_zero() {
+            return false;
+        }
+        match self.policy {
+            Policy::Block => self.sleep(timeout),
+            Policy::Spin => look_for(timeout, done),
+            Policy::Adaptive { .. } => {
+                self.adapt(&mut self.adaptive.borrow_mut(), timeout, &mut done)
             }
-            core::hint::spin_loop();
         }
     }
+
+    fn adapt(
+        &self,
+        this: &mut Adaptive,
+        timeout: Duration,
+        done: &mut impl FnMut() -> bool,
+    ) -> bool {
+        if this.spinning && this.pace.is_quick() && look(done) {
+            this.untimed = true;
+            return true;
+        }
+        let now = Clock::monotonic_ns();
+        let deadline = now.saturating_add(nanoseconds(timeout));
+        if core::mem::take(&mut this.untimed) {
+            this.pace.touched(now);
+        }
+        if let Plan::Look { from, until } = this.pace.plan(now)
+            && self.may_spin(this)
+        {
+            let from = from.min(deadline);
+            if from > now && self.sleep(Duration::from_nanos(from - now)) {
+                this.pace.rung(Clock::monotonic_ns());
+                return true;
+            }
+            let end = until.min(deadline);
+            loop {
+                let found = look(done);
+                let now = Clock::monotonic_ns();
+                if found {
+                    this.pace.caught();
+                    this.pace.rung(now);
+                    return true;
+                }
+                if now >= end {
+                    break;
+                }
+            }
+            if deadline <= end {
+                return false;
+            }
+            this.pace.in_vain();
+        }
+        self.stop_spinning(this);
+        let left = deadline.saturating_sub(Clock::monotonic_ns());
+        let rung = left > 0 && self.sleep(Duration::from_nanos(left));
+        if rung {
+            this.pace.rung(Clock::monotonic_ns());
+        }
+        rung
+    }
+
+    fn may_spin(&self, this: &mut Adaptive) -> bool {
+        if !this.spinning {
+            this.spinning = self.bell.may_spin(this.limit);
+        }
+        this.spinning
+    }
+
+    fn stop_spinning(&self, this: &mut Adaptive) {
+        if core::mem::take(&mut this.spinning) {
+            self.bell.stop_spinning();
+        }
+    }
+
+    fn sleep(&self, timeout: Duration) -> bool {
+        self.sleeps.set(self.sleeps.get() + 1);
+        self.bell.sleep(timeout)
+    }
+}
+
+/// Looks some times, without the clock.
+#[inline]
+fn look(done: &mut impl FnMut() -> bool) -> bool {
+    for _ in 0..LOOKS {
+        if done() {
+            return true;
+        }
+        core::hint::spin_loop();
+    }
+    false
+}
+
+/// Looks until there is something, at most `timeout`.
+#[inline]
+fn look_for(timeout: Duration, mut done: impl FnMut() -> bool) -> bool {
+    let mut end = None;
+    loop {
+        if look(&mut done) {
+            return true;
+        }
+        // The clock is first read when it has taken a while, so a quick ring costs no reading.
+        let now = Clock::monotonic_ns();
+        let end = *end.get_or_insert_with(|| now.saturating_add(nanoseconds(timeout)));
+        if now >= end {
+            return false;
+        }
+    }
+}
+
+fn nanoseconds(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }
 
 impl fmt::Debug for Waiter {
@@ -156,13 +320,21 @@ fn is_actor(role: Role) -> bool {
     BridgeRequest::ACTOR == role || TOPICS.iter().any(|topic| topic.qos.actors.contains(&role))
 }
 
+/// The machine's cores that run, whichever of them this thread may use.
+#[allow(unsafe_code)]
+fn cores() -> usize {
+    // SAFETY: it takes a number and returns one.
+    let cores = unsafe { libc::sysconf(libc::_SC_NPROCESSORS_ONLN) };
+    usize::try_from(cores).unwrap_or(1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn policies_are_read_as_they_are_written() {
-        for policy in [Policy::Block, Policy::Spin, Policy::Adaptive] {
+        for policy in [Policy::Block, Policy::Spin, Policy::ADAPTIVE] {
             assert_eq!(policy.to_string().parse(), Ok(policy));
         }
         let error = "busy".parse::<Policy>().unwrap_err().to_string();

@@ -10,7 +10,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Policy, Wake};
+use lager_ports::{Bus, BusConfig, Cause, Policy, Wake};
 use lager_topics::{LinkHealth, Role, SensorLine, SteeringCommand};
 
 struct Counting;
@@ -73,7 +73,7 @@ fn nothing_is_allocated_per_frame() {
         root: Some(root.clone()),
         ..BusConfig::default()
     };
-    for policy in [Policy::Block, Policy::Spin, Policy::Adaptive] {
+    for policy in [Policy::Block, Policy::Spin, Policy::ADAPTIVE] {
         exchange(&config, policy);
     }
     std::fs::remove_dir_all(root).unwrap();
@@ -102,10 +102,10 @@ fn exchange(config: &BusConfig, policy: Policy) {
     let frame = || {
         let mut frame = line_out.loan().unwrap();
         frame.link_epoch += 1;
-        frame.source_time_ns(5);
+        frame.cause(Cause::event(5));
         frame.send().unwrap();
     };
-    let order = || orders.send(5, Default::default()).unwrap();
+    let order = || orders.send(Cause::event(5), Default::default()).unwrap();
     // As many as may be open at a time; none was open beside another during start-up.
     let unsent = || drop((orders.loan().unwrap(), orders.loan().unwrap()));
     let mut receive = || {
@@ -120,10 +120,12 @@ fn exchange(config: &BusConfig, policy: Policy) {
         health_out.tick();
         assert_eq!(waiter.wait(Duration::from_micros(100)), Wake::TimedOut);
         assert_eq!(waiter.wait(Duration::ZERO), Wake::TimedOut);
+        let mut look = || line.receive().unwrap().map(drop);
+        assert_eq!(waiter.wait_for(Duration::from_micros(10), &mut look), None);
     };
 
     // Start-up: the ends meet, and their streams become known.
-    health_out.send(0, Default::default()).unwrap();
+    health_out.send(Cause::OWN, Default::default()).unwrap();
     frame();
     receive();
     order();

@@ -28,10 +28,10 @@ pub use role::{Role, UnknownRole};
 pub use schema::{Field, FieldInfo, Payload, Schema};
 pub use stamp::Stamp;
 pub use table::{
-    BridgeRequest, LinkHealth, LogThought, MissionEvent, MissionOrder, NavMap, NavRoute, NavStatus,
-    OBSERVERS, OperatorInput, Qos, Request, SERVICE_SLOTS, SensorDistance, SensorLine,
-    SteeringCommand, SteeringState, TOPICS, Topic, TopicEntry, TopicVisitor, TruthPose,
-    UnknownTopic, visit,
+    BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, NavMap,
+    NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request, SERVICE_SLOTS, SensorDistance,
+    SensorLine, SteeringCommand, SteeringState, TOPICS, Topic, TopicEntry, TopicVisitor, TruthPose,
+    UnknownTopic, by_id, visit,
 };
 pub use tag::{Coded, Tag};
 pub use text::Text;

@@ -3,25 +3,38 @@
 use crate::schema::payload;
 
 payload! {
-    /// When and by whom a sample was published, and which one of its stream it is.
+    /// When, why and by whom a sample was published, and which one of its stream it is.
     ///
     /// A stream is `(writer, epoch)`: one publisher's life. Its sequence starts at 0 and has no
     /// gaps, so a reader can count what it missed without knowing the payload; a restarted
     /// writer has a new epoch and is a new stream, not a loss. Times are real nanoseconds of
     /// `CLOCK_MONOTONIC`, comparable between processes of one machine.
-    pub struct Stamp: 40 bytes {
+    ///
+    /// A sample that follows from another one carries the way from there, stage by stage:
+    ///
+    /// ```text
+    ///  bytes read        published        received         published
+    ///  source_time --> cause_publish --> cause_receive --> publish_time
+    ///     |   the cause's writer |  its wake-up |  this writer  |
+    /// ```
+    pub struct Stamp: 56 bytes {
         /// Number of the sample in its stream, from 0.
         pub sequence: u64,
-        /// When the event happened that the sample reports, in ns.
+        /// When the event happened that the sample reports, in ns. A sample that follows from
+        /// another one has that one's.
         pub source_time_ns: u64,
+        /// When the sample from which this one follows was published, in ns; 0 = from none.
+        pub cause_publish_time_ns: u64,
+        /// When this sample's writer received it, in ns; 0 = from none.
+        pub cause_receive_time_ns: u64,
         /// When the sample was handed to the bus, in ns.
         pub publish_time_ns: u64,
         /// When the publisher was made, in ns.
         pub epoch: u64,
         /// Process id of the writer.
         pub writer: u32,
-        /// Always 0.
-        #[serde(skip)]
-        pub reserved: u32,
+        /// [`Topic::ID`](crate::Topic::ID) of the sample from which this one follows; 0 = from
+        /// none.
+        pub cause_topic: u32,
     }
 }

@@ -4,9 +4,10 @@
 
 use core::fmt;
 
+use crate::hash;
 use crate::payloads::{
-    Answer, Ask, DistanceFrame, Event, Health, Input, LineFrame, NavigatorStatus, Order, Route,
-    SteeringOrder, SteeringReport, Thought, Truth, WarehouseMap,
+    Answer, Ask, DistanceFrame, Event, Health, Input, LineFrame, NavigatorStatus, Order,
+    PathLatency, Route, SteeringOrder, SteeringReport, Thought, Truth, WarehouseMap,
 };
 use crate::role::Role;
 use crate::schema::{FieldInfo, Payload, Schema};
@@ -56,12 +57,29 @@ impl Qos {
 pub trait Topic: 'static {
     /// The name behind `lager/<robot>/`.
     const NAME: &'static str;
+    /// The name as a number, for stamps: never 0, and different for each topic of the table.
+    const ID: u32 = id(Self::NAME);
     /// What is published.
     type Payload: Payload;
     /// How it is published.
     const QOS: Qos;
     /// One line for people.
     const SUMMARY: &'static str;
+}
+
+/// The number of a topic's name.
+const fn id(name: &str) -> u32 {
+    let hash = hash::bytes(hash::START, name.as_bytes());
+    // The upper half of FNV-1a is the better mixed one; 0 is kept for "no topic".
+    match (hash >> 32) as u32 {
+        0 => 1,
+        id => id,
+    }
+}
+
+/// The topic a stamp means by its `cause_topic`; `None` for 0 and for what is in no table.
+pub fn by_id(id: u32) -> Option<&'static TopicEntry> {
+    TOPICS.iter().find(|entry| entry.id == id)
 }
 
 /// A request as a type: `bus.client::<BridgeRequest>()`.
@@ -83,6 +101,8 @@ pub trait Request: 'static {
 pub struct TopicEntry {
     /// The name behind `lager/<robot>/`.
     pub name: &'static str,
+    /// The name as a number, as stamps carry it.
+    pub id: u32,
     /// The payload's name across processes and languages.
     pub type_name: &'static str,
     /// Hash of the payload's layout.
@@ -144,6 +164,7 @@ macro_rules! topics {
         pub const TOPICS: &[TopicEntry] = &[
             $( TopicEntry {
                 name: $name,
+                id: <$topic as Topic>::ID,
                 type_name: <$payload as Schema>::TYPE_NAME,
                 hash: <$payload as Schema>::HASH,
                 size: size_of::<$payload>(),
@@ -215,6 +236,10 @@ topics! {
     "What the services say in words.",
     { buffer: 64, history: 0, publishers: 8, actors: &[], republish: false };
 
+    LatencyPath = "latency/path", PathLatency,
+    "How long sensor frames take to become commands, stage by stage, once a second.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+
     TruthPose = "truth/pose", Truth,
     "The simulated world as it really is.",
     { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
@@ -260,14 +285,24 @@ mod tests {
     }
 
     #[test]
-    fn names_types_and_hashes_are_each_used_once() {
+    fn names_numbers_types_and_hashes_are_each_used_once() {
         for (index, entry) in TOPICS.iter().enumerate() {
             for other in &TOPICS[..index] {
                 assert_ne!(entry.name, other.name);
+                assert_ne!(entry.id, other.id);
                 assert_ne!(entry.type_name, other.type_name);
                 assert_ne!(entry.hash, other.hash);
             }
         }
+    }
+
+    #[test]
+    fn a_stamp_names_its_cause_by_number() {
+        for entry in TOPICS {
+            assert_eq!(by_id(entry.id).map(|found| found.name), Some(entry.name));
+        }
+        assert_eq!(SensorLine::ID, TOPICS[0].id);
+        assert!(by_id(0).is_none());
     }
 
     #[test]

@@ -98,19 +98,33 @@ impl Decoder {
     /// Takes the next byte and gives the packet that it completes, if any.
     #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Packet> {
+        match self.version {
+            Version::One => self.push_one(byte),
+            Version::Original => {
+                self.keep(byte);
+                self.examine_original()
+            }
+        }
+    }
+
+    /// The same for a decoder of version 1, by name: so the original's rules take no room on the boards.
+    #[inline]
+    pub(crate) fn push_one(&mut self, byte: u8) -> Option<Packet> {
+        self.keep(byte);
+        match self.length {
+            1 | 2 => {
+                self.check_header();
+                None
+            }
+            LENGTH_BYTE.. => self.examine_window(),
+            _ => None,
+        }
+    }
+
+    #[inline]
+    fn keep(&mut self, byte: u8) {
         self.buffer[usize::from(self.length)] = byte;
         self.length += 1;
-        match self.version {
-            Version::One => match self.length {
-                1 | 2 => {
-                    self.check_header();
-                    None
-                }
-                LENGTH_BYTE.. => self.examine_window(),
-                _ => None,
-            },
-            Version::Original => self.examine_original(),
-        }
     }
 
     /// Forgets an unfinished packet; its bytes count as skipped.

@@ -31,6 +31,7 @@ mod text;
 
 pub use board::{ArmData, BoardStatus};
 pub use command::{ArmCommand, Command, WheelCommand};
+pub use crc::checksum;
 pub use decoder::{Decoder, DecoderCounters};
 pub use handshake::{Callsign, Handshake, ResetCause, SynAck, Version};
 pub use line::{Centimetres, LineBits, LineState};

@@ -1,9 +1,12 @@
 //! What a board must offer to the code that decides.
 //!
 //! The traits stand apart so that decisions never name a pin (O7). Implementations move bits and bytes and
-//! decide nothing; none of the calls may wait.
+//! decide nothing. No call waits for anything from outside; reading a sensor takes as long as its conversion.
 
 use lager_wire::ResetCause;
+
+/// How many bytes of EEPROM the boards use.
+pub const EEPROM_LENGTH: u8 = 64;
 
 /// What both boards have: a clock, the UART to the Pi, a watchdog.
 pub trait Board {
@@ -24,21 +27,31 @@ pub trait Board {
 
     /// Tells the watchdog that the loop is alive.
     fn kick_watchdog(&mut self);
+
+    /// A byte of the EEPROM, 0..[`EEPROM_LENGTH`]; 255 where nothing was ever written. Asked for before the
+    /// first write only.
+    fn eeprom_read(&self, address: u8) -> u8;
+
+    /// Begins to write a byte of the EEPROM, which keeps it without power; `false`, and nothing happens,
+    /// while the one before is being written (some milliseconds).
+    fn eeprom_write(&mut self, address: u8, value: u8) -> bool;
 }
 
 /// The sensor board: line sensors, IR ranger, the sending end of ExDe.
 pub trait SensorBoard: Board {
-    /// One line sensor, 0 = leftmost ..= 10 = rightmost; a high value is tape (S6).
+    /// One line sensor, 0 = leftmost ..= 10 = rightmost; a high value is tape (S6). They are read in order,
+    /// so a board may prepare the next one.
     fn read_line_sensor(&mut self, channel: u8) -> u8;
 
     /// The IR ranger, 0..=1023 for 0..5 V.
     fn read_ir(&mut self) -> u16;
 
-    /// Sets the levels of the data and sync wires.
-    fn set_exde(&mut self, data: bool, sync: bool);
+    /// Begins to send a word to the steering board; it goes on beside everything else. `false`, and nothing
+    /// happens, while another is under way or nobody has answered yet.
+    fn exde_send(&mut self, word: u16) -> bool;
 
-    /// Whether a return sync was seen since the last call.
-    fn exde_return(&mut self) -> bool;
+    /// Whether bits of a word are still to be sent.
+    fn exde_is_sending(&self) -> bool;
 }
 
 /// The steering board: two motor drivers, the arm's servos, the receiving end of ExDe.
@@ -46,11 +59,11 @@ pub trait SteeringBoard: Board {
     /// Sets both motor drivers.
     fn set_motors(&mut self, left: Motor, right: Motor);
 
-    /// The oldest bit sampled at a rise of sync and not yet read: the level on data, and when it was.
-    fn exde_bit(&mut self) -> Option<(bool, u32)>;
+    /// The oldest word received and not yet read, and when its last bit came.
+    fn exde_word(&mut self) -> Option<(u16, u32)>;
 
-    /// Sends one pulse on the return sync wire.
-    fn pulse_exde_return(&mut self);
+    /// Words lost to missing pulses, and disturbing pulses; stays at 255.
+    fn exde_errors(&self) -> u8;
 
     /// Queues bytes to the servos, all or none; whether they were queued. The board mutes the echo (AMB-26).
     fn servo_write(&mut self, bytes: &[u8]) -> bool;

@@ -60,6 +60,11 @@ impl Calibration {
         });
     }
 
+    /// The thresholds in force.
+    pub(crate) fn thresholds(&self) -> &[u8; CHANNELS] {
+        &self.thresholds
+    }
+
     pub(crate) fn is_running(&self) -> bool {
         self.watch.is_some()
     }

@@ -16,6 +16,8 @@
 
 use lager_wire::Centimetres;
 
+use crate::divide::divide;
+
 /// A Sharp ranger. The original does not name its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum IrModel {
@@ -98,7 +100,7 @@ impl IrModel {
         let Some(pair) = table.windows(2).find(|pair| adc >= pair[1].adc) else {
             return Centimetres::NONE;
         };
-        let centimetres = (between(&pair[0], &pair[1], adc) + 5) / 10;
+        let centimetres = between(&pair[0], &pair[1], adc);
         match u8::try_from(centimetres) {
             Ok(centimetres) if centimetres <= self.most_cm() => Centimetres(centimetres),
             _ => Centimetres::NONE,
@@ -114,11 +116,14 @@ impl IrModel {
     }
 }
 
-/// Millimetres between two neighbouring points, by the inverse distance.
+/// Centimetres between two neighbouring points, by the inverse distance.
 fn between(near: &Point, far: &Point, adc: u16) -> u32 {
     let (near_mm, far_mm) = (u32::from(near.millimetres), u32::from(far.millimetres));
     let from_near = u32::from(near.adc - adc);
     let from_far = u32::from(adc - far.adc);
-    let divisor = far_mm * from_far + near_mm * from_near;
-    (near_mm * far_mm * (from_near + from_far) + divisor / 2) / divisor
+    let divisor = 10 * (far_mm * from_far + near_mm * from_near);
+    divide(
+        near_mm * far_mm * (from_near + from_far) + divisor / 2,
+        divisor,
+    )
 }

@@ -23,6 +23,7 @@
 pub mod arm;
 mod board;
 mod calibration;
+mod divide;
 mod failsafe;
 pub mod ir;
 pub mod line;
@@ -31,14 +32,17 @@ mod outbox;
 pub mod pd;
 pub mod register;
 mod replies;
+mod reset;
 mod sensor;
 mod servo_bus;
 mod steering;
+mod store;
 mod time;
 pub mod turn;
 mod wheels;
 
-pub use board::{Board, Motor, SensorBoard, SteeringBoard};
+pub use board::{Board, EEPROM_LENGTH, Motor, SensorBoard, SteeringBoard};
+pub use reset::reset_cause;
 pub use sensor::{SensorConfig, SensorUnit};
 pub use steering::{SteeringConfig, SteeringUnit};
 
@@ -49,5 +53,12 @@ pub const PWM_STANDARD: u8 = 100;
 /// and the pause a USB adapter makes between two of its frames.
 pub const PACKET_GAP_US: u32 = 3_000;
 
-/// How often a step looks again whether the UART has finished, in microseconds.
-const UART_POLL_US: u32 = 250;
+/// Bytes from the Pi that one step takes in at most: what its queue holds. Noise may come faster than it can be
+/// looked at, and the rest of the step must still be reached.
+const MOST_BYTES: u8 = 64;
+
+/// How often a step looks again whether the EEPROM takes the next byte, in microseconds.
+const EEPROM_POLL_US: u32 = 4_000;
+
+/// How often a step looks again whether the UART has finished, in microseconds; boards that know step at once.
+const UART_POLL_US: u32 = 500;

@@ -36,10 +36,12 @@ pub const ON_LINE_ERROR: i8 = 2;
 const LEFT_EDGE: u16 = 0b100_0000_0000;
 const LEFT_MARK: u16 = 0b111_1100_0000;
 const RIGHT_MARK: u16 = 0b000_0001_1111;
-/// Readings after a FourWay in which no tape at all still means that the line ended there: the
-/// sensors leave a bar one after the other, and what they show meanwhile is no line. 20 readings
-/// are 100 ms, 7 mm at cruise speed.
-const END_READINGS: u8 = 20;
+/// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the line
+/// ended there: the sensors leave a bar one after the other, and what they show meanwhile is no line.
+/// 100 ms are 7 mm at cruise speed.
+const END_US: u32 = 100_000;
+/// No reading counts for more than this: after a pause the readings before tell nothing about it.
+const LONGEST_READING_US: u32 = 20_000;
 const CENTRE: u16 = 0b000_0111_0000;
 
 /// What one reading of the sensors means.
@@ -62,8 +64,10 @@ pub fn centre_on_tape(bits: LineBits) -> bool {
 pub struct LineReader {
     /// The error reported last.
     error: i8,
-    /// For this many more readings of the line itself the FourWay before them may have been its end.
-    at_end: u8,
+    /// For this many more microseconds of the line itself the FourWay before may have been its end.
+    at_end_us: u32,
+    /// When the last reading was taken.
+    last_us: u32,
 }
 
 impl LineReader {
@@ -72,7 +76,8 @@ impl LineReader {
     pub const fn new() -> Self {
         Self {
             error: 0,
-            at_end: 0,
+            at_end_us: 0,
+            last_us: 0,
         }
     }
 
@@ -82,13 +87,15 @@ impl LineReader {
         self.error
     }
 
-    /// Takes in one reading of the sensors.
-    pub fn read(&mut self, bits: LineBits) -> Reading {
+    /// Takes in one reading of the sensors, taken at `at_us`.
+    pub fn read(&mut self, bits: LineBits, at_us: u32) -> Reading {
+        let since_us = at_us.wrapping_sub(self.last_us).min(LONGEST_READING_US);
+        self.last_us = at_us;
         let bits = LineBits::new(bits.0).0;
         let state = if bits == 0 {
             self.without_tape()
         } else {
-            self.with_tape(bits)
+            self.with_tape(bits, since_us)
         };
         Reading {
             state,
@@ -100,27 +107,27 @@ impl LineReader {
         if self.error.abs() > ON_LINE_ERROR {
             self.error = MAX_ERROR * self.error.signum();
         }
-        if self.at_end > 0 {
+        if self.at_end_us > 0 {
             LineState::DropStation
         } else {
             LineState::NotOnLine
         }
     }
 
-    fn with_tape(&mut self, bits: u16) -> LineState {
+    fn with_tape(&mut self, bits: u16, since_us: u32) -> LineState {
         let left = bits & LEFT_MARK == LEFT_MARK;
         let right = bits & RIGHT_MARK == RIGHT_MARK;
         match (left, right) {
             (true, true) => {
-                self.at_end = END_READINGS;
+                self.at_end_us = END_US;
                 LineState::FourWay
             }
             (true, false) => LineState::StationToLeft,
             (false, true) => LineState::StationToRight,
             (false, false) => {
                 let error = centroid(bits);
-                if self.at_end > 0 {
-                    self.at_end -= 1;
+                if self.at_end_us > 0 {
+                    self.at_end_us = self.at_end_us.saturating_sub(since_us);
                 } else {
                     self.error = error;
                 }
@@ -138,11 +145,13 @@ impl LineReader {
 fn centroid(bits: u16) -> i8 {
     let mut sum = 0_i8;
     let mut count = 0_i8;
-    for index in 0..LineBits::SENSORS {
-        if bits & LEFT_EDGE >> index != 0 {
-            sum += 2 * (index as i8 - 5);
+    let mut sensor = LEFT_EDGE;
+    for place in (-MAX_ERROR..=MAX_ERROR).step_by(2) {
+        if bits & sensor != 0 {
+            sum += place;
             count += 1;
         }
+        sensor >>= 1;
     }
     let size = (2 * sum.abs() + count) / (2 * count);
     size * sum.signum()

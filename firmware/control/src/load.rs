@@ -1,5 +1,7 @@
 //! How busy a board is: for its status report.
 
+use crate::divide::divide;
+
 /// Measures between two reports.
 #[derive(Debug, Clone)]
 pub(crate) struct Load {
@@ -29,9 +31,9 @@ impl Load {
 
     /// Load in percent and the longest pass in 0.1 ms, both since the last call.
     pub(crate) fn report(&mut self, now_us: u32) -> (u8, u8) {
-        let span = (now_us.wrapping_sub(self.since_us) / 100).max(1);
-        let percent = (self.busy_us / span).min(100) as u8;
-        let longest = u8::try_from(self.longest_us / 100).unwrap_or(u8::MAX);
+        let span = divide(now_us.wrapping_sub(self.since_us), 100).max(1);
+        let percent = divide(self.busy_us, span).min(100) as u8;
+        let longest = u8::try_from(divide(self.longest_us, 100)).unwrap_or(u8::MAX);
         *self = Self::new(now_us);
         (percent, longest)
     }

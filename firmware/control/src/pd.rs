@@ -10,6 +10,8 @@
 //!                         '--------- D: the newest sample at least 7.5 ms old
 //! ```
 
+use crate::divide::divide;
+
 /// Gains of the regulator, in duty steps per half sensor step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Gains {
@@ -100,8 +102,11 @@ impl Pd {
             return 0;
         };
         let change = i32::from(error) - i32::from(sample.error);
+        if change == 0 {
+            return 0;
+        }
         let scaled = change * i32::from(self.gains.d) * SPAN_US as i32;
-        rounded(scaled, age as i32) as i16
+        rounded(scaled, age) as i16
     }
 
     fn remember(&mut self, sample: Sample) {
@@ -112,6 +117,7 @@ impl Pd {
 }
 
 /// Quotient with halves rounded away from zero, so that left and right stay mirrored.
-fn rounded(dividend: i32, divisor: i32) -> i32 {
-    (dividend.abs() + divisor / 2) / divisor * dividend.signum()
+fn rounded(dividend: i32, divisor: u32) -> i32 {
+    let size = divide(dividend.unsigned_abs() + divisor / 2, divisor).cast_signed();
+    if dividend < 0 { -size } else { size }
 }

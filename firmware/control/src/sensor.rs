@@ -3,16 +3,15 @@
 //! ```text
 //!   every 5 ms, and not before everything of the last pass has left (S10):
 //!
-//!     read 11 line sensors --> FlipFlop --.-- line packet (raw line packet before it, if set)
+//!     read 11 line sensors --> ExDe word, every pass
+//!                          --> FlipFlop --.-- line packet (raw line packet before it, if set)
 //!                                         '-- read IR --> distance packet
-//!                          --> ExDe word, every pass
 //!                          --> board status, answers to settings, when due
 //! ```
 //!
 //! The two handshakes do not wait for each other: without the steering board the Pi is served, without the
-//! Pi the steering board is. Packets leave by interrupt, ExDe edge by edge with the steps (S4).
+//! Pi the steering board is. Packets and words leave by interrupt beside everything else (S4).
 
-use lager_exde::{Pins, Timing, Transmitter};
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
     BoardStatus, Callsign, LineBits, Payload, ResetCause, Setting, SettingKey, SettingReply,
@@ -24,8 +23,11 @@ use crate::ir::IrModel;
 use crate::line::LineReader;
 use crate::load::Load;
 use crate::replies::Replies;
+use crate::store::Store;
 use crate::time::{first, reached};
-use crate::{Board, PACKET_GAP_US, SensorBoard, UART_POLL_US, outbox::Outbox};
+use crate::{
+    Board, EEPROM_POLL_US, MOST_BYTES, PACKET_GAP_US, SensorBoard, UART_POLL_US, outbox::Outbox,
+};
 
 /// The sensor board's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +36,8 @@ pub struct SensorConfig {
     pub loop_period_us: u32,
     /// The IR ranger's model.
     pub ir_model: IrModel,
-    /// From this reading of each line sensor on there is tape, leftmost first.
+    /// From this reading of each line sensor on there is tape, leftmost first; in force until a calibration,
+    /// which is kept in EEPROM.
     pub thresholds: [u8; CHANNELS],
     /// From one board status to the next, in microseconds.
     pub status_period_us: u32,
@@ -42,21 +45,29 @@ pub struct SensorConfig {
     pub calibration_us: u32,
     /// Silence inside a packet after which it is given up, in microseconds.
     pub gap_us: u32,
-    /// Times of ExDe.
-    pub exde: Timing,
+}
+
+impl SensorConfig {
+    /// What the chip runs: pass after pass, as fast as packets and words leave at 500 000 Bd. The simulator's
+    /// robot takes ten times as long, which is enough to drive by and costs a tenth.
+    pub const FAST: Self = Self {
+        loop_period_us: 500,
+        ..Self::USUAL
+    };
+
+    const USUAL: Self = Self {
+        loop_period_us: 5_000,
+        ir_model: IrModel::Gp2y0a21,
+        thresholds: [128; CHANNELS],
+        status_period_us: 500_000,
+        calibration_us: 5_000_000,
+        gap_us: PACKET_GAP_US,
+    };
 }
 
 impl Default for SensorConfig {
     fn default() -> Self {
-        Self {
-            loop_period_us: 5_000,
-            ir_model: IrModel::default(),
-            thresholds: [128; CHANNELS],
-            status_period_us: 500_000,
-            calibration_us: 5_000_000,
-            gap_us: PACKET_GAP_US,
-            exde: Timing::STANDARD,
-        }
+        Self::USUAL
     }
 }
 
@@ -79,10 +90,9 @@ pub struct SensorUnit {
     outbox: Outbox,
     replies: Replies,
     refused: u8,
-    transmitter: Transmitter,
-    pins: Pins,
     reader: LineReader,
     calibration: Calibration,
+    store: Store<CHANNELS>,
     raw_line: bool,
     flip_flop: FlipFlop,
     pass_due_us: u32,
@@ -98,16 +108,16 @@ impl SensorUnit {
     pub fn new(board: &impl Board, config: SensorConfig) -> Self {
         let now_us = board.now_us();
         let reset = board.reset_cause();
+        let (store, thresholds) = Store::load(board);
         Self {
             reset,
             link: BoardLink::new(Callsign::Sensor, reset, config.gap_us),
             outbox: Outbox::new(),
             replies: Replies::new(),
             refused: 0,
-            transmitter: Transmitter::new(config.exde, now_us),
-            pins: Pins::default(),
             reader: LineReader::new(),
-            calibration: Calibration::new(config.thresholds),
+            calibration: Calibration::new(thresholds.unwrap_or(config.thresholds)),
+            store,
             raw_line: false,
             flip_flop: FlipFlop::Line,
             pass_due_us: now_us,
@@ -124,21 +134,21 @@ impl SensorUnit {
         let now_us = board.now_us();
         board.kick_watchdog();
         self.listen(board, now_us);
-        if board.exde_return() {
-            self.transmitter.on_return();
-        }
         self.ask_for_pi(board, now_us);
-        self.set_pins(board, now_us);
         self.outbox.flush(board);
         if reached(now_us, self.pass_due_us) && self.has_sent_all(board) {
             self.pass(board, now_us);
         }
+        self.store.poll(board);
         self.load.worked(now_us, board.now_us());
         self.next_due_us(board.now_us())
     }
 
     fn listen<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
-        while let Some(byte) = board.uart_read() {
+        for _ in 0..MOST_BYTES {
+            let Some(byte) = board.uart_read() else {
+                return;
+            };
             match self.link.push(byte, now_us) {
                 None => {}
                 Some(BoardEvent::Up) => self.status_due_us = now_us,
@@ -188,23 +198,17 @@ impl SensorUnit {
         }
     }
 
-    fn set_pins<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
-        let pins = self.transmitter.poll(now_us);
-        if pins != self.pins {
-            self.pins = pins;
-            board.set_exde(pins.data, pins.sync);
-        }
-    }
-
     fn has_sent_all<B: SensorBoard>(&self, board: &B) -> bool {
-        let word_sent = self.transmitter.is_ready() || !self.transmitter.is_up();
-        word_sent && self.outbox.is_empty() && board.uart_idle()
+        self.outbox.is_empty() && board.uart_idle() && !board.exde_is_sending()
     }
 
     fn pass<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
         self.note_pass(now_us);
         let bits = self.read_line(board);
-        let reading = self.reader.read(bits);
+        // The wheels wait for the word, so it leaves before anything else is thought about. Nobody to send to
+        // yet is no failure: the next pass has a newer word.
+        let _ = board.exde_send(bits.0);
+        let reading = self.reader.read(bits, now_us);
         self.finish_calibration(now_us);
         match self.flip_flop {
             FlipFlop::Line => {
@@ -222,11 +226,6 @@ impl SensorUnit {
         }
         self.send_rarer_things(now_us);
         self.outbox.flush(board);
-        // Reading the sensors takes time on the chip, and the word begins when it begins.
-        let begun_us = board.now_us();
-        if self.transmitter.start(bits.0, begun_us) {
-            self.set_pins(board, begun_us);
-        }
     }
 
     fn note_pass(&mut self, now_us: u32) {
@@ -260,6 +259,9 @@ impl SensorUnit {
         let Some(calibrated) = self.calibration.finish(now_us) else {
             return;
         };
+        if calibrated.channels > 0 {
+            self.store.save(*self.calibration.thresholds());
+        }
         let complete = usize::from(calibrated.channels) == CHANNELS;
         self.replies.push(SettingReply {
             key: SettingKey::Calibrate,
@@ -313,10 +315,11 @@ impl SensorUnit {
             .link
             .us_to_syn(now_us)
             .map(|us| now_us.wrapping_add(us));
-        for other_us in [Some(pass_us), syn_us, self.transmitter.next_due_us()]
-            .into_iter()
-            .flatten()
-        {
+        let save_us = self
+            .store
+            .is_saving()
+            .then(|| now_us.wrapping_add(EEPROM_POLL_US));
+        for other_us in [Some(pass_us), syn_us, save_us].into_iter().flatten() {
             due_us = first(now_us, due_us, other_us);
         }
         due_us

@@ -5,7 +5,7 @@
 //!   started ------------------------------------.
 //!      | first word: centre on tape             v      centre on tape
 //!      '--> leaving ------------------------> open ------------------> over
-//!             two words off tape in a row       '------- time is up ----^
+//!             off tape for 5 ms                 '------- time is up ----^
 //! ```
 //!
 //! Without words from the sensor board a turn is purely timed.
@@ -18,8 +18,9 @@ use crate::time::reached;
 /// A full turn at the standard duty takes twelve seconds (W4, `STANDARD_THREESIXTY`).
 pub const FULL_TURN_US: u32 = 12_000_000;
 
-/// Words without tape before a turn that began on tape may end on it.
-const WORDS_OFF: u8 = 2;
+/// How long the centre must be off the tape before a turn that began on tape may end on it: longer than a
+/// stain, and two words of a board that sends one every 5 ms.
+const OFF_US: u32 = 4_500;
 
 /// Which way a turn goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +54,10 @@ impl Angle {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Tape {
     Unknown,
-    Leaving { off: u8 },
+    /// `off_since_us` is when a word first showed no tape, with none that did since.
+    Leaving {
+        off_since_us: Option<u32>,
+    },
     Open,
     Found,
 }
@@ -83,13 +87,22 @@ impl Turn {
         self.way
     }
 
-    /// A word from the sensor board.
-    pub fn on_word(&mut self, bits: LineBits) {
+    /// A word from the sensor board that came at `at_us`.
+    pub fn on_word(&mut self, bits: LineBits, at_us: u32) {
         self.tape = match (self.tape, centre_on_tape(bits)) {
-            (Tape::Unknown | Tape::Leaving { .. }, true) => Tape::Leaving { off: 0 },
+            (Tape::Unknown | Tape::Leaving { .. }, true) => Tape::Leaving { off_since_us: None },
             (Tape::Unknown, false) => Tape::Open,
-            (Tape::Leaving { off }, false) if off + 1 < WORDS_OFF => Tape::Leaving { off: off + 1 },
-            (Tape::Leaving { .. } | Tape::Open, false) => Tape::Open,
+            (Tape::Leaving { off_since_us }, false) => {
+                let since_us = off_since_us.unwrap_or(at_us);
+                if at_us.wrapping_sub(since_us) < OFF_US {
+                    Tape::Leaving {
+                        off_since_us: Some(since_us),
+                    }
+                } else {
+                    Tape::Open
+                }
+            }
+            (Tape::Open, false) => Tape::Open,
             (Tape::Open | Tape::Found, true) | (Tape::Found, false) => Tape::Found,
         };
     }
@@ -116,8 +129,8 @@ mod tests {
 
     fn words(words: &[LineBits]) -> bool {
         let mut turn = Turn::new(Way::Left, Angle::Perpendicular, 0);
-        for word in words {
-            turn.on_word(*word);
+        for (word, at_us) in words.iter().zip((0..).step_by(5_000)) {
+            turn.on_word(*word, at_us);
         }
         turn.is_over(1)
     }
@@ -141,6 +154,23 @@ mod tests {
         assert!(!words(&[ASIDE]));
         assert!(words(&[ASIDE, LINE]));
         assert!(words(&[ASIDE, LINE, ASIDE]), "found stays found");
+    }
+
+    #[test]
+    fn how_often_words_come_does_not_matter() {
+        for period_us in [450, 5_000, 12_000_u32] {
+            let mut turn = Turn::new(Way::Left, Angle::Perpendicular, 0);
+            turn.on_word(LINE, 0);
+            // A stain: 4 ms without tape.
+            turn.on_word(ASIDE, period_us);
+            turn.on_word(ASIDE, period_us + 4_000);
+            turn.on_word(LINE, period_us + 4_400);
+            assert!(!turn.is_over(100_000), "{period_us}");
+            turn.on_word(ASIDE, 50_000);
+            turn.on_word(ASIDE, 50_000 + 4_500_u32.next_multiple_of(period_us));
+            turn.on_word(LINE, 70_000);
+            assert!(turn.is_over(100_000), "{period_us}");
+        }
     }
 
     #[test]

@@ -118,13 +118,13 @@ impl Wheels {
     }
 
     /// A word from the sensor board.
-    pub(crate) fn on_word(&mut self, bits: LineBits) {
+    pub(crate) fn on_word(&mut self, bits: LineBits, at_us: u32) {
         if let Mode::Turn {
             under_way: Some(turn),
             ..
         } = &mut self.mode
         {
-            turn.on_word(bits);
+            turn.on_word(bits, at_us);
         }
     }
 

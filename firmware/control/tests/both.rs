@@ -3,6 +3,7 @@
 mod support;
 
 use lager_control::{Motor, SensorConfig, SteeringConfig};
+use lager_exde::{Action, Receiver, Timing, Transmitter};
 use lager_wire::SteerFlags;
 use support::servos::Servos;
 use support::{Bench, SensorBench};
@@ -14,18 +15,33 @@ const FOLLOW: u8 = 3;
 struct Robot {
     sensor: SensorBench,
     steering: Bench,
-    high: bool,
+    sender: Transmitter,
+    /// What is left of the sender's wait; nothing while it is ready.
+    wait_us: Option<u16>,
+    receiver: Receiver,
+    /// Time since the last pulse, while no silence was told.
+    since_us: Option<u16>,
+    data: bool,
+    /// Words of the sensor board that were handed to the sender.
+    begun: usize,
     returns: usize,
-    /// Rises of sync the steering board does not get.
+    /// Pulses the steering board does not get.
     lose: usize,
 }
 
 impl Robot {
     fn new(now_us: u32) -> Self {
+        let mut sensor = SensorBench::boot(now_us, SensorConfig::default());
+        sensor.pins.word_us = 310;
         Self {
-            sensor: SensorBench::boot(now_us, SensorConfig::default()),
+            sensor,
             steering: Bench::boot(now_us, SteeringConfig::default(), Servos::at([512; 8])),
-            high: false,
+            sender: Transmitter::new(),
+            wait_us: Some(0),
+            receiver: Receiver::new(),
+            since_us: None,
+            data: false,
+            begun: 0,
             returns: 0,
             lose: 0,
         }
@@ -35,25 +51,70 @@ impl Robot {
         for _ in 0..span_ms * 100 {
             self.sensor.pins.now_us = self.sensor.pins.now_us.wrapping_add(10);
             self.sensor.step();
-            let (data, sync) = self.sensor.pins.exde;
-            if sync && !self.high {
-                if self.lose > 0 {
-                    self.lose -= 1;
-                } else {
-                    self.steering
-                        .pins
-                        .bits
-                        .push_back((data, self.sensor.pins.now_us));
-                }
-            }
-            self.high = sync;
+            self.move_wires();
+            self.steering.pins.exde_errors = self.receiver.errors();
             self.steering.run_us(10);
             self.steering.step();
-            if self.steering.pins.returns > self.returns {
-                self.returns = self.steering.pins.returns;
-                self.sensor.pins.returned = true;
+        }
+    }
+
+    /// Ten microseconds on the wires.
+    fn move_wires(&mut self) {
+        self.since_us = self.since_us.map(|us| us + 10);
+        if self.since_us == Some(Timing::STANDARD.idle_us) {
+            self.since_us = None;
+            if self.receiver.on_silence() {
+                self.returns += 1;
+                self.sender.on_return();
+                self.sensor.pins.answered = true;
             }
         }
+        let words = &self.sensor.pins.words;
+        let step = if words.len() > self.begun {
+            self.begun = words.len();
+            self.sender.start(words[self.begun - 1].1)
+        } else {
+            self.wait_us = self.wait_us.map(|us| us.saturating_sub(10));
+            (self.wait_us == Some(0)).then(|| self.sender.advance())
+        };
+        let Some(step) = step else { return };
+        self.wait_us = step.wait_us;
+        match step.action {
+            Action::Nothing => {}
+            Action::Place(level) => self.data = level,
+            Action::Release => self.data = false,
+            Action::Pulse if self.lose > 0 => self.lose -= 1,
+            Action::Pulse => {
+                let word = self
+                    .receiver
+                    .on_sync(self.data, self.since_us.unwrap_or(u16::MAX));
+                self.since_us = Some(0);
+                let now_us = self.sensor.pins.now_us;
+                self.steering
+                    .pins
+                    .words
+                    .extend(word.map(|word| (word, now_us)));
+            }
+        }
+    }
+
+    fn restart_sensor(&mut self) {
+        self.sensor = SensorBench::boot(self.sensor.pins.now_us, SensorConfig::default());
+        self.sensor.pins.word_us = 310;
+        self.sender = Transmitter::new();
+        self.wait_us = Some(0);
+        self.begun = 0;
+    }
+
+    fn restart_steering(&mut self) {
+        self.steering = Bench::boot(
+            self.sensor.pins.now_us,
+            SteeringConfig::default(),
+            Servos::at([512; 8]),
+        );
+        self.receiver = Receiver::new();
+        self.since_us = None;
+        self.returns = 0;
     }
 }
 
@@ -106,19 +167,13 @@ fn either_board_may_restart_alone() {
     robot.run_ms(60);
     robot.steering.command(FOLLOW);
     robot.run_ms(40);
-    let now_us = robot.sensor.pins.now_us;
-    robot.sensor = SensorBench::boot(now_us, SensorConfig::default());
+    robot.restart_sensor();
     robot.sensor.tape(MIDDLE);
     robot.run_ms(130);
     assert!(robot.steering.report().flags.contains(SteerFlags::EXDE_OK));
     assert_ne!(robot.steering.pins.motors.0, Motor::OFF);
 
-    robot.steering = Bench::boot(
-        robot.sensor.pins.now_us,
-        SteeringConfig::default(),
-        Servos::at([512; 8]),
-    );
-    robot.returns = 0;
+    robot.restart_steering();
     robot.run_ms(60);
     assert_eq!(
         robot.steering.pins.motors,

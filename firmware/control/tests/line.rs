@@ -18,7 +18,29 @@ fn mirrored_state(state: LineState) -> LineState {
 }
 
 fn read(bits: u16) -> Reading {
-    LineReader::new().read(LineBits(bits))
+    LineReader::new().read(LineBits(bits), 0)
+}
+
+/// A reader that is given a reading every `period_us`.
+struct Paced {
+    reader: LineReader,
+    period_us: u32,
+    now_us: u32,
+}
+
+impl Paced {
+    fn every(period_us: u32) -> Self {
+        Self {
+            reader: LineReader::new(),
+            period_us,
+            now_us: u32::MAX - 20_000,
+        }
+    }
+
+    fn read(&mut self, bits: u16) -> Reading {
+        self.now_us = self.now_us.wrapping_add(self.period_us);
+        self.reader.read(LineBits(bits), self.now_us)
+    }
 }
 
 #[test]
@@ -59,8 +81,8 @@ fn mirrored_pasts_mirror() {
             _ => (state >> 12) as u16 & 0x7FF,
         };
         let (a, b) = (
-            one.read(LineBits(bits)),
-            other.read(LineBits(mirrored(bits))),
+            one.read(LineBits(bits), 0),
+            other.read(LineBits(mirrored(bits)), 0),
         );
         assert_eq!(a.error, -b.error);
         assert_eq!(a.state, mirrored_state(b.state));
@@ -108,8 +130,8 @@ fn bits_above_the_sensors_mean_nothing() {
 fn a_mark_holds_the_error() {
     for mark in [0b11111110000, 0b00000011111, 0b11111111111] {
         let mut reader = LineReader::new();
-        reader.read(LineBits(0b00000011000));
-        assert_eq!(reader.read(LineBits(mark)).error, 3);
+        reader.read(LineBits(0b00000011000), 0);
+        assert_eq!(reader.read(LineBits(mark), 5_000).error, 3);
         assert_eq!(reader.error(), 3);
     }
 }
@@ -125,9 +147,9 @@ fn a_line_that_left_on_a_side_is_remembered_there() {
         (0b00001000000, -2),
     ] {
         let mut reader = LineReader::new();
-        reader.read(LineBits(last));
+        reader.read(LineBits(last), 0);
         for _ in 0..3 {
-            let reading = reader.read(LineBits(0));
+            let reading = reader.read(LineBits(0), 5_000);
             assert_eq!(
                 reading,
                 Reading {
@@ -142,8 +164,8 @@ fn a_line_that_left_on_a_side_is_remembered_there() {
 
 #[test]
 fn the_end_is_latched_until_tape_is_seen() {
-    let mut reader = LineReader::new();
-    let mut state = |bits| reader.read(LineBits(bits)).state;
+    let mut reader = Paced::every(5_000);
+    let mut state = |bits| reader.read(bits).state;
     assert_eq!(state(0b00000100000), LineState::OnLine);
     assert_eq!(state(0), LineState::NotOnLine);
     assert_eq!(state(0x7FF), LineState::FourWay);
@@ -163,6 +185,23 @@ fn the_end_is_latched_until_tape_is_seen() {
         LineState::NotOnLine,
         "a crossing, and a line that ended later"
     );
+}
+
+#[test]
+fn how_long_the_end_is_latched_does_not_hang_on_the_pace() {
+    for period_us in [450, 5_000, 12_000] {
+        let mut reader = Paced::every(period_us);
+        reader.read(0b00000100000);
+        reader.read(0x7FF);
+        for _ in 0..100_000 / period_us - 1 {
+            reader.read(0b00000000001);
+        }
+        assert_eq!(reader.read(0).state, LineState::DropStation, "{period_us}");
+        for _ in 0..3 {
+            reader.read(0b00000100000);
+        }
+        assert_eq!(reader.read(0).state, LineState::NotOnLine, "{period_us}");
+    }
 }
 
 #[test]
@@ -217,7 +256,7 @@ fn across(right: f64, left: f64) -> Tape {
 /// left in mm, and lists every state in order, repetitions left out.
 fn sweep(track: &[Tape], degrees: f64, offset: f64) -> Vec<LineState> {
     let (sin, cos) = degrees.to_radians().sin_cos();
-    let mut reader = LineReader::new();
+    let mut reader = Paced::every(5_000);
     let mut states = Vec::new();
     // The array passes x = 0 at the offset; 73 mm/s and 5 ms a reading are 0.37 mm.
     let mut s = -70.0;
@@ -230,7 +269,7 @@ fn sweep(track: &[Tape], degrees: f64, offset: f64) -> Vec<LineState> {
             let tape = track.iter().any(|tape| tape.covers(px, py));
             bits = bits << 1 | u16::from(tape);
         }
-        let state = reader.read(LineBits(bits)).state;
+        let state = reader.read(bits).state;
         if states.last() != Some(&state) {
             states.push(state);
         }

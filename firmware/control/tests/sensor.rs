@@ -3,7 +3,6 @@
 mod support;
 
 use lager_control::SensorConfig;
-use lager_exde::{Receiver, Timing};
 use lager_wire::{
     Callsign, Centimetres, LineBits, LineState, Payload, ResetCause, SettingKey, SettingReply,
     SettingStatus, SteerCommand,
@@ -19,23 +18,6 @@ fn kinds(bench: &SensorBench) -> Vec<u8> {
         .iter()
         .map(|(_, packet)| packet.payload.kind().code())
         .collect()
-}
-
-/// What a receiver makes of the wires' changes.
-fn words(log: &[(u32, bool, bool)]) -> Vec<(u32, u16)> {
-    let mut receiver = Receiver::new(Timing::STANDARD);
-    // Its first pulse is the handshake.
-    receiver.on_sync(false, log[0].0.wrapping_sub(1_000_000));
-    let mut words = Vec::new();
-    let mut high = false;
-    for (at, data, sync) in log {
-        if *sync && !high {
-            words.extend(receiver.on_sync(*data, *at).map(|word| (*at, word)));
-        }
-        high = *sync;
-    }
-    assert_eq!(receiver.errors(), 0);
-    words
 }
 
 fn replies(bench: &SensorBench) -> Vec<SettingReply> {
@@ -96,7 +78,7 @@ fn the_steering_board_gets_every_reading_as_a_word() {
         }
     }
     bench.run_ms(4);
-    let words = words(&bench.pins.exde_log);
+    let words = &bench.pins.words;
     let got: Vec<u16> = words.iter().map(|(_, word)| *word).collect();
     assert_eq!(got[..sent.len()], sent);
     for pair in words.windows(2) {
@@ -112,12 +94,12 @@ fn on_a_slow_line_the_loop_waits_until_everything_is_sent() {
     bench.tape(MIDDLE);
     bench.run_ms(100);
     bench.pi.packets.clear();
-    bench.pins.exde_log.clear();
+    bench.pins.words.clear();
     bench.pins.uart.backlog.clear();
     bench.run_ms(2_000);
     let packets = bench.pi.packets.len();
     assert!((165..=175).contains(&packets), "{packets}");
-    let words = words(&bench.pins.exde_log).len();
+    let words = bench.pins.words.len();
     assert!((160..=175).contains(&words), "one word a pass: {words}");
     let mut pass_us = None;
     for (at_us, busy_us) in &bench.pins.uart.backlog {
@@ -137,23 +119,20 @@ fn neither_handshake_waits_for_the_other() {
         bench.pi.packets.len() > 10,
         "the Pi is served without the steering board"
     );
-    assert!(
-        bench.pins.exde_log.iter().all(|(_, data, _)| !data),
-        "no data before its answer"
-    );
+    assert!(bench.pins.words.is_empty(), "no data before its answer");
 
     let mut bench = SensorBench::boot(0, SensorConfig::default());
     bench.pi.answers = false;
     bench.tape(MIDDLE);
     bench.run_ms(10);
-    bench.pins.returned = true;
+    bench.pins.answered = true;
     bench.step();
     bench.run_ms(30);
-    bench.pins.exde_log.clear();
+    bench.pins.words.clear();
     bench.run_ms(100);
     assert!(bench.pi.packets.is_empty());
     assert!(
-        words(&bench.pins.exde_log).len() >= 19,
+        bench.pins.words.len() >= 19,
         "the steering board without the Pi"
     );
 }
@@ -352,23 +331,57 @@ fn a_step_more_or_less_changes_nothing() {
                 bench.step();
             }
         }
-        (bench.pins.exde_log, bench.pi.packets)
+        (bench.pins.words, bench.pi.packets)
     };
     assert_eq!(run(false), run(true));
 }
 
 #[test]
-fn a_late_step_stretches_a_word_and_keeps_it() {
-    let mut bench = SensorBench::ready(SensorConfig::default());
-    bench.tape(0b101_1001_0111);
-    // The board is stepped every 90 us only, whatever it asks for.
-    for _ in 0..600 {
-        bench.pins.now_us = bench.pins.now_us.wrapping_add(90);
-        bench.step();
+fn a_pass_waits_until_the_word_before_has_left() {
+    let mut bench = SensorBench::ready(SensorConfig {
+        loop_period_us: 450,
+        ..SensorConfig::default()
+    });
+    bench.tape(MIDDLE);
+    bench.pins.word_us = 7_000;
+    bench.run_ms(1_000);
+    for pair in bench.pins.words.windows(2) {
+        let apart_us = pair[1].0.wrapping_sub(pair[0].0);
+        assert!((7_000..7_500).contains(&apart_us), "{apart_us}");
     }
-    let words = words(&bench.pins.exde_log);
-    assert!(words.len() >= 7, "{}", words.len());
-    assert!(words[1..].iter().all(|(_, word)| *word == 0b101_1001_0111));
+    assert!(bench.pins.words.len() > 130);
+}
+
+#[test]
+fn a_calibration_outlives_the_power_and_an_empty_one_is_not_kept() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.set(SettingKey::Calibrate, 1, 1);
+    bench.run_ms(5_100);
+    assert_eq!(bench.pins.eeprom, [255; 64], "nothing was seen");
+    bench.set(SettingKey::Calibrate, 2, 1);
+    for reading in [30, 110] {
+        bench.pins.line = [reading; 11];
+        bench.run_ms(2_600);
+    }
+    bench.run_ms(200);
+    let eeprom = bench.pins.eeprom;
+    assert_eq!(eeprom[2..13], [70; 11], "the middle, for every sensor");
+
+    let lines = |eeprom| {
+        let mut bench = SensorBench::boot(0, SensorConfig::default());
+        bench.pins.eeprom = eeprom;
+        bench.unit = lager_control::SensorUnit::new(&bench.pins, SensorConfig::default());
+        bench.pins.line = [30, 30, 30, 30, 30, 71, 30, 30, 30, 30, 30];
+        bench.run_ms(50);
+        bench.pi.all(|payload| match payload {
+            Payload::Line(state) => Some(state),
+            _ => None,
+        })
+    };
+    assert_eq!(lines(eeprom).last().unwrap().1, LineState::OnLine);
+    let mut damaged = eeprom;
+    damaged[5] ^= 4;
+    assert_eq!(lines(damaged).last().unwrap().1, LineState::NotOnLine);
 }
 
 #[test]

@@ -298,3 +298,40 @@ fn settings_sent_together_are_all_answered() {
         ]
     );
 }
+
+#[test]
+fn gains_outlive_the_power() {
+    let mut bench = Bench::ready();
+    bench.set(SettingKey::GainP, 1, 9);
+    bench.set(SettingKey::GainD, 2, 7);
+    bench.run_ms(200);
+    let eeprom = bench.pins.eeprom;
+
+    let mut bench = Bench::boot(0, SteeringConfig::default(), Servos::at([512; 8]));
+    bench.pins.eeprom = eeprom;
+    bench.unit = lager_control::SteeringUnit::new(&bench.pins, SteeringConfig::default());
+    bench.run_ms(200);
+    // What is not allowed is answered with the value in force.
+    bench.set(SettingKey::GainP, 3, -1);
+    bench.set(SettingKey::GainD, 4, -1);
+    bench.run_ms(20);
+    let values = bench.pi.all(|payload| match payload {
+        Payload::SettingReply(reply) => Some(reply.value),
+        _ => None,
+    });
+    let values: Vec<i16> = values.into_iter().map(|(_, value)| value).collect();
+    assert_eq!(values, [9, 7]);
+}
+
+#[test]
+fn a_flood_of_bytes_does_not_hold_up_a_step() {
+    let mut bench = Bench::ready();
+    let waiting = 1_000;
+    bench.pins.uart.received.extend([0x5A; 1_000]);
+    bench.step_once();
+    assert_eq!(
+        waiting - bench.pins.uart.received.len(),
+        64,
+        "what the board's queue holds, and then the rest of the step"
+    );
+}

@@ -1,21 +1,21 @@
 //! The receiver's end: sampled bits in, words out.
 //!
 //! ```text
-//!              a pulse: answer it             silence
-//!   unanswered -----------------> unaligned ----------> aligned, 0 bits <-- silence --.
-//!                                                          | pulse    ^               |
-//!                                                          v          |               |
-//!                                                       aligned, n bits               |
-//!                                                          |      |                   |
-//!                                 silence; n = 1: a        |      '-- word full --> complete
-//!                                 handshake, answer; else <'                          | pulse:
-//!                                 an error, counted                                   '- counted
+//!              a pulse                  silence: answer
+//!   unanswered ---------> unaligned ----------------------> aligned, 0 bits <-- silence --.
+//!                                                              | pulse    ^               |
+//!                                                              v          |               |
+//!                                                           aligned, n bits               |
+//!                                                              |      |                   |
+//!                                     silence; n = 1: a        |      '-- word full --> complete
+//!                                     handshake, answer; else <'                          | pulse:
+//!                                     an error, counted                                   '- counted
 //! ```
 //!
 //! Return sync is the only thing the receiver ever sends (X7): for the first pulse it meets and for a pulse
-//! that stands alone, which is how a restarted sender asks again.
+//! that stands alone, which is how a restarted sender asks again. It knows no clock: a timer that every
+//! pulse restarts tells it of the silence.
 
-use crate::timing::reached;
 use crate::{Timing, WORD_BITS};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,94 +28,81 @@ enum Alignment {
     Complete,
 }
 
+/// The register when no bit of a word has come.
+const NO_BITS: u16 = 1;
+
 /// Collects sampled bits into words.
 #[derive(Debug, Clone)]
 pub struct Receiver {
-    timing: Timing,
     bits: u8,
     alignment: Alignment,
-    /// The shift register of the original (X8), first bit highest.
+    /// The shift register of the original (X8), first bit highest, and above it a mark: a bit that is set and
+    /// tells, by its place, how many bits have come.
     register: u16,
-    count: u8,
-    last_us: u32,
     answer: bool,
-    errors: u16,
+    errors: u8,
 }
 
 impl Receiver {
     /// A receiver of words of [`WORD_BITS`] bits that has met no sender yet.
     #[must_use]
-    pub fn new(timing: Timing) -> Self {
-        Self::with_bits(timing, WORD_BITS)
+    pub const fn new() -> Self {
+        Self::with_bits(WORD_BITS)
     }
 
-    /// The same for words of `bits` bits, 1..=16.
+    /// The same for words of `bits` bits, 1..=15.
     #[must_use]
-    pub fn with_bits(timing: Timing, bits: u8) -> Self {
+    pub const fn with_bits(bits: u8) -> Self {
+        assert!(1 <= bits && bits <= 15);
         Self {
-            timing,
-            bits: bits.clamp(1, 16),
+            bits,
             alignment: Alignment::Unanswered,
-            register: 0,
-            count: 0,
-            last_us: 0,
+            register: NO_BITS,
             answer: false,
             errors: 0,
         }
     }
 
-    /// Sync rose at `now_us` with this level on data. The last bit of a word brings the word.
-    pub fn on_sync(&mut self, data: bool, now_us: u32) -> Option<u16> {
-        self.poll(now_us);
-        let since = now_us.wrapping_sub(self.last_us);
+    /// Sync rose with this level on data, `since_us` after the rise before; what it is after a silence does
+    /// not matter. The last bit of a word brings the word.
+    #[inline(always)]
+    pub fn on_sync(&mut self, data: bool, since_us: u16) -> Option<u16> {
         match self.alignment {
+            Alignment::Aligned
+                if since_us < Timing::STANDARD.shortest_us && self.register != NO_BITS =>
+            {
+                self.count_error();
+                None
+            }
+            Alignment::Aligned => self.shift_in(data),
+            Alignment::Complete => {
+                self.count_error();
+                None
+            }
+            Alignment::Unaligned => None,
             Alignment::Unanswered => {
                 self.answer = true;
                 self.alignment = Alignment::Unaligned;
-                self.last_us = now_us;
-                return None;
+                None
             }
-            Alignment::Unaligned => {
-                self.last_us = now_us;
-                return None;
-            }
-            Alignment::Complete => {
-                self.last_us = now_us;
-                self.count_error();
-                return None;
-            }
-            Alignment::Aligned => {}
         }
-        if self.count > 0 && since < self.timing.shortest_us {
-            self.count_error();
-            return None;
-        }
-        self.last_us = now_us;
-        self.register = self.register << 1 | u16::from(data);
-        self.count += 1;
-        if self.count < self.bits {
-            return None;
-        }
-        self.count = 0;
-        self.alignment = Alignment::Complete;
-        Some(self.register & (u16::MAX >> (16 - self.bits)))
     }
 
-    /// Whether a return sync is to be sent now; asking clears it.
-    pub fn return_sync(&mut self, now_us: u32) -> bool {
-        self.poll(now_us);
+    /// No pulse has come for [`Timing::idle_us`]; told once after the last pulse. Whether to send one pulse
+    /// on return sync now.
+    #[must_use = "the sender waits for its answer"]
+    pub fn on_silence(&mut self) -> bool {
+        match self.alignment {
+            Alignment::Unanswered => {}
+            Alignment::Unaligned | Alignment::Complete => self.alignment = Alignment::Aligned,
+            Alignment::Aligned => match self.register >> 1 {
+                0 => {}
+                NO_BITS => self.answer = true,
+                _ => self.count_error(),
+            },
+        }
+        self.register = NO_BITS;
         core::mem::take(&mut self.answer)
-    }
-
-    /// When [`Receiver::return_sync`] should be asked at the latest; `None` while nothing is begun.
-    #[must_use]
-    pub fn next_due_us(&self) -> Option<u32> {
-        let waiting = match self.alignment {
-            Alignment::Unanswered => false,
-            Alignment::Unaligned | Alignment::Complete => true,
-            Alignment::Aligned => self.count > 0,
-        };
-        waiting.then(|| self.last_us.wrapping_add(self.timing.idle_us))
     }
 
     /// Whether a sender has been met.
@@ -124,31 +111,35 @@ impl Receiver {
         self.alignment != Alignment::Unanswered
     }
 
-    /// Words lost to missing pulses, and disturbing pulses; wraps.
+    /// Words lost to missing pulses, and disturbing pulses; stays at 255.
     #[must_use]
-    pub fn errors(&self) -> u16 {
+    pub fn errors(&self) -> u8 {
         self.errors
     }
 
-    fn poll(&mut self, now_us: u32) {
-        let silent = reached(now_us, self.last_us.wrapping_add(self.timing.idle_us));
-        match self.alignment {
-            Alignment::Unaligned | Alignment::Complete if silent => {
-                self.alignment = Alignment::Aligned;
-            }
-            Alignment::Aligned if silent && self.count > 0 => {
-                if self.count == 1 {
-                    self.answer = true;
-                } else {
-                    self.count_error();
-                }
-                self.count = 0;
-            }
-            _ => {}
+    #[inline(always)]
+    fn shift_in(&mut self, data: bool) -> Option<u16> {
+        self.register = self.register << 1 | u16::from(data);
+        let mark = 1 << self.bits;
+        if self.register & mark == 0 {
+            return None;
         }
+        let word = self.register ^ mark;
+        self.register = NO_BITS;
+        self.alignment = Alignment::Complete;
+        Some(word)
     }
 
+    #[inline(always)]
     fn count_error(&mut self) {
-        self.errors = self.errors.wrapping_add(1);
+        if self.errors < u8::MAX {
+            self.errors += 1;
+        }
+    }
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self::new()
     }
 }

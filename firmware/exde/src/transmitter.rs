@@ -1,68 +1,79 @@
-//! The sender's end: a machine that sets one edge per call.
+//! The sender's end: a machine that is advanced by a timer and sets one edge each time.
 //!
 //! ```text
-//!               return sync seen              start(word)
-//!   handshake ------------------> ready ------------------> lead --> pulse --> tail
-//!     |   ^                         ^                        ^                  |
-//!     '---' a pulse on sync         |  gap over              '---- next bit ----|
-//!           every handshake_us      '------- gap <------------- last bit -------'
+//!              answered                  start(word)         half          half
+//!   asking ---------------> ready -----------------> placed -----> pulsed -----.
+//!    |  ^                     ^                        ^                       |
+//!    '--' a pulse on sync     | gap over               '------- next bit ------|
+//!         every handshake_us  '----------- gap <------------ last bit ---------'
 //! ```
 //!
-//! Two edges never share a call and their distance is counted from when the earlier one was really set, so a
-//! sender that is stepped late sends slowly and still correctly.
+//! It knows no clock: every step says how long to wait before the next one.
 
-use crate::timing::reached;
 use crate::{Timing, WORD_BITS};
 
-/// Levels of the sender's two wires.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Pins {
-    /// The data wire.
-    pub data: bool,
-    /// The sync wire.
-    pub sync: bool,
+/// A constant, because the sender's interrupt comes twice a bit and has no time to look it up.
+const TIMING: Timing = Timing::STANDARD;
+
+/// What to do with the wires now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Nothing.
+    Nothing,
+    /// Set data to this level.
+    Place(bool),
+    /// Make one pulse on sync, a microsecond or a little more (X3).
+    Pulse,
+    /// Set data low: all bits of the word have been sent.
+    Release,
+}
+
+/// One step of the sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Step {
+    /// What to do now.
+    pub action: Action,
+    /// After how many microseconds to call [`Transmitter::advance`]; `None` while ready for a word.
+    pub wait_us: Option<u16>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
-    HandshakePause,
-    HandshakePulse,
+    Asking,
     Ready,
-    Lead,
-    Pulse,
-    Tail,
+    Placed,
+    Pulsed,
     Gap,
 }
+
+/// The register when only the mark is left.
+const NOTHING_LEFT: u16 = 1 << 15;
 
 /// Sends words bit by bit once the receiver has answered.
 #[derive(Debug, Clone)]
 pub struct Transmitter {
-    timing: Timing,
     bits: u8,
     phase: Phase,
-    due_us: u32,
-    word: u16,
-    left: u8,
+    /// What is left of the word, the next bit highest, and behind the last bit a mark: a bit that is set.
+    register: u16,
     answered: bool,
 }
 
 impl Transmitter {
-    /// A sender of words of [`WORD_BITS`] bits that has not yet been answered.
+    /// A sender of words of [`WORD_BITS`] bits that has not yet been answered; to be advanced at once.
     #[must_use]
-    pub fn new(timing: Timing, now_us: u32) -> Self {
-        Self::with_bits(timing, WORD_BITS, now_us)
+    pub const fn new() -> Self {
+        Self::with_bits(WORD_BITS)
     }
 
-    /// The same for words of `bits` bits, 1..=16.
+    /// The same for words of `bits` bits, 1..=15.
     #[must_use]
-    pub fn with_bits(timing: Timing, bits: u8, now_us: u32) -> Self {
+    pub const fn with_bits(bits: u8) -> Self {
+        assert!(1 <= bits && bits <= 15);
         Self {
-            timing,
-            bits: bits.clamp(1, 16),
-            phase: Phase::HandshakePause,
-            due_us: now_us,
-            word: 0,
-            left: 0,
+            bits,
+            phase: Phase::Asking,
+            register: NOTHING_LEFT,
             answered: false,
         }
     }
@@ -84,72 +95,68 @@ impl Transmitter {
         self.phase == Phase::Ready
     }
 
-    /// Begins to send `word`; `false`, and nothing happens, unless [`Transmitter::is_ready`].
-    pub fn start(&mut self, word: u16, now_us: u32) -> bool {
+    /// Whether bits of a word are still to be sent.
+    #[must_use]
+    pub fn is_sending(&self) -> bool {
+        matches!(self.phase, Phase::Placed | Phase::Pulsed)
+    }
+
+    /// Begins to send `word`; `None`, and nothing happens, unless [`Transmitter::is_ready`].
+    #[must_use = "the step is to be carried out"]
+    pub fn start(&mut self, word: u16) -> Option<Step> {
         if !self.is_ready() {
-            return false;
+            return None;
         }
-        self.word = word;
-        self.left = self.bits;
-        self.enter(Phase::Lead, self.timing.lead_us, now_us);
-        true
+        self.register = word << (16 - self.bits) | NOTHING_LEFT >> self.bits;
+        Some(self.place())
     }
 
-    /// Takes the next edge if it is due and tells the levels that hold from now on.
-    pub fn poll(&mut self, now_us: u32) -> Pins {
-        if self.phase != Phase::Ready && reached(now_us, self.due_us) {
-            self.advance(now_us);
-        }
-        self.pins()
-    }
-
-    /// When the next edge is due; `None` while ready for a word.
-    #[must_use]
-    pub fn next_due_us(&self) -> Option<u32> {
-        (self.phase != Phase::Ready).then_some(self.due_us)
-    }
-
-    /// The levels as they are.
-    #[must_use]
-    pub fn pins(&self) -> Pins {
-        let bit = self.left > 0 && self.word >> (self.left - 1) & 1 == 1;
-        Pins {
-            data: bit && matches!(self.phase, Phase::Lead | Phase::Pulse | Phase::Tail),
-            sync: matches!(self.phase, Phase::Pulse | Phase::HandshakePulse),
-        }
-    }
-
-    fn advance(&mut self, now_us: u32) {
-        let timing = self.timing;
+    /// The time of the step before is over: the next one.
+    #[inline(always)]
+    #[must_use = "the step is to be carried out"]
+    pub fn advance(&mut self) -> Step {
         match self.phase {
-            Phase::HandshakePause if self.answered => self.phase = Phase::Ready,
-            Phase::HandshakePause => self.enter(Phase::HandshakePulse, timing.pulse_us, now_us),
-            // An answer is acted on only after a silence, so that the first word does not stick to the pulse.
-            Phase::HandshakePulse => {
-                let pause = if self.answered {
-                    timing.gap_us
-                } else {
-                    timing.handshake_us
-                };
-                self.enter(Phase::HandshakePause, pause, now_us);
+            Phase::Placed => {
+                self.phase = Phase::Pulsed;
+                step(Action::Pulse, TIMING.half_us)
             }
-            Phase::Lead => self.enter(Phase::Pulse, timing.pulse_us, now_us),
-            Phase::Pulse => self.enter(Phase::Tail, timing.tail_us, now_us),
-            Phase::Tail => {
-                self.left -= 1;
-                if self.left > 0 {
-                    self.enter(Phase::Lead, timing.lead_us, now_us);
-                } else {
-                    self.enter(Phase::Gap, timing.gap_us, now_us);
+            Phase::Pulsed if self.register != NOTHING_LEFT => self.place(),
+            Phase::Pulsed => {
+                self.phase = Phase::Gap;
+                step(Action::Release, TIMING.gap_us)
+            }
+            // The answer to a pulse is acted on when the next one would be due: after a silence, so that
+            // the first word does not stick to the pulse.
+            Phase::Asking if !self.answered => step(Action::Pulse, TIMING.handshake_us),
+            Phase::Asking | Phase::Gap | Phase::Ready => {
+                self.phase = Phase::Ready;
+                Step {
+                    action: Action::Nothing,
+                    wait_us: None,
                 }
             }
-            Phase::Gap => self.phase = Phase::Ready,
-            Phase::Ready => {}
         }
     }
 
-    fn enter(&mut self, phase: Phase, lasting_us: u32, now_us: u32) {
-        self.phase = phase;
-        self.due_us = now_us.wrapping_add(lasting_us);
+    #[inline(always)]
+    fn place(&mut self) -> Step {
+        self.phase = Phase::Placed;
+        let bit = self.register & 1 << 15 != 0;
+        self.register <<= 1;
+        step(Action::Place(bit), TIMING.half_us)
+    }
+}
+
+impl Default for Transmitter {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[inline(always)]
+const fn step(action: Action, wait_us: u16) -> Step {
+    Step {
+        action,
+        wait_us: Some(wait_us),
     }
 }

@@ -35,6 +35,7 @@ mod world;
 
 pub use body::Pose;
 pub use goods::{Good, GoodState};
+pub use servo::ServoFault;
 pub use validate::WarehouseError;
 pub use warehouse::{Curve, Edge, Exit, Obstacle, Product, Side, Warehouse};
 pub use world::{World, WorldState};

@@ -16,6 +16,7 @@
 //!   it too.
 //! * [`serial`]: a port, and what to do when it cannot be opened.
 //! * [`frames`], [`settings`]: pure helpers between packets and samples.
+//! * `path`: how long sensor frames take to become commands, for `latency/path`.
 //! * [`run`]: the shell with its three threads.
 //!
 //! **Invariants:** no other process opens the ports; a reader never writes and the main loop
@@ -26,6 +27,7 @@ pub mod arbiter;
 mod boards;
 mod config;
 pub mod frames;
+mod path;
 mod reader;
 pub mod serial;
 mod service;

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use heapless::spsc::Producer;
-use lager_ports::{Bus, Clock, PortError, Publisher, Ringer};
+use lager_ports::{Bus, Cause, Clock, PortError, Publisher, Ringer};
 use lager_topics::{DistanceFrame, SensorDistance, SensorLine};
 use lager_wire::link::{HostEvent, HostLink, Up};
 use lager_wire::{
@@ -94,7 +94,7 @@ pub(crate) struct Shared {
 pub(crate) const QUEUE: usize = 64;
 
 /// Longest wait for bytes in real time: the reader looks for the stop flag that often.
-const LOOK: Duration = Duration::from_millis(10);
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Pauses between attempts to open a port, in real time.
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
@@ -222,7 +222,7 @@ impl<'a> Reader<'a> {
             if count < buffer.len() {
                 heard = now;
             }
-            let now = self.clock.now();
+            let now = self.clock.at(at_ns);
             let mut ring = false;
             for byte in &buffer[..count] {
                 if let Some(event) = link.push(*byte, now) {
@@ -382,7 +382,7 @@ impl SensorOut {
         let sent = match packet.payload {
             Payload::Line(state) => ports.line.loan().and_then(|mut loan| {
                 *loan = self.lines.line(packet.id, state, self.link_epoch);
-                loan.source_time_ns(at_ns);
+                loan.cause(Cause::event(at_ns));
                 loan.send()
             }),
             Payload::Distance(distance) => ports.distance.loan().and_then(|mut loan| {
@@ -392,7 +392,7 @@ impl SensorOut {
                     packet_id: packet.id.get(),
                     ..DistanceFrame::default()
                 };
-                loan.source_time_ns(at_ns);
+                loan.cause(Cause::event(at_ns));
                 loan.send()
             }),
             _ => return,

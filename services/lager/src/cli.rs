@@ -1,8 +1,13 @@
 //! The command line: every subcommand, flag and example. No behaviour lives here.
 
+mod realtime;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use lager_benches::{Mode, Regime};
+
+pub use realtime::{ServiceArgs, UpRealtimeArgs};
 
 use crate::config::Body;
 
@@ -15,12 +20,15 @@ use crate::config::Body;
   lager up                                     the simulated robot and all its services
   lager up --headless --mission 1 --exit-when-done --json
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1
+  lager up --realtime 20 --lock-memory --core bridge=0 --core logic=1
   lager simulate --seeds 1..20 --warehouse large --mission 1,2
   lager topic hz sensor/line
+  lager bench hop --quick
   lager drive follow-forward
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 the mission was not delivered,
-4 a robot of this name is already up."
+4 a robot of this name is already up, 5 real time, locked memory or cores are
+not granted as asked for."
 )]
 pub struct Cli {
     /// What every subcommand takes.
@@ -57,6 +65,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Look at any topic of the bus
     Topic(TopicArgs),
+    /// Measure the bus on this machine, beside its baselines in the same run
+    Bench(BenchArgs),
     /// Steer by hand in manual mode, renewed until it is done or Ctrl-C
     #[command(
         after_help = "COMMAND is a name (stop, forward, follow-forward, backward, follow-backward, left, right, left-diag, right-diag) or a code 1..9 as 8 binary digits, decimal or 0x-hex."
@@ -108,6 +118,9 @@ pub enum Command {
         /// Remove what dead processes left on the bus
         #[arg(long)]
         fix: bool,
+        /// What `lager up` is to be started with
+        #[command(flatten)]
+        realtime: UpRealtimeArgs,
     },
     /// Print the configuration in force, with every key
     Config,
@@ -130,6 +143,17 @@ pub enum ModeName {
 
 /// `lager up`.
 #[derive(Debug, Default, Args)]
+#[command(after_help = "Examples:
+  lager up                                                the simulated robot
+  lager up --headless --mission 1,2 --speed 5 --exit-when-done --json
+  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards
+  lager up --realtime 20 --lock-memory --core bridge=2 --core logic=3
+
+Real time is for bridge and logic, the services between sensor and steering, and
+for those that take their place after a crash. The supervisor keeps the normal
+priority, and so does the simulated robot, which stands for boards with
+processors of their own. What is not granted is an error (5) that says how to get
+it; `lager doctor` with the same flags tries it beforehand.")]
 pub struct UpArgs {
     /// What to drive [default: sim]
     #[arg(long)]
@@ -161,6 +185,9 @@ pub struct UpArgs {
     /// Print one line of JSON at the end; progress goes to standard error
     #[arg(long)]
     pub json: bool,
+    /// What bridge and logic want of the machine
+    #[command(flatten)]
+    pub realtime: UpRealtimeArgs,
 }
 
 /// `lager simulate`.
@@ -222,13 +249,64 @@ pub enum TopicCommand {
     },
 }
 
-/// What a service is told beyond the configuration.
+/// `lager bench`.
 #[derive(Debug, Args)]
-pub struct ServiceArgs {
-    /// Take up the state that the supervisor kept of the process before this one
+#[command(after_help = "Examples:
+  lager bench hop --quick                          a first look, in seconds
+  lager bench hop --mode block --regime same-core  the software's share of a wake
+  lager bench path --runs 9 --json > path.json     what a plot is drawn from
+  lager bench fanout                               what observers cost the writer
+
+Times are medians over the runs: of each run's median (p50) and of what 99 % and
+99.9 % of its samples kept. Ratios compare with a baseline of the same run and
+survive another machine; times do not. Measure on an otherwise idle machine, with
+no robot up.")]
+pub struct BenchArgs {
+    /// What to measure
+    pub scenario: Scenario,
+    /// Print one line of JSON instead of a table
     #[arg(long)]
-    pub resume: bool,
-    /// End when this process, the supervisor, ends
-    #[arg(long, value_name = "PID")]
-    pub parent: Option<u32>,
+    pub json: bool,
+    /// How often to measure everything; every figure is the median over the runs
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
+    pub runs: usize,
+    /// Take few samples, for a first look
+    #[arg(long)]
+    pub quick: bool,
+    /// How the receiver waits: spin, adaptive or block [default: all]
+    #[arg(long, value_name = "MODE", value_delimiter = ',')]
+    pub mode: Vec<Mode>,
+    /// Where the processes run: plain (a core each), same-core, or no-halt (a core each, kept awake) [default: all]
+    #[arg(long, value_name = "REGIME", value_delimiter = ',')]
+    pub regime: Vec<Regime>,
+}
+
+/// What `lager bench` can measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Scenario {
+    /// One sample from a writer to a waiting reader in another process
+    Hop,
+    /// A sensor packet on one port until its steering command on the other, through bridge and logic
+    Path,
+    /// What publishing costs with 1 to 64 subscribers and observers
+    Fanout,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("one run is the least".to_owned()),
+        Ok(runs) => Ok(runs),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
 }

@@ -4,13 +4,25 @@
 //! effective configuration beside its lock and every child process starts from that one file, so
 //! a flag reaches all of them or none. An unknown key is an error, never ignored.
 
+mod documented;
+mod realtime;
+
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use lager_plant::Warehouse;
-use lager_ports::{BusConfig, RobotName};
+use lager_ports::{BusConfig, Policy, RobotName};
 use serde::{Deserialize, Serialize};
+
+pub use realtime::RealtimeSection;
+
+use crate::realtime::HIGHEST_PRIORITY;
+
+/// A service waits at most this long before it looks at its clock, so a longer spin never comes
+/// to its end.
+const LONGEST_SPIN_US: u64 = 20_000;
 
 /// Everything a process of the robot needs to know at start.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -27,6 +39,8 @@ pub struct Config {
     pub warehouse: String,
     /// Where the bus lives.
     pub bus: BusSection,
+    /// What the services on the path from sensor to steering want of the machine.
+    pub realtime: RealtimeSection,
     /// The two serial ports.
     pub serial: SerialSection,
     /// What logic knows of the robot's measures.
@@ -45,8 +59,8 @@ pub enum Body {
     Serial,
 }
 
-/// `[bus]`: empty on a robot; tests give every bus its own prefix and root.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+/// `[bus]`: prefix and root are unset on a robot; tests give every bus its own.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BusSection {
     /// Prefix of the shared-memory files.
@@ -57,6 +71,21 @@ pub struct BusSection {
     pub root: Option<PathBuf>,
     /// How bridge and logic wait for samples.
     pub waiting: Waiting,
+    /// The longest that `waiting = "adaptive"` looks without pause for one sample, in µs.
+    pub longest_spin_us: u64,
+}
+
+impl BusSection {
+    /// How bridge and logic wait, as their ports want it.
+    pub fn policy(&self) -> Policy {
+        match self.waiting {
+            Waiting::Block => Policy::Block,
+            Waiting::Spin => Policy::Spin,
+            Waiting::Adaptive => Policy::Adaptive {
+                longest_spin: Duration::from_micros(self.longest_spin_us),
+            },
+        }
+    }
 }
 
 /// How a service waits: `lager_ports::Policy` as a word of the configuration.
@@ -68,18 +97,8 @@ pub enum Waiting {
     Block,
     /// Look without pause; costs a core for each service.
     Spin,
-    /// Look for a short time after each sample, then sleep.
+    /// Look without pause while samples come fast, sleep when they do not.
     Adaptive,
-}
-
-impl From<Waiting> for lager_ports::Policy {
-    fn from(waiting: Waiting) -> Self {
-        match waiting {
-            Waiting::Block => Self::Block,
-            Waiting::Spin => Self::Spin,
-            Waiting::Adaptive => Self::Adaptive,
-        }
-    }
 }
 
 /// `[serial]`: the cables to the boards.
@@ -123,9 +142,25 @@ impl Default for Config {
             body: Body::Sim,
             warehouse: "small".into(),
             bus: BusSection::default(),
+            realtime: RealtimeSection::default(),
             serial: SerialSection::default(),
             logic: LogicSection::default(),
             simulator: SimulatorSection::default(),
+        }
+    }
+}
+
+impl Default for BusSection {
+    fn default() -> Self {
+        let longest_spin = match Policy::ADAPTIVE {
+            Policy::Adaptive { longest_spin } => longest_spin,
+            Policy::Block | Policy::Spin => Duration::ZERO,
+        };
+        Self {
+            prefix: None,
+            root: None,
+            waiting: Waiting::default(),
+            longest_spin_us: longest_spin.as_micros() as u64,
         }
     }
 }
@@ -190,77 +225,19 @@ impl Config {
                 self.speed
             );
         }
+        if self.bus.longest_spin_us > LONGEST_SPIN_US {
+            bail!(
+                "[bus] longest_spin_us is {}; it must be from 0 to {LONGEST_SPIN_US} (waiting = \"spin\" never sleeps)",
+                self.bus.longest_spin_us
+            );
+        }
+        if self.realtime.priority > HIGHEST_PRIORITY {
+            bail!(
+                "[realtime] priority is {}; it must be from 1 to {HIGHEST_PRIORITY}, or 0 for the normal scheduler",
+                self.realtime.priority
+            );
+        }
         Ok(())
-    }
-
-    /// The configuration as a file with every key explained: what `lager config` prints.
-    pub fn documented(&self) -> String {
-        let quoted = |text: &str| toml::Value::from(text).to_string();
-        let unset = |name: &str, value: Option<&str>| match value {
-            Some(value) => format!("{name} = {}", quoted(value)),
-            None => format!("# {name} = \"...\""),
-        };
-        let root = self.bus.root.as_ref().map(|root| root.to_string_lossy());
-        format!(
-            "\
-# The robot's name: the middle part of every topic's name.
-name = {name}
-# How many times as fast as real time the robot's clock runs; real boards need 1.
-speed = {speed:?}
-# What the services drive: \"sim\", the simulated robot, or \"serial\", the boards at [serial].
-body = {body}
-# A built-in warehouse (small, curved, large) or the path of a warehouse file.
-warehouse = {warehouse}
-
-[bus]
-# Only to keep a bus apart from others on the machine: prefix of its shared-memory files ...
-{prefix}
-# ... and folder of its bookkeeping files.
-{root}
-# How bridge and logic wait for samples: \"block\", \"spin\" (a core for each) or \"adaptive\".
-waiting = {waiting}
-
-[serial]
-# The ports of the boards; given the wrong way round they work all the same.
-sensor = {sensor}
-steering = {steering}
-# 500000, or 9600 for boards of the original build.
-baud = {baud}
-# Whether the sensor board sends the raw reading of all eleven sensors as well.
-raw_line = {raw_line}
-
-[logic]
-# Speed in mm/s when both motors run at the standard duty of 100.
-cruise_mm_per_s = {cruise:?}
-# How far the line sensors are ahead of the wheels' axle, in mm.
-sensor_ahead_mm = {ahead:?}
-
-[simulator]
-# Seed of all noise: the same seed is the same robot.
-seed = {seed}
-",
-            name = quoted(&self.name),
-            speed = self.speed,
-            body = match self.body {
-                Body::Sim => "\"sim\"",
-                Body::Serial => "\"serial\"",
-            },
-            warehouse = quoted(&self.warehouse),
-            prefix = unset("prefix", self.bus.prefix.as_deref()),
-            root = unset("root", root.as_deref()),
-            sensor = quoted(&self.serial.sensor.to_string_lossy()),
-            steering = quoted(&self.serial.steering.to_string_lossy()),
-            baud = self.serial.baud,
-            raw_line = self.serial.raw_line,
-            waiting = match self.bus.waiting {
-                Waiting::Block => "\"block\"",
-                Waiting::Spin => "\"spin\"",
-                Waiting::Adaptive => "\"adaptive\"",
-            },
-            cruise = self.logic.cruise_mm_per_s,
-            ahead = self.logic.sensor_ahead_mm,
-            seed = self.simulator.seed,
-        )
     }
 
     /// The bus this configuration names.
@@ -283,7 +260,7 @@ seed = {seed}
         lager_logic::LogicConfig {
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
             sensor_ahead_mm: self.logic.sensor_ahead_mm,
-            waiting: self.bus.waiting.into(),
+            waiting: self.bus.policy(),
             ..lager_logic::LogicConfig::default()
         }
     }
@@ -311,32 +288,6 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_documented_file_reads_back_with_every_key() {
-        let config = Config {
-            name: "r7".into(),
-            speed: 2.5,
-            body: Body::Serial,
-            warehouse: "a \"quoted\" name".into(),
-            bus: BusSection {
-                prefix: Some("p_".into()),
-                root: Some("/tmp/root".into()),
-                waiting: Waiting::Adaptive,
-            },
-            ..Config::default()
-        };
-        for config in [config, Config::default()] {
-            let text = config.documented();
-            let read: Config = toml::from_str(&text).expect("valid TOML");
-            let plain = |config: &Config| toml::to_string(config).expect("serialisable");
-            assert_eq!(plain(&read), plain(&config));
-            for line in plain(&config).lines().filter(|line| !line.is_empty()) {
-                let key = line.split(" = ").next().expect("a key");
-                assert!(text.contains(key), "{key} is not explained");
-            }
-        }
-    }
 
     #[test]
     fn an_unknown_key_is_an_error_that_names_it() {
@@ -369,10 +320,41 @@ mod tests {
                 },
                 "simulated",
             ),
+            (
+                Config {
+                    bus: BusSection {
+                        longest_spin_us: 1_000_000,
+                        ..BusSection::default()
+                    },
+                    ..Config::default()
+                },
+                "longest_spin_us",
+            ),
+            (
+                Config {
+                    realtime: RealtimeSection {
+                        priority: 100,
+                        ..RealtimeSection::default()
+                    },
+                    ..Config::default()
+                },
+                "1 to 99",
+            ),
         ] {
             let error = config.validate().expect_err("impossible");
             assert!(error.to_string().contains(word), "{error}");
         }
+    }
+
+    #[test]
+    fn the_longest_spin_reaches_the_ports() {
+        let config: Config =
+            toml::from_str("[bus]\nwaiting = \"adaptive\"\nlongest_spin_us = 300").expect("valid");
+        let longest_spin = Duration::from_micros(300);
+        assert_eq!(config.bus.policy(), Policy::Adaptive { longest_spin });
+        assert_eq!(config.navigator().waiting, config.bus.policy());
+        let config: Config = toml::from_str("[bus]\nwaiting = \"adaptive\"").expect("valid");
+        assert_eq!(config.bus.policy(), Policy::ADAPTIVE);
     }
 
     #[test]

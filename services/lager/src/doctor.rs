@@ -3,6 +3,8 @@
 //! Each check looks at one thing and returns a finding; nothing is changed but what `--fix` is
 //! for: what dead processes left on the bus.
 
+mod realtime;
+
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
@@ -37,12 +39,11 @@ pub fn run(config: &Config, fix: bool) -> Result<ExitCode> {
         ("versions", versions()),
         ("shared memory", shared_memory()),
         ("open files", open_files()),
-        ("locked memory", locked_memory()),
-        ("real time", real_time()),
         ("session clean-up", remove_ipc()),
         ("serial rights", serial(config)),
         ("bus", bus(config, fix)),
     ];
+    let findings = findings.into_iter().chain(realtime::findings(config));
     let mut bad = 0;
     for (what, finding) in findings {
         let (mark, text) = match finding {
@@ -108,28 +109,6 @@ fn open_files() -> Finding {
         ));
     }
     Good(format!("a process may open {limit}"))
-}
-
-fn locked_memory() -> Finding {
-    match getrlimit(Resource::Memlock).current {
-        None => Good("unlimited".into()),
-        Some(bytes) if bytes >= 64 << 20 => Good(format!("{} MiB", bytes >> 20)),
-        Some(bytes) => Hint(format!(
-            "{} KiB may be locked, too little to keep a service out of swap (ulimit -l, or LimitMEMLOCK= in the unit)",
-            bytes >> 10
-        )),
-    }
-}
-
-fn real_time() -> Finding {
-    let limit = getrlimit(Resource::Rtprio).current.unwrap_or(99);
-    if limit == 0 && !rustix::process::geteuid().is_root() {
-        return Hint(
-            "this user may not use real-time priorities; under load the robot reacts later (LimitRTPRIO=80 in the unit, or limits.conf)"
-                .into(),
-        );
-    }
-    Good("real-time priorities are allowed".into())
 }
 
 /// systemd removes a user's shared memory at logout unless told otherwise.

@@ -15,3 +15,8 @@ pub fn not_delivered() -> ExitCode {
 pub fn name_taken() -> ExitCode {
     ExitCode::from(4)
 }
+
+/// Real time, locked memory or cores are not granted as asked for.
+pub fn not_granted() -> ExitCode {
+    ExitCode::from(5)
+}

@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_ports::{Bus, Client, Clock, Publisher};
+use lager_ports::{Bus, Cause, Client, Clock, Publisher};
 use lager_topics::{
     Answer, Ask, BridgeRequest, Input, MissionOrder, NavMap, OperatorInput, Order, SteeringCommand,
     SteeringOrder, WarehouseMap,
@@ -47,7 +47,7 @@ impl Hands {
 
     /// Tells the robot its warehouse; late joiners get it too.
     pub fn publish_map(&self, map: &WarehouseMap) -> Result<()> {
-        self.map.send(Clock::monotonic_ns(), *map)?;
+        self.map.send(Cause::OWN, *map)?;
         Ok(())
     }
 
@@ -81,19 +81,19 @@ impl Hands {
 
     /// Orders a product.
     pub fn fetch(&self, order: Order) -> Result<()> {
-        self.order.send(Clock::monotonic_ns(), order)?;
+        self.order.send(Cause::OWN, order)?;
         Ok(())
     }
 
     /// Gives or renews a steering order.
     pub fn steer(&self, order: SteeringOrder) -> Result<()> {
-        self.steer.send(Clock::monotonic_ns(), order)?;
+        self.steer.send(Cause::OWN, order)?;
         Ok(())
     }
 
     /// Presses a button.
     pub fn press(&self, input: Input) -> Result<()> {
-        self.press.send(Clock::monotonic_ns(), input)?;
+        self.press.send(Cause::OWN, input)?;
         Ok(())
     }
 }

@@ -6,6 +6,7 @@
     reason = "in a binary, `pub` says what a module offers to the others"
 )]
 
+mod bench;
 mod cli;
 mod config;
 mod doctor;
@@ -14,6 +15,7 @@ mod hands;
 mod keepers;
 mod map;
 mod operator;
+mod realtime;
 mod report;
 mod runtime;
 mod simulate;
@@ -39,6 +41,7 @@ use crate::config::Config;
 use crate::steer::Operator;
 
 fn main() -> ExitCode {
+    lager_benches::parts::play_if_asked();
     let cli = Cli::parse();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -53,6 +56,8 @@ fn main() -> ExitCode {
             let _ = writeln!(std::io::stderr(), "lager: {error:#}");
             if error.is::<runtime::NameTaken>() {
                 exit::name_taken()
+            } else if error.is::<realtime::RealtimeError>() {
+                exit::not_granted()
             } else {
                 exit::FAILED
             }
@@ -61,7 +66,7 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<ExitCode> {
-    let config = configure(&cli.global)?;
+    let mut config = configure(&cli.global)?;
     let shutdown = Shutdown::new();
     stop_on_signals(&shutdown)?;
     let said = match cli.command {
@@ -73,7 +78,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
                     ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
                     baud: config.serial.baud,
                     raw_line: config.serial.raw_line,
-                    waiting: config.bus.waiting.into(),
+                    waiting: config.bus.policy(),
                     resume,
                 };
                 Ok(lager_bridge::run(bus, &bridge, &shutdown)?)
@@ -108,7 +113,11 @@ fn run(cli: Cli) -> Result<ExitCode> {
             topic(&config, args, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
         }
-        Command::Doctor { fix } => return doctor::run(&config, fix),
+        Command::Bench(args) => bench::run(&args)?,
+        Command::Doctor { fix, realtime } => {
+            realtime.apply(&mut config.realtime);
+            return doctor::run(&config, fix);
+        }
         Command::Config => config.documented().trim_end().to_owned(),
         Command::Drive { command, seconds } => {
             Operator::new(&config)?.drive(&command, seconds, &shutdown)?
@@ -176,6 +185,11 @@ fn service(
     shutdown: &Shutdown,
     run: impl FnOnce(&Bus, bool) -> Result<()>,
 ) -> Result<()> {
+    // Before the first thread: all of them inherit it.
+    let mut wanted = config.realtime.wanted(role);
+    args.apply(&mut wanted);
+    wanted.apply()?;
+    config.refuse_starvation(&[(role, wanted)])?;
     if let Some(parent) = args.parent {
         supervisor::adopt(parent, shutdown)?;
     }

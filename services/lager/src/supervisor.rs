@@ -133,15 +133,17 @@ impl Supervisor {
                 continue;
             };
             let _ = kill_process(pid_of(&child), Signal::TERM);
-            let give_up = Instant::now() + PATIENCE;
-            while matches!(child.try_wait(), Ok(None)) {
-                if Instant::now() >= give_up {
-                    tracing::warn!(service = service.name, "does not stop, killing it");
-                    let _ = child.kill();
-                    let _ = child.wait();
-                    break;
+            if !ends_within(&mut child, PATIENCE) {
+                tracing::warn!(service = service.name, "does not stop, killing it");
+                let _ = child.kill();
+                // Even a killed process has to run once more to end. One that real-time load keeps
+                // from its core must not keep the others from being stopped.
+                if !ends_within(&mut child, PATIENCE) {
+                    tracing::error!(
+                        service = service.name,
+                        "is killed and gets no time to end; see which real-time process holds its core (ps -eLo pid,cls,rtprio,psr,args)"
+                    );
                 }
-                std::thread::sleep(Duration::from_millis(5));
             }
         }
     }
@@ -189,6 +191,18 @@ impl Drop for Supervisor {
     fn drop(&mut self) {
         self.stop();
     }
+}
+
+/// Whether `child` ends within `patience`.
+fn ends_within(child: &mut Child, patience: Duration) -> bool {
+    let give_up = Instant::now() + patience;
+    while matches!(child.try_wait(), Ok(None)) {
+        if Instant::now() >= give_up {
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    true
 }
 
 fn pid_of(child: &Child) -> Pid {

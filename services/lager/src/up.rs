@@ -40,6 +40,8 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
         bail!("on a real robot a mission needs --headless: there the script is the operator");
     }
 
+    rehearse(&config)?;
+
     let folder = RuntimeFolder::create(&config)?;
     let _lock = folder.lock(&config.name)?;
     if config.body == Body::Sim {
@@ -121,6 +123,18 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     })
 }
 
+/// Refuses before anything runs what the services would be refused, again and again, at every
+/// start.
+fn rehearse(config: &Config) -> Result<()> {
+    let roles = [Role::Bridge, Role::Logic, Role::Simulator]
+        .map(|role| (role, config.realtime.wanted(role)));
+    config.refuse_starvation(&roles)?;
+    for (_, wanted) in &roles {
+        wanted.rehearse()?;
+    }
+    Ok(())
+}
+
 /// Errors of the bus that pass: the next attempt may succeed, and the robot must not end with
 /// them.
 #[derive(Default)]
@@ -173,4 +187,5 @@ fn apply(config: &mut Config, args: &UpArgs) {
     if let Some(speed) = args.speed {
         config.speed = speed;
     }
+    args.realtime.apply(&mut config.realtime);
 }

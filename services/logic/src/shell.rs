@@ -1,9 +1,13 @@
 //! The navigator's shell on the bus: it carries samples in and out and decides nothing.
 //!
 //! One turn: wait, drain every subscriber, hand each sample to the navigator, and send what
-//! changed at once: events first, then the status, then the order. Killed between any two of
-//! these, the successor knows at least as much as the bridge; an event can come twice, never not
-//! at all. An unchanged order is renewed every 40 ms of robot time.
+//! changed at once: events first, then the status, then the order, and what nobody acts upon
+//! last. Killed between any two of the first three, the successor knows at least as much as the
+//! bridge; an event can come twice, never not at all. An unchanged order is renewed every 40 ms of
+//! robot time.
+//!
+//! A turn takes one decision for each sample and, only if there was none, one for the time that
+//! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`).
 //!
 //! **Safe state**: silence. When this process ends, however it ends, nobody renews the order in
 //! force; the bridge brings the robot to rest when the lease is over, 120 ms later.
@@ -11,12 +15,13 @@
 use core::time::Duration;
 
 use lager_ports::{
-    Bus, Clock, PortError, Publisher, ReceiveError, SendError, Shutdown, Subscriber, Waiter,
+    Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, SendError, Shutdown, Subscriber,
+    Waiter,
 };
 use lager_topics::{
-    InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, NavMap, NavRoute, NavStatus,
-    NavigatorStatus, OperatorInput, SensorDistance, SensorLine, SteeringCommand, SteeringOrder,
-    SteeringState, Topic,
+    InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, Mode, NavMap, NavRoute,
+    NavStatus, NavigatorStatus, OperatorInput, SensorDistance, SensorLine, SteeringCommand,
+    SteeringOrder, SteeringState, Topic,
 };
 
 use crate::config::LogicConfig;
@@ -73,6 +78,10 @@ struct Shell {
     events: Publisher<MissionEvent>,
     thoughts: Publisher<LogThought>,
 
+    /// Inputs the navigator was given.
+    decisions: u64,
+    /// Who may drive and whether a stop is latched, as the navigator was told last.
+    told_mode: Option<(Mode, bool)>,
     sent_status: NavigatorStatus,
     status_due: Duration,
     sent_order: Option<SteeringOrder>,
@@ -114,6 +123,8 @@ impl Shell {
             route: bus.publisher()?,
             events: bus.publisher()?,
             thoughts: bus.publisher()?,
+            decisions: 0,
+            told_mode: None,
             sent_status: navigator.status(),
             navigator,
             status_due: Duration::ZERO,
@@ -129,10 +140,13 @@ impl Shell {
         self.wait();
         // First who may drive and in what world, then what people want, then what the robot
         // senses: the line last, so that its decision knows all the rest.
+        let decisions = self.decisions;
         self.take_states();
         self.take_wishes();
         self.take_senses();
-        self.tell(Input::Tick, Clock::monotonic_ns());
+        if self.decisions == decisions {
+            self.tell(Input::Tick, Cause::OWN, self.clock.now());
+        }
         self.keep_time();
     }
 
@@ -144,37 +158,41 @@ impl Shell {
 
     fn take_states(&mut self) {
         let health = self.health.latest();
-        if let Some((health, at_ns)) = self.unpack(health)
+        if let Some((health, cause)) = self.check_received(health)
             && let Some(mode) = health.mode.get()
         {
             let stopped = health.stopped != 0;
-            self.tell(Input::Mode { mode, stopped }, at_ns);
+            // The bridge repeats it ten times a second, and with every order it has taken.
+            if self.told_mode != Some((mode, stopped)) {
+                self.told_mode = Some((mode, stopped));
+                self.decide(Input::Mode { mode, stopped }, cause);
+            }
         }
         let map = self.map.latest();
-        if let Some((map, at_ns)) = self.unpack(map) {
-            self.tell(Input::Map(&map), at_ns);
+        if let Some((map, cause)) = self.check_received(map) {
+            self.decide(Input::Map(&map), cause);
         }
     }
 
     fn take_wishes(&mut self) {
         loop {
             let order = self.orders.receive();
-            let Some((order, at_ns)) = self.unpack(order) else {
+            let Some((order, cause)) = self.check_received(order) else {
                 break;
             };
-            self.tell(Input::Order(&order), at_ns);
+            self.decide(Input::Order(&order), cause);
         }
         loop {
             let input = self.inputs.receive();
-            let Some((input, at_ns)) = self.unpack(input) else {
+            let Some((input, cause)) = self.check_received(input) else {
                 break;
             };
             match input.kind.get() {
                 Some(InputKind::PickupDone) => {
                     let order_id = input.order_id;
-                    self.tell(Input::PickupDone { order_id }, at_ns);
+                    self.decide(Input::PickupDone { order_id }, cause);
                 }
-                Some(InputKind::ResetPressed) => self.tell(Input::Reset, at_ns),
+                Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
                 // The switch is the bridge's (E14): the mode comes back with its health.
                 Some(InputKind::SwitchPressed) | None => {}
             }
@@ -184,36 +202,39 @@ impl Shell {
     fn take_senses(&mut self) {
         loop {
             let report = self.steering.receive();
-            let Some((report, at_ns)) = self.unpack(report) else {
+            let Some((report, cause)) = self.check_received(report) else {
                 break;
             };
-            self.tell(Input::Steering(&report), at_ns);
+            self.decide(Input::Steering(&report), cause);
         }
         loop {
             let frame = self.distance.receive();
-            let Some((frame, at_ns)) = self.unpack(frame) else {
+            let Some((frame, cause)) = self.check_received(frame) else {
                 break;
             };
-            self.tell(Input::Distance(frame.distance_cm), at_ns);
+            self.decide(Input::Distance(frame.distance_cm), cause);
         }
         loop {
             let frame = self.line.receive();
-            let Some((frame, at_ns)) = self.unpack(frame) else {
+            let Some((frame, cause)) = self.check_received(frame) else {
                 break;
             };
             if let Some(state) = frame.state.get() {
-                self.tell(Input::Line(state), at_ns);
+                self.decide(Input::Line(state), cause);
             }
         }
     }
 
-    /// A received sample's payload and the time of the event behind it.
-    fn unpack<T: Topic>(
+    /// A received sample, and what is to be said of everything that follows from it.
+    fn check_received<T: Topic>(
         &mut self,
-        received: Result<Option<lager_ports::Sample<T>>, ReceiveError>,
-    ) -> Option<(T::Payload, u64)> {
+        received: Result<Option<Sample<T>>, ReceiveError>,
+    ) -> Option<(Sample<T>, Cause)> {
         match received {
-            Ok(sample) => sample.map(|sample| (*sample, sample.stamp().source_time_ns)),
+            Ok(sample) => sample.map(|sample| {
+                let cause = sample.cause();
+                (sample, cause)
+            }),
             Err(error) => {
                 self.complain(&error);
                 None
@@ -221,22 +242,18 @@ impl Shell {
         }
     }
 
-    /// Hands one input to the navigator and sends what changed. `at_ns` is when the event behind
-    /// the input happened; it goes with everything that follows from it.
-    fn tell(&mut self, input: Input<'_>, at_ns: u64) {
-        let now = self.clock.now();
+    /// Lets the navigator decide on a sample.
+    fn decide(&mut self, input: Input<'_>, cause: Cause) {
+        let now = self.clock.at(cause.receive_time_ns());
+        self.tell(input, cause, now);
+    }
+
+    /// Hands one input to the navigator and sends what changed because of it.
+    fn tell(&mut self, input: Input<'_>, cause: Cause, now: Duration) {
+        self.decisions = self.decisions.wrapping_add(1);
         let output = self.navigator.handle(now, input);
         for event in &output.events {
-            let sent = self.events.send(at_ns, *event);
-            self.check(sent);
-        }
-        if let Some(thought) = output.thought {
-            tracing::debug!("{}", thought.text.as_str());
-            let sent = self.thoughts.send(at_ns, thought);
-            self.check(sent);
-        }
-        if output.route_changed {
-            let sent = self.route.send(at_ns, *self.navigator.route());
+            let sent = self.events.send(cause, *event);
             self.check(sent);
         }
         if Navigator::is_news(&self.sent_status, &self.navigator.status()) {
@@ -245,7 +262,16 @@ impl Shell {
         let order = self.navigator.current_order();
         if order != self.sent_order {
             self.sent_order = order;
-            self.give_order(now, at_ns);
+            self.give_order(now, cause);
+        }
+        if output.route_changed {
+            let sent = self.route.send(cause, *self.navigator.route());
+            self.check(sent);
+        }
+        if let Some(thought) = output.thought {
+            tracing::debug!("{}", thought.text.as_str());
+            let sent = self.thoughts.send(cause, thought);
+            self.check(sent);
         }
     }
 
@@ -258,14 +284,14 @@ impl Shell {
             self.route.tick();
         }
         if now >= self.renewal_due {
-            self.give_order(now, Clock::monotonic_ns());
+            self.give_order(now, Cause::OWN);
         }
     }
 
-    fn give_order(&mut self, now: Duration, at_ns: u64) {
+    fn give_order(&mut self, now: Duration, cause: Cause) {
         self.renewal_due = now + RENEWAL;
         if let Some(order) = self.sent_order {
-            let sent = self.commands.send(at_ns, order);
+            let sent = self.commands.send(cause, order);
             self.check(sent);
         }
     }
@@ -277,7 +303,7 @@ impl Shell {
             frames_lost: self.lost_before + self.lost(),
             ..self.sent_status
         };
-        let sent = self.status.send(Clock::monotonic_ns(), status);
+        let sent = self.status.send(Cause::OWN, status);
         self.check(sent);
     }
 

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use lager_logic::{LogicConfig, run};
-use lager_ports::{Bus, BusConfig, Publisher, Shutdown, Subscriber, remove_stale_nodes};
+use lager_ports::{Bus, BusConfig, Cause, Publisher, Shutdown, Subscriber, remove_stale_nodes};
 use lager_topics::{
     DistanceFrame, EventKind, Health, Input, LineFrame, LinkHealth, LogThought, MapProduct,
     MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
@@ -98,19 +98,21 @@ impl World {
             side: Side::Down.into(),
             ..MapProduct::default()
         };
-        self.map.send(0, map).unwrap();
+        self.map.send(Cause::OWN, map).unwrap();
         let health = Health {
             mode: mode.into(),
             stopped: stopped.into(),
             ..Health::default()
         };
-        self.health.send(0, health).unwrap();
-        self.state.send(0, SteeringReport::default()).unwrap();
+        self.health.send(Cause::OWN, health).unwrap();
+        self.state
+            .send(Cause::OWN, SteeringReport::default())
+            .unwrap();
         let frame = LineFrame {
             state: LineState::OnLine.into(),
             ..LineFrame::default()
         };
-        self.line.send(0, frame).unwrap();
+        self.line.send(Cause::OWN, frame).unwrap();
     }
 
     /// Reads what logic has sent. An order is read before the status, so a status that went out
@@ -200,7 +202,10 @@ fn an_order_leads_to_a_renewed_steering_order_and_is_announced() {
         world.until("logic has its map", false, |world| {
             world.phase() == Some(Phase::WaitingForOrder)
         });
-        world.orders.send(0, Order { id: 5, product: 1 }).unwrap();
+        world
+            .orders
+            .send(Cause::OWN, Order { id: 5, product: 1 })
+            .unwrap();
         world.until("the line is followed", false, |world| {
             let follow = |order: &&SteeringOrder| order.code == 3;
             world.given.iter().filter(follow).count() >= 4
@@ -259,7 +264,10 @@ fn a_successor_takes_up_the_kept_state() {
         world.until("logic has its map", false, |world| {
             world.phase() == Some(Phase::WaitingForOrder)
         });
-        world.orders.send(0, Order { id: 5, product: 1 }).unwrap();
+        world
+            .orders
+            .send(Cause::OWN, Order { id: 5, product: 1 })
+            .unwrap();
         world.until("it is on its way", false, |world| {
             world.phase() == Some(Phase::Approaching)
         });
@@ -297,19 +305,25 @@ fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
         });
         // Bursts of one topic at a time, far beyond what a subscriber holds.
         world.miss("sensor/line", |world| {
-            world.line.send(0, LineFrame::default()).unwrap();
+            world.line.send(Cause::OWN, LineFrame::default()).unwrap();
         });
         world.miss("sensor/distance", |_| {
-            distance.send(0, DistanceFrame::default()).unwrap();
+            distance.send(Cause::OWN, DistanceFrame::default()).unwrap();
         });
         world.miss("steering/state", |world| {
-            world.state.send(0, SteeringReport::default()).unwrap();
+            world
+                .state
+                .send(Cause::OWN, SteeringReport::default())
+                .unwrap();
         });
         world.miss("mission/order", |world| {
-            world.orders.send(0, Order { id: 7, product: 9 }).unwrap();
+            world
+                .orders
+                .send(Cause::OWN, Order { id: 7, product: 9 })
+                .unwrap();
         });
         world.miss("operator/input", |_| {
-            inputs.send(0, Input::default()).unwrap();
+            inputs.send(Cause::OWN, Input::default()).unwrap();
         });
     });
 }

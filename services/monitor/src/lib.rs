@@ -10,8 +10,8 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 use lager_ports::{Bus, IntrospectError, Layout, PortError, ReceiveError, Shutdown, Subscriber};
-use lager_topics::{TOPICS, Topic, TopicVisitor, UnknownTopic, visit};
-use serde_json::json;
+use lager_topics::{Stamp, TOPICS, Topic, TopicVisitor, UnknownTopic, by_id, visit};
+use serde_json::{Value, json};
 
 pub use rate::hz;
 
@@ -96,6 +96,10 @@ pub fn info(bus: &Bus, name: &str, as_json: bool, out: &mut impl Write) -> Resul
     let (publishers, subscribers) = live
         .as_ref()
         .map_or((0, 0), |topic| (topic.publishers, topic.subscribers));
+    let woken: Vec<u32> = live
+        .iter()
+        .flat_map(|topic| topic.woken.iter().map(|peer| peer.pid))
+        .collect();
     let actors: Vec<String> = entry.qos.actors.iter().map(ToString::to_string).collect();
     if as_json {
         let fields: Vec<_> = entry
@@ -107,7 +111,7 @@ pub fn info(bus: &Bus, name: &str, as_json: bool, out: &mut impl Write) -> Resul
             "name": name, "summary": entry.summary, "type": entry.type_name,
             "hash": format!("{:016x}", entry.hash), "size": entry.size, "fields": fields,
             "buffer": entry.qos.buffer, "history": entry.qos.history, "actors": actors,
-            "publishers": publishers, "subscribers": subscribers,
+            "publishers": publishers, "subscribers": subscribers, "woken": woken,
         });
         writeln!(out, "{value}")?;
         return Ok(());
@@ -146,13 +150,16 @@ pub fn info(bus: &Bus, name: &str, as_json: bool, out: &mut impl Write) -> Resul
     )?;
     let ends = live.iter().flat_map(|topic| {
         let writers = topic.writers.iter().map(|peer| ("written", peer));
-        writers.chain(topic.readers.iter().map(|peer| ("read", peer)))
+        let readers = topic.readers.iter().map(|peer| ("read", peer));
+        let woken = topic.woken.iter().map(|peer| ("woken", peer));
+        writers.chain(readers).chain(woken)
     });
     for (done, peer) in ends {
         let role = peer
             .role
             .map_or("a stranger".into(), |role| role.to_string());
-        writeln!(out, "    {done:7} by {role}, process {}", peer.pid)?;
+        let by = if done == "woken" { "is" } else { "by" };
+        writeln!(out, "    {done:7} {by} {role}, process {}", peer.pid)?;
     }
     Ok(())
 }
@@ -176,6 +183,19 @@ pub fn echo(
             out,
         },
     )?
+}
+
+/// What a sample followed from, for people and programs; null = from no sample.
+fn cause(stamp: &Stamp) -> Value {
+    if stamp.cause_topic == 0 {
+        return Value::Null;
+    }
+    json!({
+        // A newer build may have topics that this one does not know.
+        "topic": by_id(stamp.cause_topic).map(|entry| entry.name),
+        "publish_time_ns": stamp.cause_publish_time_ns,
+        "receive_time_ns": stamp.cause_receive_time_ns,
+    })
 }
 
 struct Echo<'a, W> {
@@ -205,8 +225,8 @@ impl<W: Write> TopicVisitor for Echo<'_, W> {
                 let value = json!({
                     "topic": T::NAME, "sequence": stamp.sequence, "epoch": stamp.epoch,
                     "writer": stamp.writer, "source_time_ns": stamp.source_time_ns,
-                    "publish_time_ns": stamp.publish_time_ns, "lost": subscriber.lost(),
-                    "payload": payload,
+                    "publish_time_ns": stamp.publish_time_ns, "cause": cause(&stamp),
+                    "lost": subscriber.lost(), "payload": payload,
                 });
                 writeln!(self.out, "{value}")?;
             } else {

@@ -1,24 +1,19 @@
 //! The two boards' pins: `impl Board` by arithmetic.
 //!
-//! ```text
-//!    sensor board                              steering board
-//!    set_exde(data, sync) --rise of sync--> exde_bit()
-//!    exde_return()        <---------------- pulse_exde_return()
-//! ```
 //! These types only pass on: every decision is in `lager_control`, every number of the body in
 //! `lager_plant`.
 
 use core::time::Duration;
-use std::collections::VecDeque;
 
-use lager_control::{Board, Motor, SensorBoard, SteeringBoard};
+use lager_control::{Board, EEPROM_LENGTH, Motor, SensorBoard, SteeringBoard};
 use lager_plant::World;
 use lager_wire::ResetCause;
 
+use crate::exde::ExDe;
 use crate::uart::Uart;
 
-/// Rises of sync the steering board's interrupt can keep before its loop looks.
-const EXDE_BUFFER: usize = 32;
+/// How long the chip takes to write a byte of its EEPROM.
+const EEPROM_WRITE_NS: u64 = 3_400_000;
 
 /// What every board has beside its pins.
 #[derive(Clone, Debug)]
@@ -30,6 +25,10 @@ pub(crate) struct Chip {
     /// When its loop last kicked the watchdog.
     pub(crate) kicked_ns: u64,
     pub(crate) now_ns: u64,
+    /// Outlives every reset.
+    pub(crate) eeprom: [u8; EEPROM_LENGTH as usize],
+    /// When the byte being written is.
+    pub(crate) eeprom_free_ns: u64,
 }
 
 impl Chip {
@@ -38,41 +37,11 @@ impl Chip {
     }
 }
 
-/// The three wires between the boards (X2).
-#[derive(Clone, Debug, Default)]
-pub(crate) struct ExDe {
-    data: bool,
-    sync: bool,
-    /// Bits sampled by the steering board's interrupt.
-    pub(crate) bits: VecDeque<(bool, u32)>,
-    /// Whether sync rose since the steering board was stepped.
-    pub(crate) rose: bool,
-    /// Whether the return sync was pulsed since the sensor board looked.
-    pub(crate) returned: bool,
-}
-
-impl ExDe {
-    /// The sensor board is held in reset: its pins are inputs and read low.
-    pub(crate) fn release_sender(&mut self) {
-        self.data = false;
-        self.sync = false;
-        self.returned = false;
-    }
-
-    /// The steering board is held in reset: it samples nothing.
-    pub(crate) fn release_receiver(&mut self) {
-        self.bits.clear();
-        self.rose = false;
-    }
-}
-
 /// The sensor board at one instant.
 pub(crate) struct SensorPins<'robot> {
     pub(crate) chip: &'robot mut Chip,
     pub(crate) world: &'robot mut World,
     pub(crate) exde: &'robot mut ExDe,
-    /// The steering board's clock, if that board is running.
-    pub(crate) receiver_us: Option<u32>,
 }
 
 /// The steering board at one instant.
@@ -108,6 +77,20 @@ macro_rules! board {
             fn kick_watchdog(&mut self) {
                 self.chip.kicked_ns = self.chip.now_ns;
             }
+
+            fn eeprom_read(&self, address: u8) -> u8 {
+                self.chip.eeprom[usize::from(address)]
+            }
+
+            fn eeprom_write(&mut self, address: u8, value: u8) -> bool {
+                let chip = &mut *self.chip;
+                if chip.now_ns < chip.eeprom_free_ns {
+                    return false;
+                }
+                chip.eeprom_free_ns = chip.now_ns + EEPROM_WRITE_NS;
+                chip.eeprom[usize::from(address)] = value;
+                true
+            }
         }
     };
 }
@@ -124,21 +107,12 @@ impl SensorBoard for SensorPins<'_> {
         self.world.read_ir()
     }
 
-    fn set_exde(&mut self, data: bool, sync: bool) {
-        let rises = sync && !self.exde.sync;
-        self.exde.data = data;
-        self.exde.sync = sync;
-        if let Some(now_us) = self.receiver_us
-            && rises
-            && self.exde.bits.len() < EXDE_BUFFER
-        {
-            self.exde.bits.push_back((data, now_us));
-            self.exde.rose = true;
-        }
+    fn exde_send(&mut self, word: u16) -> bool {
+        self.exde.send(word, self.chip.now_ns)
     }
 
-    fn exde_return(&mut self) -> bool {
-        core::mem::take(&mut self.exde.returned)
+    fn exde_is_sending(&self) -> bool {
+        self.exde.is_sending()
     }
 }
 
@@ -151,12 +125,12 @@ impl SteeringBoard for SteeringPins<'_> {
         self.world.set_motors(signed(left), signed(right));
     }
 
-    fn exde_bit(&mut self) -> Option<(bool, u32)> {
-        self.exde.bits.pop_front()
+    fn exde_word(&mut self) -> Option<(u16, u32)> {
+        self.exde.word()
     }
 
-    fn pulse_exde_return(&mut self) {
-        self.exde.returned = true;
+    fn exde_errors(&self) -> u8 {
+        self.exde.errors()
     }
 
     fn servo_write(&mut self, bytes: &[u8]) -> bool {

@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 
 mod boards;
+mod exde;
 mod pty;
 mod robot;
 mod shell;

@@ -23,7 +23,8 @@ use lager_plant::noise::Noise;
 use lager_plant::{Pose, Warehouse, WarehouseError, World, WorldState};
 use lager_wire::ResetCause;
 
-use crate::boards::{ExDe, SensorPins, SteeringPins};
+use crate::boards::{SensorPins, SteeringPins};
+use crate::exde::ExDe;
 use crate::station::{START_UP_NS, Station};
 use crate::uart::Uart;
 
@@ -271,6 +272,7 @@ impl Robot {
             .next_event(self.now_ns)
             .min(self.steering.next_event(self.now_ns))
             .min(servo)
+            .min(self.exde.next_event())
     }
 
     /// Moves the time without an event.
@@ -291,31 +293,32 @@ impl Robot {
         if self.steering.is_bitten(now) {
             self.reset_board(Wire::Steering, ResetCause::Watchdog);
         }
-        if self.sensor.wants(now, self.exde.returned) {
+        if self.exde.next_event() <= now {
+            self.exde.interrupt(now, self.steering.clock_us(now));
+        }
+        if self.sensor.wants(now, self.exde.sent) {
             self.step_sensor(now);
         }
         let servo = self
             .world
             .next_servo_byte()
             .is_some_and(|at| at.as_nanos() as u64 <= now);
-        if self.steering.wants(now, self.exde.rose || servo) {
+        if self.steering.wants(now, self.exde.arrived || servo) {
             self.step_steering(now);
         }
     }
 
     fn step_sensor(&mut self, now: u64) {
-        let receiver_us = self
-            .steering
-            .unit
-            .is_some()
-            .then(|| self.steering.clock_us(now));
+        self.exde.sent = false;
+        if self.sensor.unit.is_none() {
+            self.exde.start_sender(now);
+        }
         self.sensor.come_to(now);
         let Station { unit, chip, .. } = &mut self.sensor;
         let mut pins = SensorPins {
             chip,
             world: &mut self.world,
             exde: &mut self.exde,
-            receiver_us,
         };
         let unit = unit.get_or_insert_with(|| SensorUnit::new(&pins, self.options.sensor));
         let wanted_us = unit.step(&mut pins);
@@ -323,7 +326,10 @@ impl Robot {
     }
 
     fn step_steering(&mut self, now: u64) {
-        self.exde.rose = false;
+        self.exde.arrived = false;
+        if self.steering.unit.is_none() {
+            self.exde.start_receiver();
+        }
         self.steering.come_to(now);
         let Station { unit, chip, .. } = &mut self.steering;
         let mut pins = SteeringPins {

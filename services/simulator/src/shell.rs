@@ -13,7 +13,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use lager_plant::{Warehouse, WarehouseError};
-use lager_ports::{Bus, Clock, PortError, Publisher, SendError, Shutdown};
+use lager_ports::{Bus, Cause, Clock, PortError, Publisher, SendError, Shutdown};
 use lager_topics::TruthPose;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
@@ -173,8 +173,7 @@ impl Shell {
         }
         self.goods_told = changes;
         self.truth_due = now + TRUTH_PERIOD;
-        self.truth
-            .send(Clock::monotonic_ns(), message(&self.robot.truth()))
+        self.truth.send(Cause::OWN, message(&self.robot.truth()))
     }
 
     /// Sleeps for `time`, or until somebody writes to an open port. A closed one cannot be waited

@@ -10,6 +10,7 @@
 //! ```
 //! The same for both boards; what is on their pins is in [`crate::boards`].
 
+use lager_control::EEPROM_LENGTH;
 use lager_wire::ResetCause;
 
 use crate::boards::Chip;
@@ -45,6 +46,8 @@ impl<Unit> Station<Unit> {
                 boot_ns: starts_ns,
                 kicked_ns: starts_ns,
                 now_ns: 0,
+                eeprom: [u8::MAX; EEPROM_LENGTH as usize],
+                eeprom_free_ns: 0,
             },
             due_ns: starts_ns,
             hung: false,

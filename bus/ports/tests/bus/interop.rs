@@ -11,7 +11,8 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
-use lager_ports::{Clock, Policy, Wake};
+use iceoryx2::service::port_factory::event;
+use lager_ports::{Cause, Clock, Policy, Wake};
 use lager_topics::{
     Answer, Ask, BridgeRequest, LineFrame, Qos, Request, Role, Schema, SensorLine, Stamp, Topic,
 };
@@ -76,7 +77,7 @@ fn a_stock_subscriber_gets_our_samples_with_their_stamps() {
     for number in 0..500 {
         let mut loan = publisher.loan().unwrap();
         *loan = frame(number);
-        loan.source_time_ns(u64::from(number) + 1);
+        loan.cause(Cause::event(u64::from(number) + 1));
         loan.send().unwrap();
         let sample = subscriber.receive().unwrap().unwrap();
         assert_eq!(*sample.payload(), frame(number));
@@ -166,20 +167,75 @@ fn stock_is_refused_with_another_layout() {
     );
 }
 
-#[test]
-fn stock_rings_our_waiter() {
-    let domain = Domain::new();
-    let bus = domain.open(Role::Logic);
-    let waiter = bus.waiter(Policy::Block).unwrap();
-    let node = stock(&domain);
-    let wake = node
-        .service_builder(&name("wake/logic"))
+/// The event service beside the line topic, as a stock process opens it that knows only its name.
+fn line_events(node: &Node<ipc::Service>) -> event::PortFactory<ipc::Service> {
+    node.service_builder(&name(SensorLine::NAME))
         .event()
-        .open()
+        .open_or_create()
+        .unwrap()
+}
+
+#[test]
+fn a_stock_listener_is_notified_of_every_sample() {
+    let domain = Domain::new();
+    let node = stock(&domain);
+    let bus = domain.open(Role::Bridge);
+    let early = bus.publisher::<SensorLine>().unwrap();
+    let listener = line_events(&node).listener_builder().create().unwrap();
+    // One that comes after the listener tells it as well as one that was there before.
+    let late = bus.publisher::<SensorLine>().unwrap();
+    for publisher in [&early, &late, &early] {
+        assert_eq!(listener.try_wait(|_| ()).unwrap(), 0);
+        send(publisher, 1);
+        let mut told = Vec::new();
+        let rings = listener
+            .timed_wait(
+                |event| told.push(event.id.as_value()),
+                Duration::from_secs(60),
+            )
+            .unwrap();
+        assert_eq!((rings, &told[..]), (1, &[0][..]));
+    }
+    // When it has gone, sending goes on; and it may come back.
+    drop(listener);
+    send(&early, 2);
+    let listener = line_events(&node).listener_builder().create().unwrap();
+    send(&early, 3);
+    let woken = listener.timed_wait(|_| (), Duration::from_secs(60));
+    assert_eq!(woken.unwrap(), 1);
+}
+
+#[test]
+fn a_stock_listener_that_was_first_is_notified_too() {
+    let domain = Domain::new();
+    let node = stock(&domain);
+    let events = node
+        .service_builder(&name(SensorLine::NAME))
+        .event()
+        .max_notifiers(SensorLine::QOS.max_publishers())
+        .max_nodes(SensorLine::QOS.max_nodes())
+        .open_or_create()
         .unwrap();
-    let notifier = wake.notifier_builder().create().unwrap();
-    notifier.notify().unwrap();
+    let listener = events.listener_builder().create().unwrap();
+    let bus = domain.open(Role::Bridge);
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    send(&publisher, 1);
+    let woken = listener.timed_wait(|_| (), Duration::from_secs(60));
+    assert_eq!(woken.unwrap(), 1);
+}
+
+#[test]
+fn our_waiters_are_rung_beside_a_stock_listener() {
+    let domain = Domain::new();
+    let node = stock(&domain);
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    let listener = line_events(&node).listener_builder().create().unwrap();
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    send(&publisher, 1);
     assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
+    assert_eq!(listener.try_wait(|_| ()).unwrap(), 1);
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! What tools see of the bus.
 
-use lager_ports::{Layout, NodeState, Peer, nodes, remove_stale_nodes};
+use lager_ports::{Layout, NodeState, Peer, Policy, nodes, remove_stale_nodes};
 use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
 
-use crate::domain::Domain;
+use crate::domain::{Domain, send};
 use crate::process::Player;
 
 #[test]
@@ -43,6 +43,38 @@ fn topics_in_use_are_listed_with_their_ends() {
         pid
     }));
     assert_eq!((topics[1].publishers, topics[1].subscribers), (1, 0));
+}
+
+#[test]
+fn who_is_woken_by_a_topic_is_told() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    let observer = domain.open(Role::Observer);
+    let woken = || observer.topics_of(observer.robot())[0].woken.clone();
+    assert_eq!(woken(), []);
+
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    let _deaf_to_lines = bridge.waiter(Policy::Block).unwrap();
+    let here = Peer {
+        role: Some(Role::Logic),
+        pid: std::process::id(),
+    };
+    assert_eq!(woken(), [here]);
+    let player = Player::start(&domain, "navigator-waits");
+    let there = Peer {
+        pid: player.pid(),
+        ..here
+    };
+    assert_eq!(woken(), [here, there]);
+
+    // A killed one is not shown, although nobody has swept yet and its seat is still rung.
+    player.kill();
+    send(&publisher, 0);
+    assert_eq!(woken(), [here]);
+    drop(waiter);
+    assert_eq!(woken(), []);
 }
 
 #[test]

@@ -3,13 +3,13 @@
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use lager_ports::{CallError, Policy, Wake};
+use lager_ports::{CallError, Cause, Policy, Wake};
 use lager_topics::{
     Ask, BridgeRequest, NavStatus, NavigatorStatus, Outcome, Role, SensorLine, SteeringCommand,
     Topic,
 };
 
-use crate::domain::{Domain, drain, send, until};
+use crate::domain::{Domain, drain, send, sweep, until};
 use crate::process::Player;
 
 const LONG: Duration = Duration::from_secs(60);
@@ -41,7 +41,7 @@ fn a_sweep_counts_the_dead_and_leaves_the_living_alone() {
     let bridge = Player::start(&domain, "deaf-bridge");
     reader.kill();
     bridge.kill();
-    assert_eq!(bus.sweep(), 2);
+    sweep(&bus, 2);
     assert_eq!(bus.sweep(), 0);
     assert_eq!(drain(&mut subscriber).len(), 10);
     drop(living);
@@ -100,7 +100,7 @@ fn what_a_killed_writer_has_sent_survives_the_sweep_if_its_reader_had_met_it() {
     // One sample is enough to meet; nine stay unread.
     assert_eq!(subscriber.receive().unwrap().unwrap().link_epoch, 0);
     writer.kill();
-    assert_eq!(bus.sweep(), 1);
+    sweep(&bus, 1);
     assert_eq!(drain(&mut subscriber), (1..10).collect::<Vec<_>>());
     assert_eq!(subscriber.lost(), 0);
 }
@@ -133,17 +133,17 @@ fn the_successor_of_a_killed_actor_is_rung() {
     let publisher = logic.publisher::<SteeringCommand>().unwrap();
     for swept in [false, true] {
         let actor = Player::start(&domain, "deaf-bridge");
-        publisher.send(0, Default::default()).unwrap();
+        publisher.send(Cause::OWN, Default::default()).unwrap();
         actor.kill();
         for _ in 0..10 {
-            publisher.send(0, Default::default()).unwrap();
+            publisher.send(Cause::OWN, Default::default()).unwrap();
         }
         if swept {
             logic.sweep();
         }
         let successor = domain.open(Role::Bridge);
         let waiter = successor.waiter(Policy::Block).unwrap();
-        publisher.send(0, Default::default()).unwrap();
+        publisher.send(Cause::OWN, Default::default()).unwrap();
         assert_eq!(waiter.wait(LONG), Wake::Rung, "swept: {swept}");
     }
 }
@@ -165,7 +165,7 @@ fn the_last_value_of_a_killed_service_is_handed_to_its_successor() {
     assert_eq!(keeper.value().unwrap().0.order_id, 7);
     service.kill();
     keeper.remember().unwrap();
-    assert_eq!(supervisor.sweep(), 1);
+    sweep(&supervisor, 1);
     keeper.hand_over().unwrap();
     assert!(keeper.is_standing_in());
 
@@ -192,7 +192,7 @@ fn the_last_value_of_a_killed_service_is_handed_to_its_successor() {
                 order_id: 8,
                 ..kept
             };
-            publisher.send(0, status).unwrap();
+            publisher.send(Cause::OWN, status).unwrap();
             taken_over.wait();
         });
         until("the successor has taken over", || {
@@ -223,7 +223,7 @@ fn a_keeper_withdraws_when_the_successor_speaks() {
         order_id: 9,
         ..NavigatorStatus::default()
     };
-    publisher.send(0, status).unwrap();
+    publisher.send(Cause::OWN, status).unwrap();
     keeper.remember().unwrap();
     assert!(!keeper.is_standing_in());
     assert_eq!(keeper.value().unwrap().0.order_id, 9);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_ports::{Bus, BusConfig, OpenError, Policy, PortError, Wake};
+use lager_ports::{Bus, BusConfig, Cause, OpenError, Policy, PortError, Wake};
 use lager_topics::{
     DistanceFrame, Field, FieldInfo, LineFrame, OBSERVERS, Payload, Qos, Role, Schema, SensorLine,
     SteeringCommand, Topic,
@@ -83,6 +83,68 @@ fn too_many_writers_are_refused_and_a_free_place_can_be_taken() {
     );
     writers.pop();
     assert!(bus.publisher::<SensorLine>().is_ok());
+}
+
+#[test]
+fn too_many_waiters_are_refused_and_a_free_seat_can_be_taken() {
+    let domain = Domain::new();
+    let buses = [domain.open(Role::Logic), domain.open(Role::Logic)];
+    let mut waiters: Vec<_> = (0..8)
+        .map(|index| buses[index % 2].waiter(Policy::Block).unwrap())
+        .collect();
+    let refused = buses[0].waiter(Policy::Block).unwrap_err();
+    assert_eq!(
+        refused,
+        PortError::TooManyWaiters {
+            role: Role::Logic,
+            limit: 8
+        }
+    );
+    assert!(refused.to_string().contains("stop a logic that runs twice"));
+    // Another role has seats of its own.
+    assert!(domain.open(Role::Bridge).waiter(Policy::Block).is_ok());
+    waiters.remove(3);
+    assert!(buses[1].waiter(Policy::Block).is_ok());
+}
+
+/// The file of the bell board.
+fn board_of(domain: &Domain) -> PathBuf {
+    let name = domain
+        .in_shared_memory()
+        .into_iter()
+        .find(|name| name.ends_with(".bells"))
+        .expect("somebody waits");
+    Path::new("/dev/shm").join(name)
+}
+
+#[test]
+fn a_board_of_another_build_is_refused_while_it_is_in_use_and_replaced_afterwards() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Logic);
+    let waiter = bus.waiter(Policy::Block).unwrap();
+    let board = board_of(&domain);
+    let intact = std::fs::read(&board).unwrap();
+    let mut other = intact.clone();
+    other[0] ^= 0xff;
+    std::fs::write(&board, &other).unwrap();
+
+    let newcomer = domain.open(Role::Bridge);
+    let refused = newcomer.waiter(Policy::Block).unwrap_err();
+    assert!(
+        matches!(refused, PortError::OtherLayout { .. }),
+        "{refused:?}"
+    );
+    assert!(refused.to_string().contains("another build"));
+
+    // Left behind by a build that is gone, it is in nobody's way.
+    drop(waiter);
+    for left in [&other[..], &intact[..100], &[]] {
+        std::fs::write(&board, left).unwrap();
+        let waiter = newcomer.waiter(Policy::Block).unwrap();
+        let ringer = waiter.ringer().unwrap();
+        ringer.ring();
+        assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
+    }
 }
 
 /// `sensor/line` with another payload under the same name.
@@ -186,8 +248,9 @@ fn description_of_line(domain: &Domain) -> PathBuf {
         .into_iter()
         .find(|path| {
             path.extension().is_some_and(|end| end == "service")
-                && std::fs::read(path)
-                    .is_ok_and(|bytes| bytes.windows(11).any(|part| part == b"sensor/line"))
+                && std::fs::read_to_string(path).is_ok_and(|text| {
+                    text.contains("sensor/line") && text.contains("PublishSubscribe")
+                })
         })
         .expect("the topic's description lies below the root")
 }
@@ -263,7 +326,7 @@ fn a_root_of_the_greatest_length_carries_a_whole_robot() {
     let waiter = bus.waiter(Policy::Block).unwrap();
     let mut orders = bus.subscriber::<SteeringCommand>().unwrap();
     let publisher = bus.publisher::<SteeringCommand>().unwrap();
-    publisher.send(0, Default::default()).unwrap();
+    publisher.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
     assert!(orders.receive().unwrap().is_some());
 }

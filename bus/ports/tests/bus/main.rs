@@ -2,6 +2,7 @@
 //!
 //! Every test has a bus of its own and checks at its end that nothing is left of it.
 
+mod bells;
 mod domain;
 mod interop;
 mod introspection;
@@ -10,4 +11,5 @@ mod limits;
 mod process;
 mod requests;
 mod samples;
+mod stress;
 mod waiting;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Policy};
+use lager_ports::{Bus, BusConfig, Cause, Policy};
 use lager_topics::{
     Answer, BridgeRequest, NavStatus, NavigatorStatus, Outcome, Role, SensorLine, SteeringCommand,
 };
@@ -96,7 +96,7 @@ fn player() {
             let bus = open(Role::Bridge);
             let publisher = bus.publisher::<SensorLine>().unwrap();
             for number in 0..10 {
-                publisher.send(0, frame(number)).unwrap();
+                publisher.send(Cause::OWN, frame(number)).unwrap();
             }
             ready();
             until_parent_ends();
@@ -115,10 +115,60 @@ fn player() {
                     order_id,
                     ..NavigatorStatus::default()
                 };
-                publisher.send(1234, status).unwrap();
+                publisher.send(Cause::event(1234), status).unwrap();
             }
             ready();
             until_parent_ends();
+        }
+        "navigator-waits" => {
+            // Sleeps whenever it is let.
+            let bus = open(Role::Logic);
+            let waiter = bus.waiter(Policy::Block).unwrap();
+            std::thread::spawn(until_parent_ends);
+            ready();
+            loop {
+                waiter.wait(Duration::from_secs(3600));
+            }
+        }
+        "navigator-hurries" => {
+            // Wakes and sleeps as fast as it is rung.
+            let bus = open(Role::Logic);
+            let waiter = bus.waiter(Policy::Block).unwrap();
+            std::thread::spawn(until_parent_ends);
+            ready();
+            loop {
+                waiter.wait(Duration::from_micros(50));
+            }
+        }
+        "navigator-spins" => {
+            // Holds the right to look without pause.
+            let bus = open(Role::Logic);
+            let waiter = bus.waiter(Policy::ADAPTIVE).unwrap();
+            std::thread::spawn(until_parent_ends);
+            let ringer = waiter.ringer().unwrap();
+            std::thread::spawn(move || {
+                loop {
+                    ringer.ring();
+                    std::thread::sleep(Duration::from_micros(20));
+                }
+            });
+            for _ in 0..1000 {
+                waiter.wait(Duration::from_secs(60));
+            }
+            ready();
+            loop {
+                waiter.wait(Duration::from_secs(60));
+            }
+        }
+        "line-flood" => {
+            // Rings without pause.
+            let bus = open(Role::Bridge);
+            let publisher = bus.publisher::<SensorLine>().unwrap();
+            std::thread::spawn(until_parent_ends);
+            ready();
+            loop {
+                publisher.send(Cause::OWN, frame(0)).unwrap();
+            }
         }
         "deaf-bridge" => {
             // Acts on steering/command and answers requests, but does neither.

@@ -2,7 +2,7 @@
 
 use std::sync::Barrier;
 
-use lager_ports::{Bus, BusConfig, Clock, ReceiveError, SendError};
+use lager_ports::{Bus, BusConfig, Cause, Clock, ReceiveError, SendError};
 use lager_topics::{
     LogThought, NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine, Text, Thought,
 };
@@ -21,7 +21,7 @@ fn a_sample_arrives_with_its_stamp() {
     let mut loan = publisher.loan().unwrap();
     assert_eq!(*loan, Default::default());
     loan.link_epoch = 42;
-    loan.source_time_ns(17);
+    loan.cause(Cause::event(17));
     loan.send().unwrap();
     let after = Clock::monotonic_ns();
 
@@ -131,9 +131,9 @@ fn each_writer_is_counted_for_itself() {
     let one = bus.publisher::<OperatorInput>().unwrap();
     let two = bus.publisher::<OperatorInput>().unwrap();
     for number in 0..20 {
-        one.send(0, Default::default()).unwrap();
+        one.send(Cause::OWN, Default::default()).unwrap();
         if number % 2 == 0 {
-            two.send(0, Default::default()).unwrap();
+            two.send(Cause::OWN, Default::default()).unwrap();
         }
     }
     while subscriber.receive().unwrap().is_some() {}
@@ -205,7 +205,7 @@ fn a_late_joiner_gets_the_last_state_at_the_writers_tick() {
             order_id,
             ..NavigatorStatus::default()
         };
-        publisher.send(0, status).unwrap();
+        publisher.send(Cause::OWN, status).unwrap();
     }
     let mut late = domain
         .open(Role::Observer)
@@ -262,7 +262,7 @@ fn text_travels() {
         text: Text::new("Hyllan är tom."),
         from: Role::Logic.into(),
     };
-    publisher.send(0, thought).unwrap();
+    publisher.send(Cause::OWN, thought).unwrap();
     assert_eq!(*subscriber.receive().unwrap().unwrap(), thought);
 }
 
@@ -364,7 +364,7 @@ fn processes_that_come_and_go_at_once_agree_on_one_topic() {
                     let mut subscriber = bus.subscriber::<OperatorInput>().unwrap();
                     together.wait();
                     let publisher = bus.publisher::<OperatorInput>().unwrap();
-                    publisher.send(0, Default::default()).unwrap();
+                    publisher.send(Cause::OWN, Default::default()).unwrap();
                     together.wait();
                     let mut writers = std::collections::HashSet::new();
                     while let Some(sample) = subscriber.receive().unwrap() {

@@ -1,9 +1,10 @@
 //! Waking: by a ring, by a time-out, across restarts and threads.
 
 use std::sync::Barrier;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Policy, PortError, Shutdown, Wake};
+use lager_ports::{Bus, Cause, Policy, PortError, Shutdown, Wake};
 use lager_topics::{OperatorInput, Role, SensorDistance, SensorLine, SteeringCommand};
 
 use crate::domain::{Domain, drain, send, until};
@@ -11,7 +12,7 @@ use crate::domain::{Domain, drain, send, until};
 /// Long enough that a ring, not the time-out, ends the wait.
 const LONG: Duration = Duration::from_secs(60);
 
-const POLICIES: [Policy; 3] = [Policy::Block, Policy::Spin, Policy::Adaptive];
+const POLICIES: [Policy; 3] = [Policy::Block, Policy::Spin, Policy::ADAPTIVE];
 
 #[test]
 fn a_sample_wakes_the_actor_under_every_policy() {
@@ -73,6 +74,137 @@ fn without_a_ring_the_wait_ends_by_its_time_out() {
 }
 
 #[test]
+fn a_sample_is_found_by_looking_for_it_under_every_policy() {
+    for policy in POLICIES {
+        let domain = Domain::new();
+        let logic = domain.open(Role::Logic);
+        let waiter = logic.waiter(policy).unwrap();
+        let mut subscriber = logic.subscriber::<SensorLine>().unwrap();
+        let bridge = domain.open(Role::Bridge);
+        let read = Barrier::new(2);
+        let mut look = || drain(&mut subscriber).pop();
+        // The ring of the first is still to be noticed when the second is looked for.
+        let publisher = bridge.publisher::<SensorLine>().unwrap();
+        for number in 0..100 {
+            send(&publisher, number);
+            assert_eq!(waiter.wait_for(LONG, &mut look), Some(number), "{policy}");
+        }
+        assert_eq!(waiter.wait_for(LONG, &mut look), None, "{policy}: its ring");
+        let start = Instant::now();
+        let timeout = Duration::from_millis(3);
+        assert_eq!(waiter.wait_for(timeout, &mut look), None, "{policy}");
+        assert!(start.elapsed() >= timeout, "{policy}");
+
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let publisher = bridge.publisher::<SensorLine>().unwrap();
+                std::thread::sleep(Duration::from_millis(10));
+                send(&publisher, 7);
+                read.wait();
+            });
+            assert_eq!(waiter.wait_for(LONG, &mut look), Some(7), "{policy}");
+            read.wait();
+        });
+        let ringer = waiter.ringer().unwrap();
+        waiter.wait(Duration::ZERO);
+        ringer.ring();
+        assert_eq!(
+            waiter.wait_for(LONG, &mut look),
+            None,
+            "{policy}: a ring for others"
+        );
+    }
+}
+
+#[test]
+fn a_quiet_adaptive_waiter_sleeps_for_every_ring() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::ADAPTIVE).unwrap();
+    let ringer = waiter.ringer().unwrap();
+    const RINGS: u64 = 40;
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            for _ in 0..RINGS {
+                std::thread::sleep(Duration::from_millis(5));
+                ringer.ring();
+            }
+        });
+        for _ in 0..RINGS {
+            // A machine with other things to do may join rings, never split them.
+            let before = waiter.sleeps();
+            if waiter.wait(Duration::from_millis(500)) == Wake::TimedOut {
+                break;
+            }
+            assert_eq!(waiter.sleeps() - before, 1);
+        }
+    });
+    // And without any ring it sleeps its whole time-out at once.
+    let before = waiter.sleeps();
+    assert_eq!(waiter.wait(Duration::from_millis(5)), Wake::TimedOut);
+    assert_eq!(waiter.sleeps() - before, 1);
+}
+
+#[test]
+fn an_adaptive_waiter_does_not_sleep_under_quick_rings() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    // On one core nobody may spin, since the ringer needs it.
+    if std::thread::available_parallelism().unwrap().get() > 1 {
+        spins_under_quick_rings(&logic);
+    }
+}
+
+/// Rings at 10 kHz until a waiter has waited for three in a row without a sleep. On a busy machine
+/// neither thread keeps its core for long and sleeping is right, so it is tried many times.
+pub(crate) fn spins_under_quick_rings(bus: &Bus) {
+    const DISTANCE: Duration = Duration::from_micros(100);
+    let waited_awake = || {
+        let waiter = bus.waiter(Policy::ADAPTIVE).unwrap();
+        let ringer = waiter.ringer().unwrap();
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !stop.load(Ordering::Relaxed) {
+                    ringer.ring();
+                    let last = Instant::now();
+                    while last.elapsed() < DISTANCE {
+                        std::hint::spin_loop();
+                    }
+                }
+            });
+            let _stop = StopsAtTheEnd(&stop);
+            let mut awake = 0;
+            for _ in 0..40 {
+                let (before, start) = (waiter.sleeps(), Instant::now());
+                assert_eq!(waiter.wait(LONG), Wake::Rung);
+                // A ring that was there already has not been waited for.
+                let waited = start.elapsed() > DISTANCE / 2;
+                awake = if waited && waiter.sleeps() == before {
+                    awake + 1
+                } else {
+                    0
+                };
+                if awake == 3 {
+                    return true;
+                }
+            }
+            false
+        })
+    };
+    until("it looks instead of sleeping", waited_awake);
+}
+
+/// Ends the other thread also when this one fails.
+struct StopsAtTheEnd<'a>(&'a AtomicBool);
+
+impl Drop for StopsAtTheEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+#[test]
 fn many_samples_may_come_with_one_ring() {
     let domain = Domain::new();
     let logic = domain.open(Role::Logic);
@@ -99,9 +231,9 @@ fn one_waiter_serves_all_topics_of_its_role() {
     let input = bridge.publisher::<OperatorInput>().unwrap();
     send(&line, 0);
     assert_eq!(waiter.wait(LONG), Wake::Rung);
-    distance.send(0, Default::default()).unwrap();
+    distance.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(waiter.wait(LONG), Wake::Rung);
-    input.send(0, Default::default()).unwrap();
+    input.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(waiter.wait(LONG), Wake::Rung);
 }
 
@@ -115,12 +247,12 @@ fn a_sample_rings_every_actor_of_its_topic_and_nobody_else() {
     let comm = domain.open(Role::Comm);
 
     let input = comm.publisher::<OperatorInput>().unwrap();
-    input.send(0, Default::default()).unwrap();
+    input.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(logic_waiter.wait(LONG), Wake::Rung);
     assert_eq!(bridge_waiter.wait(LONG), Wake::Rung);
 
     let command = comm.publisher::<SteeringCommand>().unwrap();
-    command.send(0, Default::default()).unwrap();
+    command.send(Cause::OWN, Default::default()).unwrap();
     assert_eq!(bridge_waiter.wait(LONG), Wake::Rung);
     assert_eq!(logic_waiter.wait(Duration::from_millis(5)), Wake::TimedOut);
 }

@@ -1,5 +1,6 @@
 //! The sample layouts, one file per family of topics.
 
+mod latency;
 mod link;
 mod log;
 mod mission;
@@ -9,6 +10,7 @@ mod sensor;
 mod steering;
 mod truth;
 
+pub use latency::{PathLatency, StageLatency};
 pub use link::{BoardHealth, Health, Mode};
 pub use log::Thought;
 pub use mission::{Event, EventKind, Input, InputKind, Order};

@@ -21,7 +21,6 @@ mod ends;
 mod telling;
 
 use ends::{End, Finish};
-use lager_exde::{Receiver, Timing};
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
     ArmCommand, Callsign, Command, LineBits, Payload, ResetCause, Setting, SettingKey,
@@ -34,15 +33,16 @@ use crate::line::LineReader;
 use crate::load::Load;
 use crate::pd::{Gains, Pd};
 use crate::register::{CommandRegister, Receipt};
+use crate::store::Store;
 use crate::time::{first, reached};
 use crate::wheels::{Motors, STILL, Wheels};
-use crate::{Board, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
+use crate::{Board, EEPROM_POLL_US, MOST_BYTES, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
 use telling::Reports;
 
 /// The steering board's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SteeringConfig {
-    /// Gains at start.
+    /// Gains until others are set, which are kept in EEPROM.
     pub gains: Gains,
     /// Age of the command, in microseconds, beyond which the board stops.
     pub command_age_limit_us: u32,
@@ -54,8 +54,6 @@ pub struct SteeringConfig {
     pub line_age_limit_us: u32,
     /// Silence inside a packet after which it is given up, in microseconds.
     pub gap_us: u32,
-    /// Times of ExDe.
-    pub exde: Timing,
     /// The arm's numbers.
     pub arm: ArmConfig,
 }
@@ -69,7 +67,6 @@ impl Default for SteeringConfig {
             status_period_us: 500_000,
             line_age_limit_us: 100_000,
             gap_us: PACKET_GAP_US,
-            exde: Timing::STANDARD,
             arm: ArmConfig::default(),
         }
     }
@@ -106,7 +103,6 @@ pub struct SteeringUnit {
     register: CommandRegister,
     age: CommandAge,
     refused: u8,
-    receiver: Receiver,
     line: Line,
     wheels: Wheels,
     arm: Arm,
@@ -115,6 +111,8 @@ pub struct SteeringUnit {
     motors: Option<Motors>,
     reports: Reports,
     load: Load,
+    /// The gains, P and D.
+    store: Store<2>,
 }
 
 impl SteeringUnit {
@@ -123,6 +121,8 @@ impl SteeringUnit {
     pub fn new(board: &impl Board, config: SteeringConfig) -> Self {
         let now_us = board.now_us();
         let reset = board.reset_cause();
+        let (store, kept) = Store::load(board);
+        let gains = kept.map_or(config.gains, |[p, d]| Gains { p, d });
         Self {
             reset,
             link: BoardLink::new(Callsign::Steering, reset, config.gap_us),
@@ -130,10 +130,9 @@ impl SteeringUnit {
             register: CommandRegister::new(),
             age: CommandAge::new(config.command_age_limit_us),
             refused: 0,
-            receiver: Receiver::new(config.exde),
             line: Line {
                 reader: LineReader::new(),
-                pd: Pd::new(config.gains),
+                pd: Pd::new(gains),
                 correction: 0,
                 fresh_since_us: None,
             },
@@ -144,6 +143,7 @@ impl SteeringUnit {
             motors: None,
             reports: Reports::new(now_us),
             load: Load::new(now_us),
+            store,
             config,
         }
     }
@@ -154,11 +154,14 @@ impl SteeringUnit {
         let now_us = board.now_us();
         board.kick_watchdog();
         self.listen(board, now_us);
-        self.read_line(board, now_us);
-        self.move_arm(board, now_us);
         self.watch_age(now_us);
+        self.read_line(board, now_us);
         self.drive(board, now_us);
+        self.move_arm(board, now_us);
+        self.follow(board, now_us);
         self.report(board, now_us);
+        self.follow(board, now_us);
+        self.store.poll(board);
         let done_us = board.now_us();
         self.load.worked(now_us, done_us);
         self.load.passed(done_us.wrapping_sub(now_us));
@@ -166,7 +169,10 @@ impl SteeringUnit {
     }
 
     fn listen<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
-        while let Some(byte) = board.uart_read() {
+        for _ in 0..MOST_BYTES {
+            let Some(byte) = board.uart_read() else {
+                return;
+            };
             match self.link.push(byte, now_us) {
                 None => {}
                 Some(BoardEvent::Up) => self.greet(now_us),
@@ -271,6 +277,7 @@ impl SteeringUnit {
         let (value, status) = match changed {
             Ok((value, gains)) => {
                 self.line.pd.set_gains(gains);
+                self.store.save([gains.p, gains.d]);
                 (value, SettingStatus::Accepted)
             }
             Err(_) => (in_force, SettingStatus::OutOfRange),
@@ -283,24 +290,34 @@ impl SteeringUnit {
         }
     }
 
+    /// Looks once more at the line, between things that take long, so that the wheels do not wait for them.
+    fn follow<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
+        if self.read_words(board) {
+            self.drive(board, now_us);
+        }
+    }
+
     fn read_line<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
-        while let Some((data, at_us)) = board.exde_bit() {
-            if let Some(word) = self.receiver.on_sync(data, at_us) {
-                let bits = LineBits::new(word);
-                let reading = self.line.reader.read(bits);
-                self.line.correction = self.line.pd.update(reading.error, at_us);
-                self.line.fresh_since_us = Some(at_us);
-                self.wheels.on_word(bits);
-            }
-        }
-        if self.receiver.return_sync(now_us) {
-            board.pulse_exde_return();
-        }
+        self.read_words(board);
         if let Some(due_us) = self.line_due_us()
             && reached(now_us, due_us)
         {
             self.line.fresh_since_us = None;
         }
+    }
+
+    /// Takes in the words that have come; whether there were any.
+    fn read_words<B: SteeringBoard>(&mut self, board: &mut B) -> bool {
+        let mut came = false;
+        while let Some((word, at_us)) = board.exde_word() {
+            came = true;
+            let bits = LineBits::new(word);
+            let reading = self.line.reader.read(bits, at_us);
+            self.line.correction = self.line.pd.update(reading.error, at_us);
+            self.line.fresh_since_us = Some(at_us);
+            self.wheels.on_word(bits, at_us);
+        }
+        came
     }
 
     fn line_due_us(&self) -> Option<u32> {
@@ -361,12 +378,16 @@ impl SteeringUnit {
             .link
             .us_to_syn(now_us)
             .map(|us| now_us.wrapping_add(us));
+        let save_us = self
+            .store
+            .is_saving()
+            .then(|| now_us.wrapping_add(EEPROM_POLL_US));
         for other_us in [
             syn_us.or_else(|| self.report_due_us(now_us)),
             self.age.next_due_us(),
             self.line_due_us(),
             self.wheels.next_due_us(),
-            self.receiver.next_due_us(),
+            save_us,
         ]
         .into_iter()
         .flatten()

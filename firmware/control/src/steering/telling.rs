@@ -77,7 +77,7 @@ impl SteeringUnit {
             return Some(Payload::SettingReply(reply));
         }
         if core::mem::take(&mut self.reports.status_wanted) {
-            return Some(Payload::BoardStatus(self.board_status(now_us)));
+            return Some(Payload::BoardStatus(self.board_status(board, now_us)));
         }
         if reached(now_us, self.reports.data_due_us) && board.uart_idle() {
             return Some(Payload::SteerData(self.steer_data(board, now_us)));
@@ -132,7 +132,7 @@ impl SteeringUnit {
         flags
     }
 
-    fn board_status(&mut self, now_us: u32) -> BoardStatus {
+    fn board_status<B: SteeringBoard>(&mut self, board: &B, now_us: u32) -> BoardStatus {
         self.reports.status_due_us = now_us.wrapping_add(self.config.status_period_us);
         let (load_percent, longest_loop_100us) = self.load.report(now_us);
         BoardStatus {
@@ -140,7 +140,7 @@ impl SteeringUnit {
             bad_packets: self.link.bad_packets(),
             lost_packets: self.link.lost_packets(),
             refused: self.refused,
-            exde_errors: u8::try_from(self.receiver.errors()).unwrap_or(u8::MAX),
+            exde_errors: board.exde_errors(),
             servo_timeouts: self.arm.timeouts(),
             load_percent,
             longest_loop_100us,

@@ -12,7 +12,7 @@ pub mod servos;
 
 use std::collections::VecDeque;
 
-use lager_control::{Board, Motor, SteeringBoard, SteeringConfig, SteeringUnit};
+use lager_control::{Board, EEPROM_LENGTH, Motor, SteeringBoard, SteeringConfig, SteeringUnit};
 use lager_wire::{Payload, ResetCause, Setting, SettingKey, SteerCommand, SteerData};
 pub use pi::{Pi, Uart};
 pub use sensor::SensorBench;
@@ -25,10 +25,11 @@ pub struct SteeringPins {
     pub motors: (Motor, Motor),
     /// Every change of the motors.
     pub motor_log: Vec<(u32, (Motor, Motor))>,
-    pub bits: VecDeque<(bool, u32)>,
-    pub returns: usize,
+    pub words: VecDeque<(u16, u32)>,
+    pub exde_errors: u8,
     pub servos: Servos,
     pub kicks: usize,
+    pub eeprom: [u8; EEPROM_LENGTH as usize],
     /// What the processor adds to the clock at every step.
     pub step_us: u32,
 }
@@ -53,6 +54,13 @@ impl Board for SteeringPins {
         self.kicks += 1;
         self.now_us = self.now_us.wrapping_add(self.step_us);
     }
+    fn eeprom_read(&self, address: u8) -> u8 {
+        self.eeprom[usize::from(address)]
+    }
+    fn eeprom_write(&mut self, address: u8, value: u8) -> bool {
+        self.eeprom[usize::from(address)] = value;
+        true
+    }
 }
 
 impl SteeringBoard for SteeringPins {
@@ -60,11 +68,11 @@ impl SteeringBoard for SteeringPins {
         self.motors = (left, right);
         self.motor_log.push((self.now_us, self.motors));
     }
-    fn exde_bit(&mut self) -> Option<(bool, u32)> {
-        self.bits.pop_front()
+    fn exde_word(&mut self) -> Option<(u16, u32)> {
+        self.words.pop_front()
     }
-    fn pulse_exde_return(&mut self) {
-        self.returns += 1;
+    fn exde_errors(&self) -> u8 {
+        self.exde_errors
     }
     fn servo_write(&mut self, bytes: &[u8]) -> bool {
         self.servos.write(bytes, self.now_us)
@@ -100,10 +108,11 @@ impl Bench {
             uart: Uart::new(now_us),
             motors: (Motor::forward(77), Motor::backward(77)),
             motor_log: Vec::new(),
-            bits: VecDeque::new(),
-            returns: 0,
+            words: VecDeque::new(),
+            exde_errors: 0,
             servos,
             kicks: 0,
+            eeprom: [255; EEPROM_LENGTH as usize],
             step_us: 0,
         };
         let unit = SteeringUnit::new(&pins, config);
@@ -167,6 +176,11 @@ impl Bench {
         }
     }
 
+    /// One step of the board, whatever is left for the next.
+    pub fn step_once(&mut self) {
+        self.due_us = self.unit.step(&mut self.pins);
+    }
+
     /// Lets time pass; the board is stepped when it wants and on input.
     pub fn run_us(&mut self, span_us: u32) {
         let end_us = self.pins.now_us.wrapping_add(span_us);
@@ -225,12 +239,7 @@ impl Bench {
 
     /// A word whose last bit comes now.
     pub fn word(&mut self, bits: u16) {
-        for index in 0..11_u32 {
-            let at_us = self.pins.now_us.wrapping_sub((10 - index) * 100);
-            self.pins
-                .bits
-                .push_back((bits >> (10 - index) & 1 == 1, at_us));
-        }
+        self.pins.words.push_back((bits, self.pins.now_us));
     }
 
     pub fn duties(&self) -> (u8, u8) {

@@ -1,6 +1,6 @@
 //! A sensor board on the bench.
 
-use lager_control::{Board, SensorBoard, SensorConfig, SensorUnit};
+use lager_control::{Board, EEPROM_LENGTH, SensorBoard, SensorConfig, SensorUnit};
 use lager_wire::{Payload, ResetCause, Setting, SettingKey};
 
 use super::{Pi, Uart, ahead};
@@ -14,11 +14,14 @@ pub struct SensorPins {
     pub ir: u16,
     pub ir_reads: usize,
     pub line_reads: usize,
-    pub exde: (bool, bool),
-    /// Every change of data and sync.
-    pub exde_log: Vec<(u32, bool, bool)>,
-    pub returned: bool,
+    /// Whether the steering board has answered.
+    pub answered: bool,
+    /// Every word begun, and when.
+    pub words: Vec<(u32, u16)>,
+    /// How long a word is under way, in microseconds.
+    pub word_us: u32,
     pub kicks: usize,
+    pub eeprom: [u8; EEPROM_LENGTH as usize],
 }
 
 impl Board for SensorPins {
@@ -40,6 +43,13 @@ impl Board for SensorPins {
     fn kick_watchdog(&mut self) {
         self.kicks += 1;
     }
+    fn eeprom_read(&self, address: u8) -> u8 {
+        self.eeprom[usize::from(address)]
+    }
+    fn eeprom_write(&mut self, address: u8, value: u8) -> bool {
+        self.eeprom[usize::from(address)] = value;
+        true
+    }
 }
 
 impl SensorBoard for SensorPins {
@@ -51,17 +61,17 @@ impl SensorBoard for SensorPins {
         self.ir_reads += 1;
         self.ir
     }
-    fn set_exde(&mut self, data: bool, sync: bool) {
-        assert_ne!(
-            self.exde,
-            (data, sync),
-            "the wires are only touched to change them"
-        );
-        self.exde = (data, sync);
-        self.exde_log.push((self.now_us, data, sync));
+    fn exde_send(&mut self, word: u16) -> bool {
+        let takes = self.answered && !self.exde_is_sending();
+        if takes {
+            self.words.push((self.now_us, word));
+        }
+        takes
     }
-    fn exde_return(&mut self) -> bool {
-        core::mem::take(&mut self.returned)
+    fn exde_is_sending(&self) -> bool {
+        self.words
+            .last()
+            .is_some_and(|(begun_us, _)| self.now_us.wrapping_sub(*begun_us) < self.word_us)
     }
 }
 
@@ -82,10 +92,11 @@ impl SensorBench {
             ir: 0,
             ir_reads: 0,
             line_reads: 0,
-            exde: (false, false),
-            exde_log: Vec::new(),
-            returned: false,
+            answered: false,
+            words: Vec::new(),
+            word_us: 300,
             kicks: 0,
+            eeprom: [255; EEPROM_LENGTH as usize],
         };
         let unit = SensorUnit::new(&pins, config);
         Self {
@@ -100,10 +111,11 @@ impl SensorBench {
     pub fn ready(config: SensorConfig) -> Self {
         let mut bench = Self::boot(u32::MAX - 40_000, config);
         bench.run_ms(10);
-        bench.pins.returned = true;
-        bench.run_ms(60);
+        bench.pins.answered = true;
+        // Not on a pass's own time, which whoever runs in whole milliseconds would meet a step late.
+        bench.run_us(60_333);
         bench.pi.packets.clear();
-        bench.pins.exde_log.clear();
+        bench.pins.words.clear();
         bench
     }
 
@@ -136,7 +148,11 @@ impl SensorBench {
     }
 
     pub fn run_ms(&mut self, span_ms: u32) {
-        let end_us = self.pins.now_us.wrapping_add(span_ms * 1_000);
+        self.run_us(span_ms * 1_000);
+    }
+
+    pub fn run_us(&mut self, span_us: u32) {
+        let end_us = self.pins.now_us.wrapping_add(span_us);
         loop {
             let left_us = end_us.wrapping_sub(self.pins.now_us);
             let ahead_us = left_us.min(ahead(self.pins.now_us, self.due_us).max(1));

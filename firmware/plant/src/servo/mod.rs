@@ -20,18 +20,28 @@ use std::collections::VecDeque;
 
 use device::Servo;
 use lager_ax12::table::{GOAL_POSITION_L, ID, RETURN_DELAY_TIME};
-use lager_ax12::{BROADCAST_ID, Frame, Instruction, InstructionDecoder, Packet};
+use lager_ax12::{BROADCAST_ID, ErrorBits, Frame, Instruction, InstructionDecoder, Packet};
 
 use crate::arm::SERVOS;
 
 /// Time of one byte at 1 Mbit/s.
 const BYTE_NS: u64 = 10_000;
 
+/// What is wrong with one servo; nothing, by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ServoFault {
+    /// Errors it reports in every answer, beside those of the question.
+    pub errors: ErrorBits,
+    /// Its answers arrive with a wrong checksum.
+    pub garbled: bool,
+}
+
 /// The servos on their wire.
 #[derive(Clone, Debug)]
 pub struct ServoBus {
     servos: [Servo; SERVOS],
     present: [bool; SERVOS],
+    faults: [ServoFault; SERVOS],
     decoder: InstructionDecoder,
     replies: VecDeque<(u64, u8)>,
     free_ns: u64,
@@ -44,6 +54,7 @@ impl ServoBus {
         Self {
             servos: core::array::from_fn(|index| Servo::new(index as u8 + 1, positions[index])),
             present: [true; SERVOS],
+            faults: [ServoFault::default(); SERVOS],
             decoder: InstructionDecoder::new(),
             replies: VecDeque::new(),
             free_ns: 0,
@@ -64,12 +75,16 @@ impl ServoBus {
             end += BYTE_NS;
             let mut packet = self.decoder.push(byte);
             while let Some(found) = packet {
-                let answer = act(&mut self.servos, &self.present, &found);
+                let answer = act(&mut self.servos, &self.present, &self.faults, &found);
                 if let Some((delay, frame)) = answer {
                     let mut at = end + delay;
-                    for &byte in frame.as_bytes() {
+                    let fault = faults(&self.faults, found.id);
+                    let bytes = frame.as_bytes();
+                    for (place, &byte) in bytes.iter().enumerate() {
                         at += BYTE_NS;
-                        self.replies.push_back((at, byte));
+                        let spoilt = fault.garbled && place + 1 == bytes.len();
+                        self.replies
+                            .push_back((at, if spoilt { !byte } else { byte }));
                     }
                     self.free_ns = at;
                 }
@@ -124,6 +139,13 @@ impl ServoBus {
         }
     }
 
+    /// Makes servo `id` (1 to 8) ill, or well again.
+    pub fn set_fault(&mut self, id: u8, fault: ServoFault) {
+        if let Some(place) = self.faults.get_mut(usize::from(id).wrapping_sub(1)) {
+            *place = fault;
+        }
+    }
+
     /// How often the board sent while a servo was answering.
     pub fn collisions(&self) -> u64 {
         self.collisions
@@ -134,6 +156,7 @@ impl ServoBus {
 fn act(
     servos: &mut [Servo; SERVOS],
     present: &[bool; SERVOS],
+    all_faults: &[ServoFault; SERVOS],
     packet: &Packet<'_>,
 ) -> Option<(u64, Frame)> {
     let instruction = packet.instruction();
@@ -165,8 +188,14 @@ fn act(
         .find(|servo| servo.table[usize::from(ID)] == packet.id)?;
     let (errors, registers) = servo.obey(instruction, packet.parameters);
     let delay = u64::from(servo.table[usize::from(RETURN_DELAY_TIME)]) * 2_000;
+    let errors = errors.union(faults(all_faults, packet.id).errors);
     let frame = Frame::status(packet.id, errors, &registers).ok()?;
     servo.answers(instruction).then_some((delay, frame))
+}
+
+fn faults(faults: &[ServoFault; SERVOS], id: u8) -> ServoFault {
+    let index = usize::from(id).wrapping_sub(1);
+    faults.get(index).copied().unwrap_or_default()
 }
 
 fn nanoseconds(time: Duration) -> u64 {
@@ -176,7 +205,6 @@ fn nanoseconds(time: Duration) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lager_ax12::ErrorBits;
     use lager_ax12::table::{CCW_ANGLE_LIMIT_L, PRESENT_LOAD_L, PRESENT_POSITION_L, RETURN_LEVEL};
 
     fn bus() -> ServoBus {
@@ -322,6 +350,30 @@ mod tests {
             .is_empty()
         );
         assert!(!ask(&mut bus, &Frame::read(6, ID, 1)).is_empty());
+    }
+
+    #[test]
+    fn an_ill_servo_says_so_and_a_garbled_answer_has_a_wrong_checksum() {
+        let mut bus = bus();
+        bus.set_fault(
+            2,
+            ServoFault {
+                errors: ErrorBits::OVERLOAD,
+                garbled: false,
+            },
+        );
+        let answer = ask(&mut bus, &Frame::ping(2));
+        assert_eq!(answer, [0xFF, 0xFF, 0x02, 0x02, 0x20, 0xDB]);
+        bus.set_fault(
+            2,
+            ServoFault {
+                errors: ErrorBits::NONE,
+                garbled: true,
+            },
+        );
+        let answer = ask(&mut bus, &Frame::ping(2));
+        assert_eq!(answer, [0xFF, 0xFF, 0x02, 0x02, 0x00, !0xFB]);
+        assert_eq!(ask(&mut bus, &Frame::ping(3))[4], 0);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The links' side of the main loop: what the readers bring, and boards that come and go.
 
+use lager_ports::Cause;
 use lager_wire::link::HostTransmitter;
 use lager_wire::{Callsign, SettingKey, SettingReply, SettingStatus, SteerData, Version};
 
@@ -119,7 +120,7 @@ impl Core<'_> {
                 *rest = at_rest && *writes > 0;
             }
         }
-        self.publish_state(at_ns);
+        self.publish_state(Cause::event(at_ns));
     }
 }
 

@@ -2,15 +2,21 @@
 //! decided is decided by the [`Arbiter`], which this loop feeds.
 //!
 //! One turn: wait, take what the readers have brought, answer requests, drain all orders, let the
-//! arbiter decide, publish its state, write. The order matters: a resume is answered before the
-//! orders are drained, so that a stop that came with it wins; the arbiter's state is published
-//! before the bytes are written, so that no successor can take a carried-out order for a new one.
+//! arbiter decide, publish its state, write, tell the rest. The order matters: a resume is answered
+//! before the orders are drained, so that a stop that came with it wins; the arbiter's state
+//! (`link/health`) is published before the bytes are written, so that no successor can take a
+//! carried-out order for a new one.
+//!
+//! Nobody is woken in vain: `link/health` rings only when it says something new to logic, the mode
+//! or the stop; `steering/state` tells the order in force with the board's next report, and rings
+//! for reports and for the end of an order.
 //!
 //! **Safe state**: standby. It is written when nobody holds a lease, when a stop is latched, and
 //! several times at shutdown. If this process is killed, the steering board halts by itself
 //! within 150 ms.
 
 mod links;
+mod publish;
 mod requests;
 
 use std::sync::Arc;
@@ -18,20 +24,19 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use heapless::spsc::{Consumer, Queue};
-use lager_ports::{Bus, Clock, PortError, Publisher, Server, Shutdown, Subscriber, Waiter};
+use lager_ports::{Bus, Cause, Clock, PortError, Publisher, Server, Shutdown, Subscriber, Waiter};
 use lager_topics::{
-    BridgeRequest, Health, InputKind, LinkHealth, Mode, OperatorInput, SteeringCommand,
-    SteeringState,
+    BridgeRequest, Health, InputKind, LatencyPath, LinkHealth, Mode, OperatorInput,
+    SteeringCommand, SteeringState,
 };
 use lager_wire::link::HostTransmitter;
-use lager_wire::{
-    Callsign, PACKET_LENGTH, Payload, SettingKey, SteerCommand, SteerData, SteerFlags,
-};
+use lager_wire::{Callsign, PACKET_LENGTH, Payload, SettingKey, SteerCommand, SteerData};
 
-use crate::arbiter::Arbiter;
+use crate::arbiter::{Arbiter, Ended, Verdict};
 use crate::boards::Boards;
 use crate::config::BridgeConfig;
-use crate::frames::{ServoTable, steering_report};
+use crate::frames::ServoTable;
+use crate::path::PathMeter;
 use crate::reader::{PortEvent, QUEUE, Reader, Shared};
 use crate::serial::{PacketWriter, Sent, SerialPort};
 use crate::settings::Settings;
@@ -120,6 +125,7 @@ struct Core<'a> {
     inputs: Subscriber<OperatorInput>,
     state: Publisher<SteeringState>,
     health: Publisher<LinkHealth>,
+    latency: Publisher<LatencyPath>,
     ports: [Port<'a>; 2],
     boards: Boards,
     arbiter: Arbiter,
@@ -132,6 +138,11 @@ struct Core<'a> {
     /// The arbiter's revisions that `link/health` and `steering/state` last showed.
     health_revision: u32,
     state_revision: u32,
+    /// The order that ended last, as `steering/state` last told it.
+    told_end: Option<Ended>,
+    /// Who may drive and whether a stop is latched, as `link/health` last told it.
+    told_mode: Option<(Mode, bool)>,
+    path: PathMeter,
     health_due: Duration,
     lost_before: u64,
     bus_complaints: u32,
@@ -174,10 +185,14 @@ impl<'a> Core<'a> {
             inputs: bus.subscriber()?,
             state: bus.publisher()?,
             health: bus.publisher()?,
+            latency: bus.publisher()?,
             ports: events.map(port),
             boards: Boards::new(kept, shared),
             health_revision: arbiter.revision(),
             state_revision: arbiter.revision(),
+            told_end: arbiter.last_ended(),
+            told_mode: None,
+            path: PathMeter::new(Clock::monotonic_ns()),
             arbiter,
             settings,
             servos: ServoTable::default(),
@@ -221,16 +236,19 @@ impl<'a> Core<'a> {
 
     /// Drains orders and buttons completely.
     fn take_orders(&mut self) {
-        let now = self.clock.now();
-        let now_ns = Clock::monotonic_ns();
         loop {
             match self.orders.receive() {
                 Ok(Some(order)) => {
+                    let received_ns = Clock::monotonic_ns();
                     // A lease counts from its origin's word, not from when it is read here.
-                    let age_ns = now_ns.saturating_sub(order.stamp().publish_time_ns);
-                    let age = Duration::from_nanos(age_ns).mul_f64(self.clock.speed());
+                    let given_ns = order.stamp().publish_time_ns.min(received_ns);
                     let was_stopped = self.arbiter.is_stopped();
-                    self.arbiter.order(now.saturating_sub(age), &order);
+                    let verdict = self.arbiter.order(self.clock.at(given_ns), &order);
+                    if verdict == Verdict::Executes
+                        && let Some((key, _)) = self.arbiter.current()
+                    {
+                        self.path.begin(key, order.stamp(), received_ns);
+                    }
                     if self.arbiter.is_stopped() && !was_stopped {
                         tracing::warn!("stopped; a resume releases it");
                     }
@@ -266,20 +284,31 @@ impl<'a> Core<'a> {
 
     /// Lets the arbiter decide, publishes what has changed, and writes what is due.
     fn flush(&mut self) {
-        let now = self.clock.now();
+        let now_ns = Clock::monotonic_ns();
+        let now = self.clock.at(now_ns);
         self.arbiter.advance(now);
-        let revision = self.arbiter.revision();
-        if revision != self.health_revision || self.health_due <= now {
+        if self.arbiter.revision() != self.health_revision || self.health_due <= now {
             self.publish_health(now);
-        }
-        if revision != self.state_revision {
-            self.publish_state(Clock::monotonic_ns());
         }
         if let Some(place) = self.boards.place(Callsign::Steering) {
             while let Some(command) = self.arbiter.poll(now) {
                 self.write_command(now, place, command);
             }
         }
+        self.path.give_up();
+        self.write_settings(now);
+        // A report tells the order in force soon enough, but not every board reports.
+        let unreported = self.report.is_none() && self.arbiter.revision() != self.state_revision;
+        if unreported || self.arbiter.last_ended() != self.told_end {
+            self.publish_state(Cause::OWN);
+        }
+        if self.path.is_due(now_ns) {
+            self.publish_latency(now_ns);
+        }
+    }
+
+    /// Writes the settings that are due.
+    fn write_settings(&mut self, now: Duration) {
         for board in [Callsign::Sensor, Callsign::Steering] {
             let Some(place) = self.boards.place(board) else {
                 continue;
@@ -300,7 +329,15 @@ impl<'a> Core<'a> {
             .is_some_and(|packet| self.write(place, &packet));
         if !written {
             self.arbiter.not_written(now);
-        } else if let Some((writes, _)) = &mut self.parking {
+            return;
+        }
+        if let Some((key, in_force)) = self.arbiter.current()
+            && in_force.code() == command.code
+            && self.path.is_waiting_for(key)
+        {
+            self.path.written(Clock::monotonic_ns());
+        }
+        if let Some((writes, _)) = &mut self.parking {
             *writes += 1;
         }
     }
@@ -316,53 +353,6 @@ impl<'a> Core<'a> {
             port.writer.write(device, packet),
             Ok(Sent::Whole | Sent::Partly)
         )
-    }
-
-    fn publish_health(&mut self, now: Duration) {
-        self.boards.measure(self.shared);
-        let dropped = self.shared.dropped.load(Ordering::Relaxed);
-        let lost = self.orders.lost() + self.inputs.lost() + u64::from(dropped);
-        let sent = self.health.loan().and_then(|mut loan| {
-            self.boards.fill(&mut loan);
-            self.arbiter.fill(now, &mut loan);
-            self.settings.fill(&mut loan);
-            loan.bus_lost = self.lost_before + lost;
-            loan.send()
-        });
-        match sent {
-            Ok(()) => self.health_revision = self.arbiter.revision(),
-            Err(error) => self.complain(&error),
-        }
-        self.health_due = now + HEALTH_PERIOD;
-    }
-
-    /// Publishes what the steering board does. Without a report that means something it is what
-    /// the board was told.
-    fn publish_state(&mut self, at_ns: u64) {
-        let told = SteerData {
-            code: self
-                .arbiter
-                .current()
-                .map_or(0, |(_, command)| command.code()),
-            left_duty: 0,
-            right_duty: 0,
-            flags: SteerFlags::NONE,
-            line_error: 0,
-            finished_seq: 0,
-            servo_errors: 0,
-            battery_decivolts: 0,
-        };
-        let data = self.report.unwrap_or(told);
-        let epoch = self.boards.epoch(Callsign::Steering);
-        let sent = self.state.loan().and_then(|mut loan| {
-            *loan = steering_report(epoch, &data, &self.servos, &self.arbiter);
-            loan.source_time_ns(at_ns);
-            loan.send()
-        });
-        match sent {
-            Ok(()) => self.state_revision = self.arbiter.revision(),
-            Err(error) => self.complain(&error),
-        }
     }
 
     /// Brings the robot to rest before the bridge ends.

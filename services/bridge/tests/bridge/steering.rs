@@ -1,5 +1,6 @@
 //! The way of an order: bus, arbiter, packet, board, and back as a report.
 
+use lager_ports::Cause;
 use lager_topics::{AskKind, Finish, Input, InputKind, Mode, OperatorInput, Origin, Outcome, Role};
 use lager_wire::{ArmCommand, Command, LineState, SteerFlags};
 
@@ -327,7 +328,7 @@ fn the_switch_button_changes_the_mode() {
         let kind = InputKind::SwitchPressed.into();
         buttons
             .send(
-                0,
+                Cause::OWN,
                 Input {
                     kind,
                     ..Input::default()

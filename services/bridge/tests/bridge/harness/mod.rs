@@ -21,7 +21,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lager_bridge::BridgeConfig;
-use lager_ports::{Bus, BusConfig, Client, PortError, Publisher, Shutdown, Subscriber};
+use lager_ports::{Bus, BusConfig, Cause, Client, PortError, Publisher, Shutdown, Subscriber};
 use lager_topics::{
     Answer, Ask, AskKind, BridgeRequest, DistanceFrame, Health, LineFrame, LinkHealth, Mode,
     OrderKind, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder,
@@ -242,7 +242,7 @@ impl Hands {
     }
 
     pub(crate) fn give(&self, order: SteeringOrder) {
-        self.orders.send(0, order).unwrap();
+        self.orders.send(Cause::OWN, order).unwrap();
     }
 
     /// Renews `order` every 40 ms until `condition` holds.

@@ -1,0 +1,181 @@
+//! The scenarios with their real processes, from the start to the report: whether they measure what
+//! they say, end when a process dies, and leave nothing behind. No time is asserted.
+//!
+//! Not under the standard harness, because this executable is also its own other processes.
+
+use std::path::Path;
+use std::time::Duration;
+
+use lager_benches::hop;
+use lager_benches::{BenchError, Mode, Options, Regime, Report, parts};
+use rustix::process::{Pid, Signal, kill_process};
+
+fn main() {
+    parts::play_if_asked();
+    let tests: &[(&str, fn())] = &[
+        ("a_hop_yields_every_row_once", a_hop_yields_every_row_once),
+        (
+            "a_report_is_read_back_as_it_was_written",
+            a_report_is_read_back_as_it_was_written,
+        ),
+        (
+            "a_killed_player_ends_the_measurement",
+            a_killed_player_ends_the_measurement,
+        ),
+        (
+            "what_cannot_be_measured_is_refused",
+            what_cannot_be_measured_is_refused,
+        ),
+    ];
+    // As under the standard harness: a word chooses the tests whose names contain it.
+    let chosen = std::env::args().skip(1).find(|word| !word.starts_with('-'));
+    for (name, test) in tests {
+        if chosen
+            .as_ref()
+            .is_none_or(|word| name.contains(word.as_str()))
+        {
+            test();
+            assert_eq!(left_behind(), Vec::<String>::new(), "after {name}");
+            println!("test {name} ... ok");
+        }
+    }
+}
+
+fn options(modes: &[Mode], regime: Regime) -> Options {
+    Options {
+        runs: 1,
+        quick: true,
+        modes: modes.to_vec(),
+        regimes: vec![regime],
+    }
+}
+
+/// The cheapest measurement: one core, nobody spins.
+fn same_core() -> Report {
+    hop::measure(&options(&[Mode::Block], Regime::SameCore)).expect("a report")
+}
+
+fn a_hop_yields_every_row_once() {
+    let report = same_core();
+    let labels: Vec<String> = report
+        .rows
+        .iter()
+        .filter(|row| row.what == "hop")
+        .map(lager_benches::Row::label)
+        .collect();
+    assert_eq!(
+        labels,
+        [
+            "lager",
+            "iceoryx2/event",
+            "futex",
+            "eventfd",
+            "pipe",
+            "uds",
+            "tcp"
+        ]
+    );
+    for row in &report.rows {
+        assert!(row.n >= 200, "{row:?}");
+        assert!(
+            row.p50_ns <= row.p99_ns && row.p99_ns <= row.p999_ns,
+            "{row:?}"
+        );
+    }
+    let ratio = report
+        .ratio("hop", "lager", Mode::Block, Regime::SameCore, "futex")
+        .expect("the typed ports are compared with the futex");
+    assert!(ratio.p50 > 0.0);
+    assert!(
+        report
+            .ratio(
+                "ring-64",
+                "lager/ring",
+                Mode::Block,
+                Regime::SameCore,
+                "iceoryx2/notify"
+            )
+            .is_some()
+    );
+}
+
+fn a_report_is_read_back_as_it_was_written() {
+    let report = same_core();
+    let json: serde_json::Value = serde_json::from_str(&report.to_json()).expect("JSON");
+    assert!(json["machine"].is_string());
+    let row = &json["rows"][0];
+    for field in [
+        "name",
+        "mode",
+        "regime",
+        "n",
+        "p50_ns",
+        "p99_ns",
+        "p999_ns",
+        "ratio_to",
+        "ratio_p50",
+    ] {
+        assert!(!row[field].is_null(), "no {field} in {row}");
+    }
+    assert_eq!(row["mode"], "block");
+    assert_eq!(row["regime"], "same-core");
+    let again: Report = serde_json::from_value(json).expect("the same layout");
+    assert_eq!(again.rows.len(), report.rows.len());
+    for line in report.to_string().lines() {
+        assert!(line.chars().count() <= 100, "{line}");
+    }
+}
+
+fn a_killed_player_ends_the_measurement() {
+    let killer = std::thread::spawn(|| {
+        loop {
+            if let Some(player) = a_player() {
+                // Some way into its work, wherever that is.
+                std::thread::sleep(Duration::from_millis(30));
+                if kill_process(player, Signal::KILL).is_ok() {
+                    return;
+                }
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+    let ended = hop::measure(&options(&[Mode::Block], Regime::SameCore));
+    killer.join().expect("the killer finds a player");
+    assert!(
+        matches!(ended, Err(BenchError::PartEnded { .. })),
+        "{ended:?}"
+    );
+}
+
+fn what_cannot_be_measured_is_refused() {
+    let refused = hop::measure(&options(&[Mode::Spin], Regime::SameCore));
+    assert!(
+        matches!(refused, Err(BenchError::NothingToMeasure(_))),
+        "{refused:?}"
+    );
+}
+
+/// A process that this one has started to play a part.
+fn a_player() -> Option<Pid> {
+    let own = std::process::id().to_string();
+    std::fs::read_dir("/proc").ok()?.find_map(|entry| {
+        let path = entry.ok()?.path();
+        let stat = std::fs::read_to_string(path.join("stat")).ok()?;
+        // "pid (name) state parent …": a name may contain blanks and brackets.
+        let parent = stat.rsplit_once(") ")?.1.split(' ').nth(1)?.to_owned();
+        let number: i32 = path.file_name()?.to_str()?.parse().ok()?;
+        (parent == own).then(|| Pid::from_raw(number))?
+    })
+}
+
+/// What measurements of this process have left in shared memory and among temporary files.
+fn left_behind() -> Vec<String> {
+    let own = format!("lager-bench-{}-", std::process::id());
+    [Path::new("/dev/shm"), &std::env::temp_dir()]
+        .iter()
+        .filter_map(|folder| std::fs::read_dir(folder).ok())
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with(&own))
+        .collect()
+}

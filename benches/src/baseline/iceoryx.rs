@@ -1,0 +1,356 @@
+//! Bare iceoryx2, as its own examples use it: its stock `ipc` service, its ports, nothing between.
+//!
+//! Three kinds of line differ in what they carry besides the ball: the same header as the typed
+//! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and iceoryx2's
+//! own defaults. A receiver looks without pause, or sleeps on an iceoryx2 event that the sender
+//! notifies after publishing.
+
+use core::fmt::Debug;
+use core::time::Duration;
+use std::path::Path as OsPath;
+use std::time::Instant;
+
+use iceoryx2::config::Config;
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{
+    FileName, LogLevel, Node, NodeBuilder, Path, SemanticString, ServiceName, SignalHandlingMode,
+    ZeroCopySend, ipc, set_log_level,
+};
+use lager_ports::Clock;
+use lager_topics::{Qos, Stamp};
+
+use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
+use crate::ball::Ball;
+use crate::error::BenchError;
+
+/// Samples a subscriber may hold, as the typed ports allow.
+const MAX_HELD: usize = 4;
+
+/// What stands in front of each sample.
+pub(crate) trait Header: Debug + Default + ZeroCopySend + 'static {
+    /// Fills it in for the sample with that number.
+    fn fill(&mut self, number: u64, stream: &Stream);
+}
+
+/// What the headers of one sender have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stream {
+    epoch: u64,
+    writer: u32,
+}
+
+impl Stream {
+    /// A stream that begins now and is this process's.
+    pub(crate) fn new() -> Self {
+        Self {
+            epoch: Clock::monotonic_ns(),
+            writer: std::process::id(),
+        }
+    }
+}
+
+impl Header for Stamp {
+    fn fill(&mut self, number: u64, stream: &Stream) {
+        let now = Clock::monotonic_ns();
+        *self = Self {
+            sequence: number,
+            source_time_ns: now,
+            publish_time_ns: now,
+            epoch: stream.epoch,
+            writer: stream.writer,
+            ..Self::default()
+        };
+    }
+}
+
+impl Header for () {
+    fn fill(&mut self, _: u64, _: &Stream) {}
+}
+
+/// A process's membership.
+pub(crate) struct Member {
+    node: Node<ipc::Service>,
+}
+
+impl Member {
+    /// Joins the bus with that prefix and root.
+    pub(crate) fn join(prefix: &str, root: &OsPath) -> Result<Self, BenchError> {
+        set_log_level(LogLevel::Fatal);
+        let config = config(prefix, root)?;
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create()
+            .map_err(|error| failed("bare iceoryx2 could not be joined", error))?;
+        Ok(Self { node })
+    }
+
+    /// A publisher of balls; `None` leaves iceoryx2's limits as they are.
+    pub(crate) fn publisher<H: Header>(
+        &self,
+        name: &str,
+        limits: Option<&Qos>,
+    ) -> Result<Publisher<ipc::Service, Ball, H>, BenchError> {
+        const WHAT: &str = "a publisher of bare iceoryx2 could not be made";
+        patiently(|| {
+            let service = self.topic::<Ball, H>(name, limits)?;
+            service
+                .publisher_builder()
+                .create()
+                .map_err(|error| failed(WHAT, error))
+        })
+    }
+
+    /// A subscriber to balls; limits as for the publisher.
+    pub(crate) fn subscriber<H: Header>(
+        &self,
+        name: &str,
+        limits: Option<&Qos>,
+    ) -> Result<Subscriber<ipc::Service, Ball, H>, BenchError> {
+        const WHAT: &str = "a subscriber of bare iceoryx2 could not be made";
+        patiently(|| {
+            let service = self.topic::<Ball, H>(name, limits)?;
+            service
+                .subscriber_builder()
+                .create()
+                .map_err(|error| failed(WHAT, error))
+        })
+    }
+
+    /// A topic of any payload; limits as for the publisher.
+    pub(crate) fn topic<P: Debug + ZeroCopySend, H: Header>(
+        &self,
+        name: &str,
+        limits: Option<&Qos>,
+    ) -> Result<
+        iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, P, H>,
+        BenchError,
+    > {
+        let builder = self
+            .node
+            .service_builder(&service_name(name))
+            .publish_subscribe::<P>()
+            .user_header::<H>();
+        let builder = match limits {
+            None => builder,
+            Some(qos) => builder
+                .max_publishers(qos.max_publishers())
+                .max_subscribers(qos.max_subscribers())
+                .max_nodes(qos.max_nodes())
+                .subscriber_max_buffer_size(qos.buffer)
+                .subscriber_max_borrowed_samples(MAX_HELD)
+                .history_size(qos.history)
+                .enable_safe_overflow(true),
+        };
+        builder
+            .open_or_create()
+            .map_err(|error| failed("a service of bare iceoryx2 could not be opened", error))
+    }
+
+    /// What rings at every listener of an event.
+    pub(crate) fn notifier(
+        &self,
+        name: &str,
+        listeners: usize,
+    ) -> Result<Notifier<ipc::Service>, BenchError> {
+        const WHAT: &str = "a notifier of bare iceoryx2 could not be made";
+        patiently(|| {
+            let service = self.event(name, listeners)?;
+            service
+                .notifier_builder()
+                .create()
+                .map_err(|error| failed(WHAT, error))
+        })
+    }
+
+    /// What is rung at.
+    pub(crate) fn listener(
+        &self,
+        name: &str,
+        listeners: usize,
+    ) -> Result<Listener<ipc::Service>, BenchError> {
+        const WHAT: &str = "a listener of bare iceoryx2 could not be made";
+        patiently(|| {
+            let service = self.event(name, listeners)?;
+            service
+                .listener_builder()
+                .create()
+                .map_err(|error| failed(WHAT, error))
+        })
+    }
+
+    fn event(
+        &self,
+        name: &str,
+        listeners: usize,
+    ) -> Result<iceoryx2::service::port_factory::event::PortFactory<ipc::Service>, BenchError> {
+        self.node
+            .service_builder(&service_name(name))
+            .event()
+            .max_listeners(listeners)
+            // Each wake looks at every id there may be, so one is the fastest.
+            .event_id_max_value(0)
+            .open_or_create()
+            .map_err(|error| failed("an event of bare iceoryx2 could not be opened", error))
+    }
+}
+
+fn config(prefix: &str, root: &OsPath) -> Result<Config, BenchError> {
+    const WHAT: &str = "bare iceoryx2 could not be configured";
+    let mut config = Config::default();
+    config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|error| failed(WHAT, error))?;
+    let root =
+        Path::new(root.as_os_str().as_encoded_bytes()).map_err(|error| failed(WHAT, error))?;
+    config.global.set_root_path(&root);
+    config.global.creation_timeout = Duration::from_millis(500);
+    config.global.service.cleanup_dead_nodes_on_open = false;
+    Ok(config)
+}
+
+fn service_name(name: &str) -> ServiceName {
+    ServiceName::new(name).expect("the scenarios' names are short")
+}
+
+fn failed(what: &'static str, detail: impl Debug) -> BenchError {
+    BenchError::Bus {
+        what,
+        detail: format!("{detail:?}"),
+    }
+}
+
+/// Tries again while the other process is in the middle of creating or removing the same thing.
+fn patiently<T>(mut attempt: impl FnMut() -> Result<T, BenchError>) -> Result<T, BenchError> {
+    const PATIENCE: Duration = Duration::from_secs(3);
+    let start = Instant::now();
+    loop {
+        match attempt() {
+            Err(_) if start.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(1)),
+            done => return done,
+        }
+    }
+}
+
+/// Publishes with a header of one's own.
+pub(crate) struct Sender<H: Header> {
+    publisher: Publisher<ipc::Service, Ball, H>,
+    stream: Stream,
+    next: u64,
+}
+
+impl<H: Header> Sender<H> {
+    pub(crate) fn new(publisher: Publisher<ipc::Service, Ball, H>) -> Self {
+        Self {
+            publisher,
+            stream: Stream::new(),
+            next: 0,
+        }
+    }
+
+    pub(crate) fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
+        let mut sample = self.publisher.loan_uninit().map_err(broken)?;
+        sample.user_header_mut().fill(self.next, &self.stream);
+        self.next += 1;
+        sample.write_payload(*ball).send().map_err(broken)?;
+        Ok(())
+    }
+}
+
+/// Both directions with a receiver that looks without pause.
+pub(crate) struct Polling<H: Header> {
+    sender: Sender<H>,
+    subscriber: Subscriber<ipc::Service, Ball, H>,
+    // The ports need it to live.
+    _member: Member,
+}
+
+impl<H: Header> Polling<H> {
+    /// Publishes to `out` and subscribes to `back`.
+    pub(crate) fn new(
+        member: Member,
+        (out, back): (&str, &str),
+        limits: Option<&Qos>,
+    ) -> Result<Self, BenchError> {
+        Ok(Self {
+            subscriber: member.subscriber(back, limits)?,
+            sender: Sender::new(member.publisher(out, limits)?),
+            _member: member,
+        })
+    }
+}
+
+impl<H: Header> End for Polling<H> {
+    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
+        self.sender.send(ball)
+    }
+
+    fn receive(&mut self) -> Result<Ball, Fault> {
+        spin(|| receive(&self.subscriber))
+    }
+}
+
+/// Both directions with a receiver that sleeps on an event.
+pub(crate) struct Listening {
+    sender: Sender<Stamp>,
+    subscriber: Subscriber<ipc::Service, Ball, Stamp>,
+    notifier: Notifier<ipc::Service>,
+    listener: Listener<ipc::Service>,
+    // The ports need it to live.
+    _member: Member,
+}
+
+impl Listening {
+    /// Publishes to `out` and subscribes to `back`.
+    pub(crate) fn new(
+        member: Member,
+        (out, back): (&str, &str),
+        limits: &Qos,
+    ) -> Result<Self, BenchError> {
+        // As many as iceoryx2 allows by default.
+        const LISTENERS: usize = 16;
+        Ok(Self {
+            subscriber: member.subscriber(back, Some(limits))?,
+            listener: member.listener(back, LISTENERS)?,
+            sender: Sender::new(member.publisher(out, Some(limits))?),
+            notifier: member.notifier(out, LISTENERS)?,
+            _member: member,
+        })
+    }
+}
+
+impl End for Listening {
+    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
+        self.sender.send(ball)?;
+        self.notifier.notify().map_err(broken)?;
+        Ok(())
+    }
+
+    fn receive(&mut self) -> Result<Ball, Fault> {
+        sleep_until(|| receive(&self.subscriber), || sleep(&self.listener))
+    }
+}
+
+/// Sleeps until the event is notified, at most [`TIME_OUT`].
+pub(crate) fn sleep(listener: &Listener<ipc::Service>) -> Result<Slept, Fault> {
+    let rings = listener.timed_wait(|_| (), TIME_OUT).map_err(broken)?;
+    Ok(if rings == 0 {
+        Slept::TimedOut
+    } else {
+        Slept::Woken
+    })
+}
+
+/// The next ball, if there is one.
+pub(crate) fn receive<H: Header>(
+    subscriber: &Subscriber<ipc::Service, Ball, H>,
+) -> Result<Option<Ball>, Fault> {
+    let sample = subscriber.receive().map_err(broken)?;
+    Ok(sample.map(|sample| *sample.payload()))
+}
+
+/// A fault of a port.
+pub(crate) fn broken(error: impl Debug) -> Fault {
+    Fault::Broken(format!("{error:?}"))
+}

@@ -1,0 +1,161 @@
+//! Why a measurement ended without a report; every message says what to do.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+/// Why a measurement ended without a report.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// Two processes that never share a core need two.
+    #[error(
+        "this measurement needs {needed} processor cores and this process may use {found}; run it on a larger machine, or without `taskset`, or choose `--regime same-core`"
+    )]
+    TooFewCores {
+        /// Cores needed.
+        needed: usize,
+        /// Cores the process may use.
+        found: usize,
+    },
+    /// A thread could not be bound to a core.
+    #[error(
+        "a process could not be bound to core {core} ({detail}); check the container's cpuset, and that no other tool changes affinities meanwhile"
+    )]
+    Affinity {
+        /// The core.
+        core: usize,
+        /// What the kernel says.
+        detail: String,
+    },
+    /// The user may not run processes in real time.
+    #[error(
+        "no right to run in real time ({detail}), so what needs it was not measured; run as root, or give this user rtprio (`ulimit -r`)"
+    )]
+    RealTime {
+        /// What the kernel says.
+        detail: String,
+    },
+    /// Other work keeps the measured services from running.
+    #[error(
+        "{overtaken} of {frames} frames were not answered before logic went blind half a millisecond later: the machine is too busy to measure the path; end what else runs on it and start again"
+    )]
+    Overloaded {
+        /// Frames put aside.
+        overtaken: u64,
+        /// Frames sent.
+        frames: u64,
+    },
+    /// Nothing is left of what was asked for.
+    #[error(
+        "nothing to measure: {0}; choose other modes or regimes (a spinning receiver cannot share its core with the sender)"
+    )]
+    NothingToMeasure(String),
+    /// The kernel refused something a measurement is made of.
+    #[error(
+        "{what} could not be made ({detail}); check the limit of open files (ulimit -n) and free memory"
+    )]
+    Kernel {
+        /// What was to be made.
+        what: &'static str,
+        /// What the kernel says.
+        detail: String,
+    },
+    /// The bus or bare iceoryx2 failed.
+    #[error("{what}: {detail}; check that /dev/shm exists, is writable and is not full")]
+    Bus {
+        /// What was to be done.
+        what: &'static str,
+        /// What the transport says.
+        detail: String,
+    },
+    /// The measurement has no place for its bus.
+    #[error(
+        "{place} cannot be used for the measurement's own bus ({detail}); check that it exists, is writable and is not full"
+    )]
+    NoPlace {
+        /// The folder.
+        place: PathBuf,
+        /// What the kernel says.
+        detail: String,
+    },
+    /// The second process could not be started.
+    #[error(
+        "the process for `{part}` could not be started ({detail}); the executable may have been replaced meanwhile, start again"
+    )]
+    Start {
+        /// What it was to play.
+        part: String,
+        /// What the kernel says.
+        detail: String,
+    },
+    /// A process of the measurement ended too early.
+    #[error(
+        "the process for `{part}` ended before it was done ({detail}); look at its messages above and start again"
+    )]
+    PartEnded {
+        /// What it played.
+        part: String,
+        /// How it ended.
+        detail: String,
+    },
+    /// A process of the measurement says what went wrong.
+    #[error("{detail}")]
+    PartFailed {
+        /// What it played.
+        part: String,
+        /// Its sentence.
+        detail: String,
+    },
+    /// A process of the measurement said nothing for too long.
+    #[error(
+        "the process for `{part}` did not answer within {limit:?}; a wake-up was lost or the machine is overloaded: start again, and report it if it happens twice"
+    )]
+    PartSilent {
+        /// What it played.
+        part: String,
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// A sample came that was not sent, or twice, or in the wrong order.
+    #[error(
+        "`{contender}` delivered sample {got} where {expected} was due; this is a defect, please report it with the command line"
+    )]
+    WrongSample {
+        /// What carried the sample.
+        contender: String,
+        /// The number expected.
+        expected: u64,
+        /// The number received.
+        got: u64,
+    },
+    /// A sample did not come.
+    #[error(
+        "`{contender}` did not deliver sample {expected} within {limit:?}; a wake-up was lost or the other process stands still: start again, and report it if it happens twice"
+    )]
+    NoSample {
+        /// What carries the samples.
+        contender: String,
+        /// The number expected.
+        expected: u64,
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// What carries the samples failed.
+    #[error("`{contender}` failed ({detail}); start again, and report it if it happens twice")]
+    Carrier {
+        /// What carries the samples.
+        contender: String,
+        /// What it says.
+        detail: String,
+    },
+    /// The other process did not come to the start.
+    #[error(
+        "the other process of the measurement was not ready within {limit:?}; the machine is overloaded, or it has ended: look at the messages above and start again"
+    )]
+    Alone {
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// Somebody wants to stop.
+    #[error("interrupted; nothing was left behind")]
+    Interrupted,
+}

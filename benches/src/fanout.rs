@@ -1,0 +1,302 @@
+//! `fanout`: what publishing costs the writer when 1, 8 or 64 read.
+//!
+//! ```text
+//!   | loan, fill in, send |  announce -----> all subscribers receive --+
+//!   |<---- measured ----->|  wait until drained <----------------------+
+//! ```
+//!
+//! Our typed ports and bare iceoryx2 with the same user header, the same limits and the same
+//! number of subscribers, in turn. Both fill in the whole payload from memory of their own. The
+//! subscribers live in a process of their own on the other core and are drained after each
+//! publish, so that no buffer is ever full and the writer finds its queues as readers leave them.
+//!
+//! Rows are called `publish-64` for 64 bytes to 64 subscribers, `publish-8@1MiB`, and so on.
+
+mod block;
+mod readers;
+
+use core::fmt;
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+use std::time::Instant;
+
+use iceoryx2::port::publisher::Publisher as BarePublisher;
+use iceoryx2::prelude::ipc;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use lager_ports::{Bus, Clock, Publisher};
+use lager_topics::{Role, Stamp, Topic};
+
+use crate::baseline::iceoryx::{Header, Member, Stream};
+use crate::domain::Domain;
+use crate::error::BenchError;
+use crate::machine::{self, Awake, cores_for};
+use crate::parts::{Part, interrupted};
+use crate::report::{Mode, Options, Regime, Report, Row};
+use crate::run::{self, Entry};
+use crate::shared::Shared;
+use crate::slow;
+use block::{Block, Fan};
+use readers::{Counter, LIMIT, READERS, Script};
+
+pub(crate) use readers::PARTS;
+
+/// Sizes of a block, in words of eight bytes.
+const SMALL: usize = 8;
+const KIB_64: usize = 1 << 13;
+const MIB_1: usize = 1 << 17;
+
+/// How many subscribers there are.
+pub const READERS_OF: [usize; 3] = [1, 8, 64];
+
+/// A block of 1 MiB passes over the stack once, unless the compiler saves it the way.
+const STACK: usize = 32 << 20;
+
+const ENTRIES: &[Entry] = &[
+    Entry {
+        name: "lager",
+        variant: "",
+        mode: Mode::Spin,
+        against: &["iceoryx2/header"],
+    },
+    Entry {
+        name: "iceoryx2",
+        variant: "header",
+        mode: Mode::Spin,
+        against: &[],
+    },
+];
+
+/// Who publishes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contender {
+    /// Our typed ports.
+    Lager,
+    /// Bare iceoryx2 with the same user header.
+    Iceoryx2,
+}
+
+/// Measures publishing in every regime that `options` names. The readers look without pause, so
+/// the only mode there is is `spin`.
+///
+/// # Errors
+/// See [`BenchError`].
+pub fn measure(options: &Options) -> Result<Report, BenchError> {
+    let mut rows = Vec::new();
+    if options.modes.contains(&Mode::Spin) {
+        for regime in &options.regimes {
+            let _awake = Awake::during(*regime)?;
+            for readers in READERS_OF {
+                let what = format!("publish-{readers}");
+                rows.extend(group::<SMALL>(&what, *regime, readers, 2_000, options)?);
+                let what = format!("publish-{readers}@64KiB");
+                rows.extend(group::<KIB_64>(&what, *regime, readers, 300, options)?);
+                let what = format!("publish-{readers}@1MiB");
+                rows.extend(group::<MIB_1>(&what, *regime, readers, 50, options)?);
+            }
+        }
+    }
+    if rows.is_empty() {
+        return Err(BenchError::NothingToMeasure(
+            "the readers of what is published look without pause, so it is measured in mode spin"
+                .to_owned(),
+        ));
+    }
+    Ok(Report {
+        machine: machine::describe(),
+        rows,
+    })
+}
+
+/// Both contenders with one size and one number of readers.
+fn group<const WORDS: usize>(
+    what: &str,
+    regime: Regime,
+    readers: usize,
+    publishes: usize,
+    options: &Options,
+) -> Result<Vec<Row>, BenchError> {
+    let (rounds, publishes) = if options.quick {
+        (2, publishes / 4)
+    } else {
+        (4, publishes)
+    };
+    std::thread::scope(|scope| {
+        std::thread::Builder::new()
+            .stack_size(STACK)
+            .spawn_scoped(scope, || {
+                let mut session = Session::<WORDS>::open(regime, readers)?;
+                run::measure(what, regime, ENTRIES, options, rounds, |index| {
+                    let contender = [Contender::Lager, Contender::Iceoryx2][index];
+                    session.round(contender, publishes)
+                })
+            })
+            .map_err(|error| BenchError::Kernel {
+                what: "a thread",
+                detail: error.to_string(),
+            })?
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+/// Blocks of 64 bytes, for the criterion bench.
+pub type Small = Session<SMALL>;
+
+/// A writer of each contender and the process of their readers. Stays in the thread that opened it,
+/// which is bound to a core from then on.
+pub struct Session<const WORDS: usize> {
+    ours: Publisher<Fan<WORDS>>,
+    bare: BarePublisher<ipc::Service, Block<WORDS>, Stamp>,
+    stream: Stream,
+    source: Box<Block<WORDS>>,
+    counter: Shared<Counter>,
+    number: u64,
+    observers: usize,
+    // Dropped in this order: nobody is on the bus when it is swept.
+    readers: Part,
+    _member: Member,
+    _bus: Bus,
+    _domain: Domain,
+}
+
+impl<const WORDS: usize> Session<WORDS> {
+    /// Starts the readers and attaches them to both contenders.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub fn open(regime: Regime, readers: usize) -> Result<Self, BenchError> {
+        let (first, second) = cores_for(regime)?;
+        let domain = Domain::new()?;
+        let counter = Shared::<Counter>::new()?;
+        let bus = Bus::open(&domain.config(), Role::Operator).map_err(failed)?;
+        let member = Member::join(domain.prefix(), domain.root())?;
+        let ours = bus.publisher().map_err(failed)?;
+        let bare = bare_service::<WORDS>(&member)?
+            .publisher_builder()
+            .create()
+            .map_err(failed)?;
+        let mut part = Part::start(READERS)?;
+        let () = part.ask(&Script {
+            core: second,
+            prefix: domain.prefix().to_owned(),
+            root: domain.root().to_owned(),
+            words: WORDS,
+            readers,
+            counter: counter.number(),
+        })?;
+        machine::pin(first)?;
+        let mut session = Self {
+            ours,
+            bare,
+            stream: Stream::new(),
+            source: source(),
+            counter,
+            number: 0,
+            observers: readers,
+            readers: part,
+            _member: member,
+            _bus: bus,
+            _domain: domain,
+        };
+        // The first sample connects the ports, which takes long.
+        for contender in [Contender::Lager, Contender::Iceoryx2] {
+            session.round(contender, 20)?;
+        }
+        Ok(session)
+    }
+
+    /// Publishes `count` blocks; how long each took, in ns.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub fn round(&mut self, contender: Contender, count: usize) -> Result<Vec<u64>, BenchError> {
+        let mut times = Vec::with_capacity(count);
+        for _ in 0..count {
+            self.number += 1;
+            self.source.words[0] = self.number;
+            let start = Clock::monotonic_ns();
+            match contender {
+                Contender::Lager => self.publish_ours()?,
+                Contender::Iceoryx2 => self.publish_bare()?,
+            }
+            let end = Clock::monotonic_ns();
+            times.push(end - start);
+            self.wait_until_drained(contender)?;
+        }
+        Ok(times)
+    }
+
+    fn publish_ours(&mut self) -> Result<(), BenchError> {
+        let mut loan = self.ours.loan().map_err(failed)?;
+        loan.words.copy_from_slice(&self.source.words);
+        slow::publish(self.observers);
+        loan.send().map_err(failed)
+    }
+
+    #[allow(unsafe_code)]
+    fn publish_bare(&mut self) -> Result<(), BenchError> {
+        let mut sample = self.bare.loan_uninit().map_err(failed)?;
+        sample.user_header_mut().fill(self.number, &self.stream);
+        sample.payload_mut().write(*self.source);
+        // SAFETY: the payload was written just now.
+        let sample = unsafe { sample.assume_init() };
+        sample.send().map_err(failed)?;
+        Ok(())
+    }
+
+    fn wait_until_drained(&mut self, contender: Contender) -> Result<(), BenchError> {
+        // Looking at the clock and for signals costs more than looking at a word.
+        const LOOKS: u32 = 1_000;
+        let announced = 2 * self.number + u64::from(contender == Contender::Iceoryx2);
+        self.counter.published.store(announced, Ordering::Release);
+        let start = Instant::now();
+        loop {
+            for _ in 0..LOOKS {
+                if self.counter.drained.load(Ordering::Acquire) == announced {
+                    return Ok(());
+                }
+                // The readers may be on this core.
+                rustix::thread::sched_yield();
+            }
+            if interrupted() {
+                return Err(BenchError::Interrupted);
+            }
+            if start.elapsed() > LIMIT + Duration::from_secs(1) {
+                let () = self.readers.hear_within(Duration::ZERO)?;
+            }
+        }
+    }
+}
+
+impl<const WORDS: usize> fmt::Debug for Session<WORDS> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Session")
+            .field("bytes", &(8 * WORDS))
+            .field("published", &self.number)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A block that is not all zeros, on the heap from the start.
+fn source<const WORDS: usize>() -> Box<Block<WORDS>> {
+    let mut block = Box::<Block<WORDS>>::default();
+    for (index, word) in block.words.iter_mut().enumerate() {
+        *word = index as u64;
+    }
+    block
+}
+
+/// Bare iceoryx2's topic for blocks of that size, with the limits of ours.
+fn bare_service<const WORDS: usize>(
+    member: &Member,
+) -> Result<PortFactory<ipc::Service, Block<WORDS>, Stamp>, BenchError> {
+    member.topic("bench/bare-fan", Some(&Fan::<WORDS>::QOS))
+}
+
+fn failed(error: impl fmt::Debug) -> BenchError {
+    BenchError::Bus {
+        what: "publishing to many readers",
+        detail: format!("{error:?}"),
+    }
+}

@@ -1,0 +1,279 @@
+//! The limits as they stand in `benches/limits.toml`, read strictly: a limit that was mistyped would
+//! guard nothing. Nothing is measured or judged here.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::figures::RatioName;
+
+/// Everything the file says.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Limits {
+    /// Where figures come from that are counted rather than timed, by name.
+    #[serde(default)]
+    pub(crate) counted: BTreeMap<String, Counted>,
+    /// The limits.
+    #[serde(default, rename = "limit")]
+    pub(crate) limits: Vec<Limit>,
+}
+
+/// How far counts may be from the ones measured. Counts do not depend on the machine's load, but
+/// they do on the compiler.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Counted {
+    /// The compiler that built what was counted.
+    pub(crate) rustc: String,
+    /// What it was built for. Counts of another target are shown and not judged.
+    pub(crate) target: String,
+    /// By how much a count may exceed the measured one.
+    pub(crate) margin_percent: f64,
+    /// The same if another compiler built it.
+    pub(crate) margin_percent_other_rustc: f64,
+}
+
+/// One limit: on a ratio (`at_most`) or on a count (`measured`, and the margin of its source).
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Limit {
+    /// `hop`, `path` or `fanout`, or one of [`Limits::counted`].
+    pub(crate) source: String,
+    /// The figure's name within its source.
+    pub(crate) figure: String,
+    /// What the figure must not exceed.
+    pub(crate) at_most: Option<f64>,
+    /// What the count was when this line was written.
+    pub(crate) measured: Option<f64>,
+    /// By how much the count may exceed it, where the margin of its source would hide too much.
+    pub(crate) margin_percent: Option<f64>,
+    /// What the project wants, if that is not what is held.
+    pub(crate) goal: Option<f64>,
+    /// Why the limit is what it is.
+    pub(crate) reason: String,
+}
+
+/// Why a file of limits is not one.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub(crate) enum LimitsError {
+    #[error("{file} cannot be read ({detail}); name another file with --limits")]
+    Unreadable { file: PathBuf, detail: String },
+    #[error("{file} is no list of limits: {detail}")]
+    Syntax { file: PathBuf, detail: String },
+    #[error(
+        "there is no limit in {file}; a guard without limits guards nothing, so write at least one [[limit]]"
+    )]
+    Empty { file: PathBuf },
+    #[error("`{figure}` of `{source_name}` has two limits; keep one")]
+    Twice { source_name: String, figure: String },
+    #[error("the limit of `{figure}` has no reason; say why it is what it is")]
+    NoReason { figure: String },
+    #[error("`{figure}`: {what} must be a positive number, not {value}")]
+    NotPositive {
+        figure: String,
+        what: &'static str,
+        value: f64,
+    },
+    #[error(
+        "`{figure}` is a count; give what was measured (`measured = …`), the margin comes from [counted.{source_name}]"
+    )]
+    NotACount { source_name: String, figure: String },
+    #[error(
+        "`{figure}` is a ratio; give the limit itself (`at_most = …`), no `measured` and no margin"
+    )]
+    NotARatio { figure: String },
+    #[error(
+        "`{figure}` comes from `{source_name}`, which is neither hop, path or fanout nor described under [counted.{source_name}]"
+    )]
+    UnknownSource { source_name: String, figure: String },
+    #[error(
+        "`{figure}` names no ratio ({detail}); write it as `what mode regime: label / label p50`, for instance `hop block same-core: lager / iceoryx2/listener p50`"
+    )]
+    NoRatioName { figure: String, detail: String },
+    #[error(
+        "[counted.{source_name}]: the margins are percentages from 0 to 100, and the one for another rustc is not the smaller one"
+    )]
+    Margin { source_name: String },
+}
+
+/// The sources that are timed, and therefore yield ratios.
+pub(crate) const SCENARIOS: [&str; 3] = ["hop", "path", "fanout"];
+
+impl Limits {
+    /// Reads and checks a file.
+    pub(crate) fn load(file: &Path) -> Result<Self, LimitsError> {
+        let text = std::fs::read_to_string(file).map_err(|error| LimitsError::Unreadable {
+            file: file.to_owned(),
+            detail: error.to_string(),
+        })?;
+        Self::parse(file, &text)
+    }
+
+    fn parse(file: &Path, text: &str) -> Result<Self, LimitsError> {
+        let limits: Self = toml::from_str(text).map_err(|error| LimitsError::Syntax {
+            file: file.to_owned(),
+            detail: error.to_string().trim_end().to_owned(),
+        })?;
+        if limits.limits.is_empty() {
+            return Err(LimitsError::Empty {
+                file: file.to_owned(),
+            });
+        }
+        for (source, counted) in &limits.counted {
+            counted.check(source)?;
+        }
+        let mut seen = BTreeSet::new();
+        for limit in &limits.limits {
+            limit.check(&limits.counted)?;
+            if !seen.insert((&limit.source, &limit.figure)) {
+                return Err(LimitsError::Twice {
+                    source_name: limit.source.clone(),
+                    figure: limit.figure.clone(),
+                });
+            }
+        }
+        Ok(limits)
+    }
+
+    /// The limits of one source.
+    pub(crate) fn of<'a>(&'a self, source: &'a str) -> impl Iterator<Item = &'a Limit> {
+        self.limits
+            .iter()
+            .filter(move |limit| limit.source == source)
+    }
+}
+
+impl Counted {
+    fn check(&self, source: &str) -> Result<(), LimitsError> {
+        let sound = 0.0..=100.0;
+        if sound.contains(&self.margin_percent)
+            && sound.contains(&self.margin_percent_other_rustc)
+            && self.margin_percent <= self.margin_percent_other_rustc
+        {
+            Ok(())
+        } else {
+            Err(LimitsError::Margin {
+                source_name: source.to_owned(),
+            })
+        }
+    }
+}
+
+impl Limit {
+    fn check(&self, counted: &BTreeMap<String, Counted>) -> Result<(), LimitsError> {
+        let source_name = self.source.clone();
+        let figure = self.figure.clone();
+        if self.reason.trim().is_empty() {
+            return Err(LimitsError::NoReason { figure });
+        }
+        for (what, value) in [
+            ("at_most", self.at_most),
+            ("measured", self.measured),
+            ("margin_percent", self.margin_percent),
+            ("goal", self.goal),
+        ] {
+            if let Some(value) = value
+                && !(value.is_finite() && value > 0.0)
+            {
+                return Err(LimitsError::NotPositive {
+                    figure,
+                    what,
+                    value,
+                });
+            }
+        }
+        let timed = SCENARIOS.contains(&self.source.as_str());
+        match (timed, self.at_most, self.measured) {
+            (true, Some(_), None) if self.margin_percent.is_none() => self
+                .figure
+                .parse::<RatioName>()
+                .map(|_| ())
+                .map_err(|detail| LimitsError::NoRatioName { figure, detail }),
+            (true, ..) => Err(LimitsError::NotARatio { figure }),
+            (false, ..) if !counted.contains_key(&self.source) => Err(LimitsError::UnknownSource {
+                source_name,
+                figure,
+            }),
+            (false, None, Some(_)) => Ok(()),
+            (false, ..) => Err(LimitsError::NotACount {
+                source_name,
+                figure,
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNTED: &str = "[counted.instructions]\nrustc = '1.95.0'\ntarget = 't'\n\
+                           margin_percent = 5\nmargin_percent_other_rustc = 15\n";
+    const RATIO: &str = "[[limit]]\nsource = 'hop'\n\
+                         figure = 'hop spin plain: lager / iceoryx2/header p50'\n\
+                         at_most = 1.2\ngoal = 1.05\nreason = 'because'\n";
+    const COUNT: &str = "[[limit]]\nsource = 'instructions'\nfigure = 'decode'\n\
+                         measured = 480\nreason = 'because'\n";
+
+    fn parse(text: &str) -> Result<Limits, LimitsError> {
+        Limits::parse(Path::new("limits.toml"), text)
+    }
+
+    fn refusal(text: &str) -> String {
+        parse(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_checked_in_limits_are_sound() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("limits.toml");
+        let limits = Limits::load(&file).unwrap_or_else(|error| panic!("{error}"));
+        for source in ["hop", "path", "fanout", "instructions"] {
+            assert!(limits.of(source).count() > 0, "nothing guards {source}");
+        }
+    }
+
+    #[test]
+    fn ratios_and_counts_are_read() {
+        let limits = parse(&format!("{COUNTED}{RATIO}{COUNT}")).unwrap();
+        assert_eq!(limits.limits.len(), 2);
+        assert_eq!(limits.of("hop").next().unwrap().at_most, Some(1.2));
+        assert_eq!(
+            limits.of("instructions").next().unwrap().measured,
+            Some(480.0)
+        );
+        assert_eq!(limits.of("path").count(), 0);
+    }
+
+    #[test]
+    fn what_would_guard_nothing_is_refused_with_a_sentence() {
+        let cases = [
+            (String::new(), "no limit"),
+            (COUNTED.to_owned(), "no limit"),
+            (format!("{RATIO}{RATIO}"), "two limits"),
+            (format!("{RATIO}at_moost = 3\n"), "at_moost"),
+            (format!("limits = 3\n{RATIO}"), "limits"),
+            (RATIO.replace("reason = 'because'", ""), "reason"),
+            (RATIO.replace("because", " "), "has no reason"),
+            (RATIO.replace("1.2", "nan"), "positive"),
+            (RATIO.replace("1.2", "-1.0"), "positive"),
+            (RATIO.replace("at_most = 1.2", ""), "is a ratio"),
+            (RATIO.replace("goal", "measured"), "is a ratio"),
+            (RATIO.replace("goal", "margin_percent"), "is a ratio"),
+            (
+                RATIO.replace("'hop'", "'hopp'"),
+                "neither hop, path or fanout",
+            ),
+            (RATIO.replace("spin", "asleep"), "asleep"),
+            (RATIO.replace(" / ", " "), "label / label"),
+            (COUNT.to_owned(), "[counted.instructions]"),
+            (format!("{COUNTED}{COUNT}at_most = 500\n"), "is a count"),
+            (format!("{COUNTED}{COUNT}").replace("15", "3"), "margins"),
+        ];
+        for (text, expected) in cases {
+            let refusal = refusal(&text);
+            assert!(refusal.contains(expected), "{text}\n-> {refusal}");
+        }
+    }
+}

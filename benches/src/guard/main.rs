@@ -1,0 +1,240 @@
+//! The guard: measures, and fails when a limit of `benches/limits.toml` is broken.
+//!
+//! `benches/guard` is the way to run it: the script builds this, has callgrind count instructions,
+//! and hands the counts over. Apart from the library, because a scenario measures and asserts
+//! nothing, while this decides and measures nothing itself.
+//!
+//! Exit codes: 0 all limits are kept, 1 a limit is broken or its figure is missing, 2 the guard
+//! could not do its work.
+
+mod figures;
+mod judge;
+mod limits;
+mod measure;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use lager_benches::machine;
+use serde::Serialize;
+
+use crate::figures::{Built, Figures, FiguresError};
+use crate::judge::{Judgement, Verdict, judge};
+use crate::limits::{Limits, LimitsError, SCENARIOS};
+use crate::measure::{MeasureError, Thoroughness, measure};
+
+/// Holds the bus and the path to their limits: ratios measured in one run, and instruction counts.
+///
+/// Exit codes: 0 all limits are kept; 1 a limit is broken or its figure is missing; 2 the guard
+/// could not do its work.
+#[derive(Debug, Parser)]
+#[command(
+    name = "benches/guard",
+    bin_name = "benches/guard",
+    after_help = "Examples:\n  benches/guard                        everything, about three minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json"
+)]
+struct Arguments {
+    /// The limits
+    #[arg(long, value_name = "FILE", default_value = "benches/limits.toml")]
+    limits: PathBuf,
+    /// Judge these sources only: hop, path, fanout, instructions
+    #[arg(long, value_name = "SOURCE", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Runs of each measurement; a ratio is the median over them
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
+    runs: usize,
+    /// How often to measure a scenario while one of its limits is broken; the lower ratio counts
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
+    attempts: usize,
+    /// One line of JSON instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Instruction counts as gungraun writes them (the script gives this)
+    #[arg(long, value_name = "FILE", hide = true)]
+    callgrind: Option<PathBuf>,
+    /// Counts of another program: {"source":…,"built":{"rustc":…,"target":…},"figures":{NAME:N,…}}
+    #[arg(long, value_name = "FILE")]
+    counts: Vec<PathBuf>,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) | Err(_) => Err("give a whole number, 1 or more".to_owned()),
+        Ok(number) => Ok(number),
+    }
+}
+
+/// Why the guard could not do its work.
+#[derive(Debug, thiserror::Error)]
+enum GuardError {
+    #[error(transparent)]
+    Limits(#[from] LimitsError),
+    #[error(transparent)]
+    Figures(#[from] FiguresError),
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
+    NoSuchSource(String, String),
+    #[error(
+        "there are no counts of `{0}`; run `benches/guard`, which makes them, or leave them out with --only"
+    )]
+    NoCounts(String),
+}
+
+/// What the guard has found.
+#[derive(Debug, Serialize)]
+struct Findings {
+    machine: String,
+    kept: bool,
+    limits: Vec<Judgement>,
+    notes: Vec<String>,
+}
+
+fn main() -> ExitCode {
+    lager_benches::parts::play_if_asked();
+    lager_benches::slow::refuse_in_vain();
+    let arguments = Arguments::parse();
+    match guard(&arguments) {
+        Ok(findings) => {
+            if arguments.json {
+                let json = serde_json::to_string(&findings).expect("names and numbers are JSON");
+                println!("{json}");
+            } else {
+                print(&findings);
+            }
+            ExitCode::from(u8::from(!findings.kept))
+        }
+        Err(error) => {
+            eprintln!("benches/guard: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
+    let limits = Limits::load(&arguments.limits)?;
+    let sources = sources(&limits, &arguments.only)?;
+    let counts = counts(arguments)?;
+    let how = Thoroughness {
+        runs: arguments.runs,
+        attempts: arguments.attempts,
+    };
+    let mut findings = Findings {
+        machine: machine::describe(),
+        kept: true,
+        limits: Vec::new(),
+        notes: Vec::new(),
+    };
+    for source in sources {
+        let counted = counts.iter().find(|figures| figures.source == source);
+        let figures = match counted {
+            Some(figures) => figures.clone(),
+            None if SCENARIOS.contains(&source.as_str()) => {
+                let measured = measure(&limits, &source, how)?;
+                if measured.attempts > 1 {
+                    let times = measured.attempts;
+                    findings.notes.push(format!(
+                        "{source}: measured {times} times because a limit was broken; the lower ratios count"
+                    ));
+                }
+                measured.figures
+            }
+            None => return Err(GuardError::NoCounts(source)),
+        };
+        let (judgements, notes) = judge(&limits, &figures);
+        findings.kept &= !judgements.iter().any(|one| one.verdict.fails());
+        findings.limits.extend(judgements);
+        findings.notes.extend(notes);
+    }
+    Ok(findings)
+}
+
+/// The sources that have limits, in the file's order, or those of them that were asked for.
+fn sources(limits: &Limits, only: &[String]) -> Result<Vec<String>, GuardError> {
+    let mut all: Vec<String> = Vec::new();
+    for limit in &limits.limits {
+        if !all.contains(&limit.source) {
+            all.push(limit.source.clone());
+        }
+    }
+    if let Some(unknown) = only.iter().find(|name| !all.contains(name)) {
+        return Err(GuardError::NoSuchSource(unknown.clone(), all.join(", ")));
+    }
+    all.retain(|source| only.is_empty() || only.contains(source));
+    Ok(all)
+}
+
+fn counts(arguments: &Arguments) -> Result<Vec<Figures>, GuardError> {
+    let read = |file: &Path| {
+        std::fs::read_to_string(file).map_err(|error| FiguresError::Unreadable {
+            file: file.display().to_string(),
+            detail: error.to_string(),
+        })
+    };
+    let mut counts = Vec::new();
+    if let Some(file) = &arguments.callgrind {
+        let name = file.display().to_string();
+        counts.push(Figures::of_callgrind(
+            &name,
+            &read(file)?,
+            Built::by_rustc()?,
+        )?);
+    }
+    for file in &arguments.counts {
+        counts.push(Figures::of_counts(
+            &file.display().to_string(),
+            &read(file)?,
+        )?);
+    }
+    Ok(counts)
+}
+
+fn print(findings: &Findings) {
+    println!("{}\n", findings.machine);
+    println!(
+        "{:<70} {:>9} {:>9} {:>7}  verdict",
+        "figure", "measured", "limit", "goal"
+    );
+    let mut source = "";
+    for one in &findings.limits {
+        if one.source != source {
+            source = &one.source;
+            println!("{source}");
+        }
+        println!(
+            "  {:<68} {:>9} {:>9} {:>7}  {}",
+            one.figure,
+            one.measured.map_or_else(|| "-".to_owned(), number),
+            number(one.limit),
+            one.goal.map(number).unwrap_or_default(),
+            one.verdict,
+        );
+        if one.verdict.fails() {
+            println!("      {}", one.reason);
+        }
+    }
+    for note in &findings.notes {
+        println!("\n{note}");
+    }
+    let failing = findings
+        .limits
+        .iter()
+        .filter(|one| one.verdict.fails())
+        .count();
+    let judged = findings
+        .limits
+        .iter()
+        .filter(|one| one.verdict != Verdict::NotJudged)
+        .count();
+    println!("\n{} of {judged} limits kept", judged - failing);
+}
+
+/// Ratios with two digits, counts as what they are.
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 && value >= 100.0 {
+        format!("{value}")
+    } else {
+        format!("{value:.2}")
+    }
+}

@@ -1,0 +1,31 @@
+//! What is measured, each beside its baseline in the same run.
+//!
+//! A scenario (`hop`, `path`, `fanout`) starts the processes it needs, measures every candidate and
+//! every baseline in turn, and returns a [`Report`] that prints as a table and serialises as JSON.
+//! The criterion targets beside this library and `lager bench` are two ways to run the same code.
+//!
+//! Absolute times mean little on a shared machine, so candidates and baselines take turns within
+//! one run and a report states ratios of one run. Nothing here asserts a time; the guard does.
+//!
+//! **Invariant:** whoever measures waits for nothing without a limit, and leaves nothing behind.
+
+mod ball;
+mod baseline;
+mod domain;
+pub mod error;
+pub mod fanout;
+pub mod hop;
+pub mod machine;
+pub mod parts;
+pub mod path;
+pub mod report;
+mod ring;
+mod run;
+mod scenarios;
+mod shared;
+pub mod slow;
+mod stats;
+
+pub use error::BenchError;
+pub use report::{Mode, Options, Ratio, Regime, Report, Row};
+pub use scenarios::{a_second_of_bytes, a_second_of_packets};

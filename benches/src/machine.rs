@@ -1,0 +1,190 @@
+//! The machine: what it is, its cores, and the processes that keep cores from halting.
+//!
+//! Apart, because every scenario binds its processes and says on what it ran. It never changes
+//! anything for other processes.
+
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+
+use crate::error::BenchError;
+use crate::parts::{Part, Play, Stage};
+use crate::report::Regime;
+
+pub(crate) const PARTS: &[(&str, Play)] = &[("idle spinner", keep_from_halting)];
+
+/// The machine in one line: processor, cores, governor, kernel.
+#[must_use]
+pub fn describe() -> String {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let processor =
+        processor_of(&read("/proc/cpuinfo")).unwrap_or_else(|| std::env::consts::ARCH.to_owned());
+    let cores = usable_cores().len();
+    let governor = read("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+    let governor = match governor.trim() {
+        "" => String::new(),
+        name => format!(", governor {name}"),
+    };
+    let kernel = rustix::system::uname();
+    format!(
+        "{processor}, {cores} cores{governor}, {} {}",
+        kernel.sysname().to_string_lossy(),
+        kernel.release().to_string_lossy(),
+    )
+}
+
+/// The processor's name in the text of `/proc/cpuinfo`: x86 says `model name`, some ARM boards
+/// say `Model` for the whole board.
+fn processor_of(cpuinfo: &str) -> Option<String> {
+    ["model name", "Model", "Hardware"].iter().find_map(|key| {
+        cpuinfo.lines().find_map(|line| {
+            let (name, value) = line.split_once(':')?;
+            (name.trim() == *key).then(|| value.trim().to_owned())
+        })
+    })
+}
+
+/// The cores this process may use, in ascending order.
+#[must_use]
+pub fn usable_cores() -> Vec<usize> {
+    let Ok(set) = sched_getaffinity(None) else {
+        return Vec::new();
+    };
+    (0..CpuSet::MAX_CPU)
+        .filter(|core| set.is_set(*core))
+        .collect()
+}
+
+/// Where the first and the second process of a scenario run: on one core for
+/// [`Regime::SameCore`], on one each otherwise.
+///
+/// # Errors
+/// There are too few cores.
+pub fn cores_for(regime: Regime) -> Result<(usize, usize), BenchError> {
+    let cores = usable_cores();
+    let needed = if regime == Regime::SameCore { 1 } else { 2 };
+    match (regime, cores.as_slice()) {
+        (Regime::SameCore, [.., last]) => Ok((*last, *last)),
+        (Regime::Plain | Regime::NoHalt, [first, second, ..]) => Ok((*first, *second)),
+        _ => Err(BenchError::TooFewCores {
+            needed,
+            found: cores.len(),
+        }),
+    }
+}
+
+/// Binds the calling thread to `core`.
+///
+/// # Errors
+/// The kernel refuses.
+pub fn pin(core: usize) -> Result<(), BenchError> {
+    let mut set = CpuSet::new();
+    if core < CpuSet::MAX_CPU {
+        set.set(core);
+    }
+    sched_setaffinity(None, &set).map_err(|error| BenchError::Affinity {
+        core,
+        detail: error.to_string(),
+    })
+}
+
+/// Processes that keep cores from halting, for as long as this lives.
+#[derive(Debug)]
+pub struct Awake {
+    _spinners: Vec<Part>,
+}
+
+impl Awake {
+    /// Keeps the cores from halting if `regime` asks for it.
+    ///
+    /// # Errors
+    /// The processes cannot be started, bound, or given the lowest priority.
+    pub fn during(regime: Regime) -> Result<Self, BenchError> {
+        let cores = if regime == Regime::NoHalt {
+            usable_cores()
+        } else {
+            Vec::new()
+        };
+        let spinners = cores
+            .into_iter()
+            .map(|core| {
+                let mut part = Part::start("idle spinner")?;
+                let () = part.ask(&core)?;
+                Ok(part)
+            })
+            .collect::<Result<_, BenchError>>()?;
+        Ok(Self {
+            _spinners: spinners,
+        })
+    }
+}
+
+/// Runs whenever nothing else wants the core, until it is killed.
+fn keep_from_halting(stage: &mut Stage) -> Result<(), BenchError> {
+    let Some(core) = stage.hear::<usize>()? else {
+        return Ok(());
+    };
+    pin(core)?;
+    run_only_when_idle()?;
+    stage.tell(&())?;
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+#[allow(unsafe_code)]
+fn run_only_when_idle() -> Result<(), BenchError> {
+    let priority = libc::sched_param { sched_priority: 0 };
+    // SAFETY: the parameter outlives the call, which reads it and changes this thread only.
+    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_IDLE, &raw const priority) };
+    if result == 0 {
+        Ok(())
+    } else {
+        Err(BenchError::Kernel {
+            what: "a process of the lowest priority",
+            detail: std::io::Error::last_os_error().to_string(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_processor_is_found_as_x86_and_as_arm_boards_name_it() {
+        let x86 = "processor\t: 0\nmodel name\t: Some CPU @ 3 GHz\nprocessor\t: 1\n";
+        assert_eq!(processor_of(x86).as_deref(), Some("Some CPU @ 3 GHz"));
+        let arm = "processor\t: 0\nCPU part\t: 0xd08\n\nModel\t\t: Raspberry Pi 4 Model B\n";
+        assert_eq!(processor_of(arm).as_deref(), Some("Raspberry Pi 4 Model B"));
+        assert_eq!(processor_of(""), None);
+    }
+
+    #[test]
+    fn a_pinned_thread_may_use_that_core_only() {
+        let cores = usable_cores();
+        let last = *cores.last().unwrap();
+        // In a thread of its own: the binding would stay.
+        let seen = std::thread::spawn(move || {
+            pin(last).unwrap();
+            usable_cores()
+        });
+        assert_eq!(seen.join().unwrap(), [last]);
+    }
+
+    #[test]
+    fn a_core_that_is_not_there_is_refused() {
+        let refused = std::thread::spawn(|| pin(CpuSet::MAX_CPU + 1))
+            .join()
+            .unwrap();
+        assert!(matches!(refused, Err(BenchError::Affinity { .. })));
+    }
+
+    #[test]
+    fn both_processes_share_a_core_only_where_that_is_asked_for() {
+        let (first, second) = cores_for(Regime::SameCore).unwrap();
+        assert_eq!(first, second);
+        if usable_cores().len() > 1 {
+            let (first, second) = cores_for(Regime::Plain).unwrap();
+            assert_ne!(first, second);
+        }
+    }
+}

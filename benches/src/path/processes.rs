@@ -1,0 +1,105 @@
+//! The processes of one chain: put to sleep while others are measured, watched, and asked what
+//! processor time they used.
+
+use core::time::Duration;
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use super::pace::{ANSWER_WITHIN, now_ns};
+use crate::error::BenchError;
+use crate::parts::Part;
+
+/// The processes of one chain.
+pub(super) struct Processes {
+    parts: Vec<Part>,
+    /// Of these the processor time is counted: the services, not their observers.
+    counted: usize,
+    /// Processor time and real time when the turn's counting began, in ns.
+    began: Option<(u64, u64)>,
+    /// Processor time and real time of all turns so far, in ns.
+    total: (u64, u64),
+}
+
+impl Processes {
+    /// All of `parts` are counted.
+    pub(super) fn new(parts: Vec<Part>) -> Self {
+        Self {
+            counted: parts.len(),
+            parts,
+            began: None,
+            total: (0, 0),
+        }
+    }
+
+    /// More processes, which are not counted.
+    pub(super) fn add(&mut self, parts: Vec<Part>) {
+        self.parts.extend(parts);
+    }
+
+    /// Lets them run.
+    pub(super) fn wake(&self) -> Result<(), BenchError> {
+        self.signal(Signal::CONT)
+    }
+
+    /// The turn is over: lets them stand still until [`Processes::wake`].
+    pub(super) fn rest(&mut self) -> Result<(), BenchError> {
+        if let Some((processor, real)) = self.began.take() {
+            self.total.0 += self.processor_ns().saturating_sub(processor);
+            self.total.1 += now_ns().saturating_sub(real);
+        }
+        self.signal(Signal::STOP)
+    }
+
+    /// From now on processor time is counted.
+    pub(super) fn start_counting(&mut self) -> Result<(), BenchError> {
+        self.began = Some((self.processor_ns(), now_ns()));
+        Ok(())
+    }
+
+    /// Processor time per real time over all turns, in percent of one core.
+    pub(super) fn cpu_percent(&self) -> Option<f64> {
+        let (processor, real) = self.total;
+        (real > 0).then(|| 100.0 * processor as f64 / real as f64)
+    }
+
+    /// Why frame `number` has no answer: what a process says, or that it is silent.
+    pub(super) fn fault(&mut self, contender: &str, number: u64) -> BenchError {
+        for part in &mut self.parts {
+            match part.hear_within::<()>(Duration::ZERO) {
+                Ok(()) | Err(BenchError::PartSilent { .. }) => {}
+                Err(said) => return said,
+            }
+        }
+        BenchError::NoSample {
+            contender: contender.to_owned(),
+            expected: number,
+            limit: Duration::from_nanos(ANSWER_WITHIN),
+        }
+    }
+
+    fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+        for part in &self.parts {
+            let pid = i32::try_from(part.pid()).ok().and_then(Pid::from_raw);
+            // One that has ended is found out with the next frame.
+            let _ = pid.map(|pid| kill_process(pid, signal));
+        }
+        Ok(())
+    }
+
+    /// Processor time of all threads of the counted processes, in ns.
+    fn processor_ns(&self) -> u64 {
+        self.parts[..self.counted].iter().map(processor_ns).sum()
+    }
+}
+
+/// The kernel counts each thread's time on a processor in ns, first in its `schedstat`.
+fn processor_ns(part: &Part) -> u64 {
+    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", part.pid())) else {
+        return 0;
+    };
+    threads
+        .flatten()
+        .filter_map(|thread| std::fs::read_to_string(thread.path().join("schedstat")).ok())
+        .filter_map(|text| text.split_whitespace().next()?.parse::<u64>().ok())
+        .sum()
+}

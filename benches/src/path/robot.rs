@@ -1,0 +1,480 @@
+//! The chain under test: the real bridge and the real logic, each in a process of its own, between
+//! two boards that this file plays.
+//!
+//! Every frame makes one new order. Logic is told to trust a line frame for no time at all, so
+//!
+//! ```text
+//!   sensor board sends        logic decides              steering board gets
+//!   Line(OnLine)       -->    I see: follow the line --> command 3, new seq
+//!   Distance(255)      -->    I see nothing: stand   --> command 1, new seq
+//! ```
+//!
+//! by turns. A command answers a frame if it is the one that frame asks for and its seq is new;
+//! repetitions of the command in force carry the old one. On a machine that keeps logic from
+//! running for half a millisecond, logic may go blind right after it saw, and the bridge then
+//! writes the later of both orders alone: such a frame is put aside, and counted. The steering board reports that its
+//! wheels stand, so the robot drives towards its goods for as long as it is measured.
+
+use core::time::Duration;
+use std::time::Instant;
+
+use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
+use lager_topics::{
+    Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MapProduct, MissionOrder, Mode as Driver,
+    NavMap, NavStatus, Order, PathLatency, Phase, Role, Side, WarehouseMap,
+};
+use lager_wire::link::{BoardEvent, BoardLink};
+use lager_wire::{
+    Callsign, Centimetres, Command, LineState, Payload, ResetCause, SteerData, SteerFlags,
+    WheelCommand,
+};
+
+use super::cable::Cable;
+use super::pace::{ANSWER_WITHIN, Chain, now_ns, sleep_until_due};
+use super::players::{BRIDGE, LOGIC, OBSERVER, Place, RealTime, Script, bus_error};
+use super::processes::Processes;
+use crate::domain::Domain;
+use crate::error::BenchError;
+use crate::parts::{Part, interrupted};
+use crate::report::Mode;
+
+/// How long the robot may take to come up, and to come back after it stood still.
+const UP_WITHIN: Duration = Duration::from_secs(10);
+
+/// How long a board waits for the next byte of a packet, in us. The bridge writes packets whole,
+/// but a process that is put to sleep may be cut off in one.
+const GAP_US: u32 = 50_000;
+
+/// Reports come this often, in ns: often enough for the link (1 s) and for the order in force.
+const REPORT_EVERY: u64 = 200_000_000;
+
+/// Frames that must be answered one after the other before a robot counts as awake.
+const IN_A_ROW: usize = 5;
+
+/// So many frames may be put aside whatever their part of all frames is.
+const TOO_FEW_TO_JUDGE: u64 = 20;
+
+/// Who asks and orders here, in the sentences of errors.
+const OPERATOR: &str = "the operator of the measurement";
+
+const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
+
+/// One board: its end of the wire and its end of the link.
+struct Board {
+    cable: Cable,
+    link: BoardLink,
+}
+
+impl Board {
+    fn new(sign: Callsign) -> Result<Self, BenchError> {
+        Ok(Self {
+            cable: Cable::new()?,
+            link: BoardLink::new(sign, ResetCause::PowerOn, GAP_US),
+        })
+    }
+
+    /// Sends a handshake if one is due.
+    fn shake_hands(&mut self) -> Result<(), BenchError> {
+        match self.link.poll(now_us()) {
+            Some(syn) => self.cable.write(&syn),
+            None => Ok(()),
+        }
+    }
+
+    fn send(&mut self, payload: Payload) -> Result<(), BenchError> {
+        match self.link.encode(payload) {
+            Some(packet) => self.cable.write(&packet),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes what has come and is not a command.
+    fn drain(&mut self) -> Result<(), BenchError> {
+        let mut buffer = [0; 256];
+        loop {
+            let count = self.cable.read(&mut buffer)?;
+            if count == 0 {
+                return Ok(());
+            }
+            for byte in &buffer[..count] {
+                self.link.push(*byte, now_us());
+            }
+        }
+    }
+}
+
+/// What became of a frame.
+enum Answer {
+    /// The command it asks for was read so many ns after it was written.
+    After(u64),
+    /// Another command came in its place.
+    Overtaken,
+    /// Nothing new came in time.
+    None,
+}
+
+/// The robot under test.
+pub(super) struct Robot {
+    /// While frames are counted, if the boards are to come before everything else. The first to
+    /// go: nobody tears down a robot before the rest of the machine may run.
+    urgent: Option<RealTime>,
+    boards_priority: Option<i32>,
+    name: String,
+    // The processes end first and the bus's files go last.
+    processes: Processes,
+    sensor: Board,
+    steering: Board,
+    /// Code and seq of the last command that the steering board got.
+    last: (u8, u8),
+    reported_ns: u64,
+    frames: u64,
+    /// Frames put aside; more than one in ten end the measurement.
+    overtaken: u64,
+    health: Subscriber<LinkHealth>,
+    status: Subscriber<NavStatus>,
+    latency: Subscriber<LatencyPath>,
+    map: Publisher<NavMap>,
+    orders: Publisher<MissionOrder>,
+    requests: Client<BridgeRequest>,
+    bus: Bus,
+    script: Script,
+    domain: Domain,
+}
+
+impl Robot {
+    /// Starts bridge and logic and lets them drive.
+    pub(super) fn start(
+        name: &str,
+        mode: Mode,
+        bridge: Place,
+        logic: Place,
+    ) -> Result<Self, BenchError> {
+        let domain = Domain::new()?;
+        let [sensor, steering] = [
+            Board::new(Callsign::Sensor)?,
+            Board::new(Callsign::Steering)?,
+        ];
+        let script = Script {
+            place: Place::default(),
+            prefix: domain.prefix().to_owned(),
+            root: domain.root().to_owned(),
+            mode,
+            ports: [sensor.cable.path().clone(), steering.cable.path().clone()],
+        };
+        let bus = script.open(Role::Operator)?;
+        let mut parts = Vec::new();
+        for (part, place) in [(LOGIC, logic), (BRIDGE, bridge)] {
+            let mut part = Part::start(part)?;
+            let () = part.ask(&Script {
+                place,
+                ..script.clone()
+            })?;
+            parts.push(part);
+        }
+        let mut robot = Self {
+            urgent: None,
+            boards_priority: None,
+            name: name.to_owned(),
+            processes: Processes::new(parts),
+            sensor,
+            steering,
+            last: (0, 0),
+            reported_ns: 0,
+            frames: 0,
+            overtaken: 0,
+            health: bus.subscriber().map_err(bus_error(OPERATOR))?,
+            status: bus.subscriber().map_err(bus_error(OPERATOR))?,
+            latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
+            map: bus.publisher().map_err(bus_error(OPERATOR))?,
+            orders: bus.publisher().map_err(bus_error(OPERATOR))?,
+            requests: bus.client().map_err(bus_error(OPERATOR))?,
+            bus,
+            script,
+            domain,
+        };
+        robot.set_out()?;
+        Ok(robot)
+    }
+
+    /// From now on the thread that plays the boards has that SCHED_FIFO priority while frames are
+    /// counted, so that nobody who only looks on keeps it from reading the clock.
+    pub(super) fn with_boards_at(&mut self, priority: i32) -> Result<(), BenchError> {
+        drop(RealTime::begin(priority)?);
+        self.boards_priority = Some(priority);
+        Ok(())
+    }
+
+    /// Attaches `count` observers, each a process of its own as `lager topic echo` would be.
+    pub(super) fn observed_by(&mut self, count: usize) -> Result<(), BenchError> {
+        let mut observers = Vec::new();
+        for _ in 0..count {
+            let mut observer = Part::start(OBSERVER)?;
+            observer.tell(&self.script)?;
+            observers.push(observer);
+        }
+        // They start together; the last of them waits for the others' processor time.
+        for observer in &mut observers {
+            let () = observer.hear_within(2 * UP_WITHIN)?;
+        }
+        self.processes.add(observers);
+        Ok(())
+    }
+
+    /// From two silent boards to a robot on its way.
+    fn set_out(&mut self) -> Result<(), BenchError> {
+        self.map
+            .send(Cause::OWN, map())
+            .map_err(bus_error(OPERATOR))?;
+        self.until("both boards are up", |robot| {
+            let health = robot.health.latest();
+            let health = health.map_err(bus_error("reading health"))?;
+            Ok(health.is_some_and(|health| health.sensor.up != 0 && health.steering.up != 0))
+        })?;
+        let ask = Ask {
+            kind: AskKind::SetMode.into(),
+            mode: Driver::Autonomous.into(),
+            ..Ask::default()
+        };
+        self.requests
+            .call(ask, UP_WITHIN)
+            .map_err(bus_error("asking for the autonomous mode"))?;
+        let order = Order { id: 1, product: 1 };
+        let mut ordered = Instant::now();
+        self.orders
+            .send(Cause::OWN, order)
+            .map_err(bus_error(OPERATOR))?;
+        self.until("the robot is on its way", |robot| {
+            let status = robot.status.latest();
+            let status = status.map_err(bus_error("reading nav/status"))?;
+            // An order that came before logic had its place on the topic is given again.
+            if ordered.elapsed() > Duration::from_millis(500) {
+                ordered = Instant::now();
+                robot
+                    .orders
+                    .send(Cause::OWN, order)
+                    .map_err(bus_error(OPERATOR))?;
+            }
+            Ok(status.is_some_and(|status| status.phase.get() == Some(Phase::Approaching)))
+        })
+    }
+
+    /// Plays both boards, slowly, until `done`.
+    fn until(
+        &mut self,
+        what: &str,
+        mut done: impl FnMut(&mut Self) -> Result<bool, BenchError>,
+    ) -> Result<(), BenchError> {
+        let start = Instant::now();
+        while !done(self)? {
+            if interrupted() {
+                return Err(BenchError::Interrupted);
+            }
+            if start.elapsed() > UP_WITHIN {
+                return Err(match self.processes.fault(&self.name, 0) {
+                    BenchError::NoSample { .. } => BenchError::PartSilent {
+                        part: format!("{}, until {what}", self.name),
+                        limit: UP_WITHIN,
+                    },
+                    said => said,
+                });
+            }
+            self.play_boards()?;
+            self.sensor.send(Payload::Line(LineState::OnLine))?;
+            self.map.tick();
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        Ok(())
+    }
+
+    /// All that the boards do beside sending frames.
+    fn play_boards(&mut self) -> Result<(), BenchError> {
+        self.sensor.drain()?;
+        self.sensor.shake_hands()?;
+        self.drain_commands()?;
+        self.steering.shake_hands()?;
+        self.report()
+    }
+
+    /// Reports, if it is time: the wheels stand, and the board is one of ours.
+    fn report(&mut self) -> Result<(), BenchError> {
+        let now = now_ns();
+        if now.saturating_sub(self.reported_ns) < REPORT_EVERY || !self.steering.link.is_up() {
+            return Ok(());
+        }
+        self.reported_ns = now;
+        self.steering.send(Payload::SteerData(SteerData {
+            code: self.last.0,
+            left_duty: 0,
+            right_duty: 0,
+            flags: SteerFlags::ARM_LOCKED,
+            line_error: 0,
+            finished_seq: 0,
+            servo_errors: 0,
+            battery_decivolts: 111,
+        }))
+    }
+
+    /// Takes commands that nobody has asked for by a frame.
+    fn drain_commands(&mut self) -> Result<(), BenchError> {
+        let mut buffer = [0; 256];
+        loop {
+            let count = self.steering.cable.read(&mut buffer)?;
+            if count == 0 {
+                return Ok(());
+            }
+            self.take(&buffer[..count]);
+        }
+    }
+
+    /// Takes bytes from the bridge; the last command among them, if it is a new one.
+    fn take(&mut self, bytes: &[u8]) -> Option<u8> {
+        let mut new = None;
+        for byte in bytes {
+            if let Some(BoardEvent::Packet(packet)) = self.steering.link.push(*byte, now_us())
+                && let Payload::SteerCommand(command) = packet.payload
+            {
+                if command.seq != self.last.1 {
+                    new = Some(command.code);
+                }
+                self.last = (command.code, command.seq);
+            }
+        }
+        new
+    }
+
+    /// Sends one frame when it is due, and waits at most `limit` ns for its answer.
+    fn exchange(&mut self, limit: u64) -> Result<Answer, BenchError> {
+        sleep_until_due();
+        self.drain_commands()?;
+        self.frames += 1;
+        let follows = self.last.0 == FOLLOW;
+        let payload = if follows {
+            Payload::Distance(Centimetres(255))
+        } else {
+            Payload::Line(LineState::OnLine)
+        };
+        let Some(packet) = self.sensor.link.encode(payload) else {
+            return Ok(Answer::None);
+        };
+        let start = now_ns();
+        self.sensor.cable.write(&packet)?;
+        let mut buffer = [0; 256];
+        loop {
+            let count = self.steering.cable.read_until(start + limit, &mut buffer)?;
+            let end = now_ns();
+            if count == 0 {
+                return Ok(Answer::None);
+            }
+            if let Some(code) = self.take(&buffer[..count]) {
+                return Ok(if (code == FOLLOW) == follows {
+                    Answer::Overtaken
+                } else {
+                    Answer::After(end - start)
+                });
+            }
+        }
+    }
+}
+
+impl Chain for Robot {
+    fn begin(&mut self) -> Result<(), BenchError> {
+        self.processes.wake()?;
+        let start = Instant::now();
+        let mut in_a_row = 0;
+        // It may have stood still for longer than leases and links hold, and finds its way back by
+        // itself; or for nearly as long, and then the next report must not be late.
+        self.reported_ns = 0;
+        while in_a_row < IN_A_ROW {
+            if interrupted() {
+                return Err(BenchError::Interrupted);
+            }
+            if start.elapsed() > UP_WITHIN {
+                return Err(self.processes.fault(&self.name, self.frames));
+            }
+            self.play_boards()?;
+            in_a_row = match self.exchange(20_000_000)? {
+                Answer::After(_) => in_a_row + 1,
+                Answer::Overtaken | Answer::None => 0,
+            };
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self) -> Result<u64, BenchError> {
+        let time = loop {
+            match self.exchange(ANSWER_WITHIN)? {
+                Answer::After(time) => break time,
+                Answer::Overtaken => self.overtaken += 1,
+                Answer::None => return Err(self.processes.fault(&self.name, self.frames)),
+            }
+            if self.overtaken > TOO_FEW_TO_JUDGE + self.frames / 10 {
+                return Err(BenchError::Overloaded {
+                    overtaken: self.overtaken,
+                    frames: self.frames,
+                });
+            }
+        };
+        // While the robot stands: a report is news to logic too, which then looks for the line.
+        if self.last.0 != FOLLOW {
+            self.report()?;
+        }
+        Ok(time)
+    }
+
+    fn count(&mut self) -> Result<(), BenchError> {
+        self.urgent = self.boards_priority.map(RealTime::begin).transpose()?;
+        self.processes.start_counting()
+    }
+
+    fn end(&mut self) -> Result<(), BenchError> {
+        self.urgent = None;
+        self.processes.rest()
+    }
+
+    fn cpu_percent(&self) -> Option<f64> {
+        self.processes.cpu_percent()
+    }
+
+    fn latency(&mut self) -> Result<Option<PathLatency>, BenchError> {
+        let latest = self
+            .latency
+            .latest()
+            .map_err(bus_error("reading the path's latency"))?;
+        Ok(latest
+            .map(|sample| *sample)
+            .filter(|seen| seen.total.count > 0))
+    }
+}
+
+impl core::fmt::Debug for Robot {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter
+            .debug_struct("Robot")
+            .field("name", &self.name)
+            .field("bus", &self.bus)
+            .field("domain", &self.domain)
+            .finish_non_exhaustive()
+    }
+}
+
+/// One square with a product on the edge along which the robot looks: no turn, no crossing.
+fn map() -> WarehouseMap {
+    let mut map = WarehouseMap {
+        width: 1,
+        height: 1,
+        side_length_cm: 50,
+        product_count: 1,
+        ..WarehouseMap::default()
+    };
+    map.products[0] = MapProduct {
+        id: 1,
+        side: Side::Down.into(),
+        ..MapProduct::default()
+    };
+    map
+}
+
+/// A board's clock: microseconds that wrap.
+fn now_us() -> u32 {
+    (now_ns() / 1_000) as u32
+}

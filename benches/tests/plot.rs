@@ -1,0 +1,113 @@
+//! The plot script: a report of this crate goes in, a well-formed SVG comes out, and what is no
+//! report is refused with a sentence.
+
+use std::io::Write;
+use std::process::{Command, Output, Stdio};
+
+use lager_benches::{Mode, Regime, Report, Row};
+
+fn plot(input: &str) -> Output {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/plot");
+    let mut child = Command::new("python3")
+        .args([script, "-", "--title", "Bus & <path>"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("python3 is installed");
+    let mut stdin = child.stdin.take().expect("it is piped");
+    stdin.write_all(input.as_bytes()).expect("it reads");
+    drop(stdin);
+    child.wait_with_output().expect("it ends")
+}
+
+fn row(name: &str, mode: Mode, p50_ns: u64) -> Row {
+    Row {
+        name: name.to_owned(),
+        variant: "kind <1>".to_owned(),
+        what: "hop".to_owned(),
+        mode,
+        regime: Regime::Plain,
+        n: 100,
+        p50_ns,
+        p99_ns: 2 * p50_ns,
+        p999_ns: 3 * p50_ns,
+        ratio_to: "iceoryx2/header".to_owned(),
+        ratio_p50: 1.25,
+        ratio_p99: 1.5,
+        ratios: Vec::new(),
+        cpu_percent: (mode == Mode::Block).then_some(7.0),
+    }
+}
+
+/// Whether every element that is opened is closed in its turn, and no character is left bare.
+fn is_well_formed(svg: &str) -> bool {
+    let mut open = Vec::new();
+    let mut rest = svg.trim();
+    while let Some(start) = rest.find('<') {
+        let Some(end) = rest[start..].find('>') else {
+            return false;
+        };
+        if rest[..start].contains("& ") {
+            return false;
+        }
+        let tag = &rest[start + 1..start + end];
+        let name = tag.trim_start_matches('/').split([' ', '/']).next();
+        if tag.starts_with('/') {
+            if open.pop() != name {
+                return false;
+            }
+        } else if !tag.ends_with('/') {
+            open.push(name.unwrap_or_default());
+        }
+        rest = &rest[start + end + 1..];
+        if open.is_empty() {
+            return rest.is_empty();
+        }
+    }
+    false
+}
+
+#[test]
+fn a_report_becomes_a_well_formed_drawing() {
+    let report = Report {
+        machine: "a machine with <brackets> & more".to_owned(),
+        rows: vec![
+            row("lager", Mode::Block, 2_300),
+            row("iceoryx2", Mode::Block, 5_400),
+            row("lager", Mode::Spin, 300),
+        ],
+    };
+    let drawn = plot(&report.to_json());
+    let svg = String::from_utf8(drawn.stdout).expect("UTF-8");
+    assert!(drawn.status.success(), "{:?}", drawn.stderr);
+    assert!(is_well_formed(&svg), "{svg}");
+    assert!(!is_well_formed(&svg.replacen("</text>", "", 1)));
+    // One bar for each row, ours highlighted, with its ratio and its processor time.
+    assert_eq!(svg.matches("<rect class=\"ours\"").count(), 2);
+    assert_eq!(svg.matches("<rect class=\"bar\"").count(), 1);
+    assert!(
+        svg.contains("2.30 µs · 1.25 × iceoryx2/header · 7 % CPU"),
+        "{svg}"
+    );
+    assert!(svg.contains("Bus &amp; &lt;path&gt;"), "{svg}");
+}
+
+#[test]
+fn what_is_no_report_is_refused_with_a_sentence() {
+    let falling = r#"{"machine":"m","rows":[{"name":"lager","mode":"spin","regime":"plain",
+        "p50_ns":5,"p99_ns":4,"p999_ns":6}]}"#;
+    for (input, why) in [
+        ("no JSON", "is no JSON"),
+        ("[1, 2]", "has no list `rows`"),
+        (r#"{"machine":"m","rows":[]}"#, "no rows to draw"),
+        (r#"{"rows":[{"name":"lager"}]}"#, "has no text `mode`"),
+        (falling, "percentiles that do not rise"),
+    ] {
+        let refused = plot(input);
+        let said = String::from_utf8(refused.stderr).expect("UTF-8");
+        assert_eq!(refused.status.code(), Some(1), "{input}: {said}");
+        assert!(said.starts_with("plot: ") && said.contains(why), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}

@@ -1,0 +1,208 @@
+//! The bell board: what lies in shared memory, and what may be done to it.
+//!
+//! ```text
+//!     0   head       magic and layout version
+//!     64  callers    per role: which seats are to be rung          read by every ring
+//!     128 spinners   which seats look without pause                written now and then
+//!     256 seat 0     the word, who sits there                      written by every ring
+//!     384 seat 1     …                                             32 seats of 128 bytes
+//! ```
+//!
+//! A seat has 128 bytes, since processors fetch lines in pairs and a neighbour's rings must not
+//! disturb one that is spinning.
+//!
+//! **Invariant:** nothing here asks the system; who may write what is decided by the locks of
+//! `segment.rs`. A seat's callers, spinner bit and occupant are written only by who holds its lock.
+
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+use lager_topics::Role;
+
+use super::word;
+
+/// Waiters of one robot at the same time.
+pub(crate) const SEATS: usize = 32;
+
+/// Waiters of one role at the same time: the actor, its successor, and more for tools and tests.
+pub(crate) const SEATS_PER_ROLE: usize = 8;
+
+/// "lagerbel" and the layout's version; changed whenever [`Board`] or the word changes.
+const MAGIC: u64 = u64::from_be_bytes(*b"lagerbel") ^ VERSION;
+const VERSION: u64 = 1;
+
+#[repr(C, align(64))]
+struct Line<T>(T);
+
+#[repr(C, align(128))]
+struct Seat {
+    word: AtomicU32,
+    pid: AtomicU32,
+}
+
+/// The board. Every bit pattern of the right size is a valid one.
+#[repr(C)]
+pub(crate) struct Board {
+    magic: Line<AtomicU64>,
+    callers: Line<[AtomicU32; 16]>,
+    spinners: Line<AtomicU32>,
+    seats: [Seat; SEATS],
+}
+
+const _: () = assert!(size_of::<Board>() == 256 + 128 * SEATS);
+const _: () = assert!(SEATS <= 32 && Role::ALL.len() <= 16);
+
+/// How a board that others have made looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// Made and never finished: all zero.
+    Blank,
+    Ours,
+    Other,
+}
+
+impl Board {
+    pub(crate) fn layout(&self) -> Layout {
+        match self.magic.0.load(Ordering::Acquire) {
+            0 => Layout::Blank,
+            MAGIC => Layout::Ours,
+            _ => Layout::Other,
+        }
+    }
+
+    /// Says that the board is complete.
+    pub(crate) fn sign(&self) {
+        self.magic.0.store(MAGIC, Ordering::Release);
+    }
+
+    /// The word of a seat.
+    #[inline]
+    pub(crate) fn word(&self, seat: usize) -> &AtomicU32 {
+        &self.seats[seat % SEATS].word
+    }
+
+    /// Rings every waiter of `role`.
+    #[inline]
+    pub(crate) fn ring(&self, role: Role) {
+        // Relaxed: see `take` for a waiter that is taking its seat at this moment.
+        let mut seats = self.callers_of(role).load(Ordering::Relaxed);
+        while seats != 0 {
+            word::ring(self.word(seats.trailing_zeros() as usize));
+            seats &= seats - 1;
+        }
+    }
+
+    /// The seats of `role`, as bits, those of killed ones included.
+    pub(crate) fn seats_of(&self, role: Role) -> u32 {
+        self.callers_of(role).load(Ordering::Acquire)
+    }
+
+    /// Every seat that somebody has taken, as bits, those of killed ones included.
+    pub(crate) fn taken(&self) -> u32 {
+        let masks = self.callers.0.iter();
+        masks.fold(0, |all, seats| all | seats.load(Ordering::Acquire))
+            | self.spinners.0.load(Ordering::Acquire)
+    }
+
+    /// The process that sits, or sat last, in a seat.
+    pub(crate) fn pid(&self, seat: usize) -> u32 {
+        self.seats[seat].pid.load(Ordering::Acquire)
+    }
+
+    /// Registers a waiter. From now on it is rung, and its word is its own.
+    pub(crate) fn take(&self, seat: usize, role: Role, pid: u32) {
+        self.seats[seat].pid.store(pid, Ordering::Release);
+        self.callers_of(role).fetch_or(1 << seat, Ordering::SeqCst);
+    }
+
+    /// Removes whoever sits in a seat.
+    pub(crate) fn clear(&self, seat: usize) {
+        for seats in &self.callers.0 {
+            // Most are not set, and writing would take the line from every ringer.
+            if seats.load(Ordering::Acquire) & (1 << seat) != 0 {
+                seats.fetch_and(!(1 << seat), Ordering::AcqRel);
+            }
+        }
+        self.stop_spinning(seat);
+        self.seats[seat].pid.store(0, Ordering::Release);
+    }
+
+    /// Asks to be one of at most `limit` that look without pause; who may, keeps the right until
+    /// [`Board::stop_spinning`].
+    pub(crate) fn may_spin(&self, seat: usize, limit: usize) -> bool {
+        let granted = |spinners: u32| {
+            let with_me = spinners | 1 << seat;
+            (with_me.count_ones() as usize <= limit).then_some(with_me)
+        };
+        let spinners = &self.spinners.0;
+        spinners
+            .fetch_update(Ordering::AcqRel, Ordering::Acquire, granted)
+            .is_ok()
+    }
+
+    pub(crate) fn stop_spinning(&self, seat: usize) {
+        if self.spinners.0.load(Ordering::Acquire) & (1 << seat) != 0 {
+            self.spinners.0.fetch_and(!(1 << seat), Ordering::AcqRel);
+        }
+    }
+
+    fn callers_of(&self, role: Role) -> &AtomicU32 {
+        // Codes are below 16, see above.
+        &self.callers.0[role as usize % 16]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blank() -> Box<Board> {
+        let line = |value| Line(AtomicU32::new(value));
+        Box::new(Board {
+            magic: Line(AtomicU64::new(0)),
+            callers: Line(Default::default()),
+            spinners: line(0),
+            seats: core::array::from_fn(|_| Seat {
+                word: AtomicU32::new(0),
+                pid: AtomicU32::new(0),
+            }),
+        })
+    }
+
+    #[test]
+    fn a_ring_reaches_the_seats_of_its_role_only() {
+        let board = blank();
+        board.take(3, Role::Logic, 30);
+        board.take(31, Role::Logic, 310);
+        board.take(4, Role::Bridge, 40);
+        board.ring(Role::Logic);
+        let rung: Vec<_> = (0..SEATS)
+            .filter(|seat| board.word(*seat).load(Ordering::Relaxed) != 0)
+            .collect();
+        assert_eq!(rung, [3, 31]);
+        board.clear(3);
+        board.ring(Role::Logic);
+        assert_eq!(board.word(3).load(Ordering::Relaxed), 2);
+        assert_eq!(board.word(31).load(Ordering::Relaxed), 4);
+    }
+
+    #[test]
+    fn no_more_spin_than_may() {
+        let board = blank();
+        assert!(!board.may_spin(0, 0));
+        assert!(board.may_spin(0, 2) && board.may_spin(5, 2));
+        assert!(!board.may_spin(6, 2));
+        assert!(board.may_spin(5, 2), "who may already, may");
+        board.clear(0);
+        assert!(board.may_spin(6, 2));
+    }
+
+    #[test]
+    fn a_board_is_blank_until_it_is_signed() {
+        let board = blank();
+        assert_eq!(board.layout(), Layout::Blank);
+        board.sign();
+        assert_eq!(board.layout(), Layout::Ours);
+        board.magic.0.store(MAGIC ^ VERSION ^ 2, Ordering::Relaxed);
+        assert_eq!(board.layout(), Layout::Other);
+    }
+}

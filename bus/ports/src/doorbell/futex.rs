@@ -1,0 +1,54 @@
+//! The word in shared memory: an atomic that the kernel can put a process to sleep on.
+//!
+//! Apart from the protocol, which knows of no kernel. The futex is a shared one, found by its page
+//! in memory, so ringer and waiter need nothing in common but the mapping.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use core::time::Duration;
+
+use rustix::io::Errno;
+use rustix::thread::futex;
+use rustix::time::Timespec;
+
+use super::word::{Ended, Word};
+
+impl Word for AtomicU32 {
+    #[inline]
+    fn load(&self, order: Ordering) -> u32 {
+        Self::load(self, order)
+    }
+
+    #[inline]
+    fn fetch_add(&self, value: u32, order: Ordering) -> u32 {
+        Self::fetch_add(self, value, order)
+    }
+
+    #[inline]
+    fn fetch_and(&self, mask: u32, order: Ordering) -> u32 {
+        Self::fetch_and(self, mask, order)
+    }
+
+    #[inline]
+    fn exchange(&self, current: u32, new: u32, success: Ordering, failure: Ordering) -> bool {
+        self.compare_exchange(current, new, success, failure)
+            .is_ok()
+    }
+
+    fn sleep_while(&self, value: u32, timeout: Duration) -> Ended {
+        // Beyond the type's range a time-out is for ever in any case, and nobody asks for that.
+        let timeout = Timespec::try_from(timeout).unwrap_or(Timespec {
+            tv_sec: 3600,
+            tv_nsec: 0,
+        });
+        match futex::wait(self, futex::Flags::empty(), value, Some(&timeout)) {
+            Err(Errno::TIMEDOUT) => Ended::TimedOut,
+            // Woken, changed before it slept, or a signal: whoever waits looks around.
+            _ => Ended::Awake,
+        }
+    }
+
+    fn wake(&self) {
+        // It fails only for an address that is none.
+        let _ = futex::wake(self, futex::Flags::empty(), 1);
+    }
+}

@@ -1,0 +1,71 @@
+//! Locks on single bytes of an open file, which the kernel drops when their holder dies.
+//!
+//! They belong to the opened file and not to the process, so two buses in one process exclude each
+//! other as two processes do, and no process id has to be believed. Whoever unlocks does so by
+//! name instead of closing the file only, because a child that is being forked at this moment
+//! holds the same opened file until it executes its program.
+
+#![allow(
+    unsafe_code,
+    reason = "rustix has locks for whole files only, and those belong to the process"
+)]
+
+use core::ffi::c_int;
+use std::fs::File;
+use std::io::{Error, ErrorKind};
+use std::os::fd::AsRawFd;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Shared,
+    Exclusive,
+}
+
+/// Locks a byte, or changes the kind of the lock held on it; false if another holds it.
+pub(super) fn try_lock(file: &File, byte: u64, kind: Kind) -> Result<bool, Error> {
+    let kind = match kind {
+        Kind::Shared => libc::F_RDLCK,
+        Kind::Exclusive => libc::F_WRLCK,
+    };
+    match command(file, libc::F_OFD_SETLK, byte, kind) {
+        Ok(_) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Unlocks a byte; that it was not locked is in order.
+pub(super) fn unlock(file: &File, byte: u64) {
+    // Unlocking fails only without memory for the kernel's list, and then closing does it.
+    let _ = command(file, libc::F_OFD_SETLK, byte, libc::F_UNLCK);
+}
+
+/// Whether somebody else holds a byte exclusively.
+pub(super) fn is_held(file: &File, byte: u64) -> Result<bool, Error> {
+    let met = command(file, libc::F_OFD_GETLK, byte, libc::F_RDLCK)?;
+    Ok(met != libc::F_UNLCK)
+}
+
+/// One `fcntl`; returns the kind of lock it leaves in the argument.
+fn command(file: &File, command: c_int, byte: u64, kind: c_int) -> Result<c_int, Error> {
+    let mut lock = libc::flock {
+        // The constants are tiny; the field's type differs between machines.
+        l_type: kind as libc::c_short,
+        l_whence: libc::SEEK_SET as libc::c_short,
+        l_start: byte as libc::off_t,
+        l_len: 1,
+        l_pid: 0,
+    };
+    loop {
+        // SAFETY: the descriptor is open as long as `file` is borrowed, and `lock` is a complete
+        // `flock` that the call reads and writes only while it lasts.
+        let done = unsafe { libc::fcntl(file.as_raw_fd(), command, &raw mut lock) };
+        if done == 0 {
+            return Ok(c_int::from(lock.l_type));
+        }
+        let error = Error::last_os_error();
+        if error.kind() != ErrorKind::Interrupted {
+            return Err(error);
+        }
+    }
+}

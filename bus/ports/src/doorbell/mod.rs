@@ -1,0 +1,212 @@
+//! How one thread wakes another, in its own process or not: a board of bells in shared memory.
+//!
+//! Each waiter has a seat on its robot's board with one word of its own, on which it sleeps for all
+//! its topics at once. Who publishes on a topic rings the seats of the roles that act on it: one
+//! atomic addition for each, and one system call where somebody sleeps. Observers have no seat and
+//! cost a ringer nothing. There is nothing to connect: a waiter that starts later, restarts or
+//! replaces a killed one is rung by the next sample.
+//!
+//! | file | what it is |
+//! |---|---|
+//! | `word` | the ring and sleep protocol; `model` runs it under every interleaving |
+//! | `futex` | the word as a futex |
+//! | `board` | the shared memory: who is rung for what, who may spin |
+//! | `segment`, `locks` | its file: joining, leaving, seats, what killed processes leave |
+//! | `pace` | when looking without pause is worth it |
+//! | `standard` | listeners of plain iceoryx2, which know nothing of boards |
+//!
+//! **Invariant:** a ring is a hint that never says what happened; whoever waits has a time-out and
+//! looks at everything after it. Ringing and waiting do not allocate.
+
+mod board;
+mod futex;
+mod locks;
+#[cfg(test)]
+mod model;
+mod pace;
+mod segment;
+mod standard;
+mod word;
+
+use core::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+use iceoryx2::config::Config;
+use lager_topics::Role;
+
+pub(crate) use pace::{Pace, Plan};
+use segment::{Fault, Segment};
+pub(crate) use standard::StandardListeners;
+use word::Sleeper;
+
+use crate::bus::Bus;
+use crate::error::PortError;
+use crate::name::RobotName;
+
+/// A bus's board, opened when the first of its ports needs it and left with the last.
+#[derive(Default)]
+pub(crate) struct Board(Mutex<Weak<Segment>>);
+
+impl Board {
+    fn open(&self, bus: &Bus, role: Role) -> Result<Arc<Segment>, PortError> {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(segment) = known.upgrade() {
+            return Ok(segment);
+        }
+        let path = segment::path(bus.transport(), bus.robot());
+        let segment = Segment::join(&path).map_err(|fault| error(role, fault))?;
+        let segment = Arc::new(segment);
+        *known = Arc::downgrade(&segment);
+        Ok(segment)
+    }
+}
+
+/// Clears the seats of killed processes on one robot's board, or removes it if it is unused.
+pub(crate) fn sweep(config: &Config, robot: &RobotName) {
+    sweep_at(&segment::path(config, robot));
+}
+
+/// The same for every robot of the bus.
+pub(crate) fn sweep_all(config: &Config) {
+    for path in segment::all(config) {
+        sweep_at(&path);
+    }
+}
+
+fn sweep_at(path: &std::path::Path) {
+    // What cannot be swept now, because somebody is just joining, is swept the next time. Being
+    // the last to leave removes the file.
+    if let Ok(Some(segment)) = Segment::existing(path) {
+        let _ = segment.sweep();
+    }
+}
+
+/// The living processes whose waiters are rung for `role`; a process may wait more than once.
+pub(crate) fn woken(config: &Config, robot: &RobotName, role: Role) -> Vec<u32> {
+    match Segment::existing(&segment::path(config, robot)) {
+        Ok(Some(segment)) => segment.woken(role),
+        _ => Vec::new(),
+    }
+}
+
+/// The actor's end: one seat.
+pub(crate) struct Bell {
+    segment: Arc<Segment>,
+    seat: usize,
+    sleeper: Sleeper,
+}
+
+impl Bell {
+    /// Hangs a bell of this process's role.
+    pub(crate) fn hang(bus: &Bus) -> Result<Self, PortError> {
+        let role = bus.role();
+        let segment = bus.board().open(bus, role)?;
+        let seat = segment
+            .take_seat(role)
+            .map_err(|fault| error(role, fault))?;
+        let sleeper = Sleeper::new(segment.word(seat));
+        Ok(Self {
+            segment,
+            seat,
+            sleeper,
+        })
+    }
+
+    /// Whether it has rung since it was last asked. No system call.
+    #[inline]
+    pub(crate) fn rung(&self) -> bool {
+        self.sleeper.rung(self.segment.word(self.seat))
+    }
+
+    /// Sleeps until a ring, at most `timeout`; true if it was one, or a signal. If it has rung
+    /// since it was last asked it does not sleep.
+    pub(crate) fn sleep(&self, timeout: Duration) -> bool {
+        self.sleeper.sleep(self.segment.word(self.seat), timeout)
+    }
+
+    /// Asks for the right to look without pause, which at most `limit` waiters have at a time.
+    pub(crate) fn may_spin(&self, limit: usize) -> bool {
+        self.segment.may_spin(self.seat, limit)
+    }
+
+    /// Gives that right back.
+    pub(crate) fn stop_spinning(&self) {
+        self.segment.stop_spinning(self.seat);
+    }
+
+    /// A rope for the threads of this process.
+    pub(crate) fn inside_rope(&self) -> InsideRope {
+        InsideRope {
+            segment: Arc::clone(&self.segment),
+            seat: self.seat,
+        }
+    }
+}
+
+impl Drop for Bell {
+    fn drop(&mut self) {
+        self.segment.leave_seat(self.seat);
+    }
+}
+
+/// A ringer's end.
+pub(crate) struct Rope {
+    segment: Arc<Segment>,
+    role: Role,
+}
+
+impl Rope {
+    /// A rope to the bells of `role`, those that hang and those that will.
+    pub(crate) fn to(bus: &Bus, role: Role) -> Result<Self, PortError> {
+        Ok(Self {
+            segment: bus.board().open(bus, role)?,
+            role,
+        })
+    }
+
+    /// Rings every waiter of the role. A system call for each that sleeps, and none otherwise.
+    #[inline]
+    pub(crate) fn ring(&self) {
+        self.segment.ring(self.role);
+    }
+}
+
+/// A rope to one bell, for the threads of its own process; clones pull the same bell. When the bell
+/// is gone, its seat's next owner may be woken in vain.
+#[derive(Clone)]
+pub(crate) struct InsideRope {
+    segment: Arc<Segment>,
+    seat: usize,
+}
+
+impl InsideRope {
+    /// Rings.
+    pub(crate) fn ring(&self) {
+        word::ring(self.segment.word(self.seat));
+    }
+}
+
+fn error(role: Role, fault: Fault) -> PortError {
+    let topic = format!("bell of {role}");
+    match fault {
+        Fault::OtherLayout => PortError::OtherLayout {
+            topic,
+            detail: "its board in shared memory differs".to_owned(),
+        },
+        Fault::Busy => PortError::Busy {
+            topic,
+            detail: "its board in shared memory stays locked".to_owned(),
+        },
+        Fault::NoSeat => PortError::TooManyWaiters {
+            role,
+            limit: board::SEATS_PER_ROLE,
+        },
+        Fault::File(error) if error.kind() == std::io::ErrorKind::PermissionDenied => {
+            PortError::Permission { topic }
+        }
+        Fault::File(error) => PortError::Transport {
+            topic,
+            detail: error.to_string(),
+        },
+    }
+}

@@ -1,0 +1,197 @@
+//! The protocol of `word.rs` under every interleaving that the memory model allows, up to a number
+//! of switches between threads.
+//!
+//! The word is loom's, and so is the futex: a queue behind a lock, which compares and puts to sleep
+//! in one step, as the kernel's does. Nobody has a time-out unless the model gives one, so a lost
+//! wake-up is a deadlock, and loom reports that.
+
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+
+use loom::sync::atomic::{AtomicBool, AtomicU32};
+use loom::sync::{Arc, Condvar, Mutex};
+use loom::thread;
+
+use super::word::{self, Ended, Sleeper, Word};
+
+/// Switches between threads that the code does not force, in one run. Loom's authors find all bugs
+/// they know of with two or three; without a bound a run takes hours.
+const PREEMPTIONS: usize = 3;
+
+fn under_every_interleaving(run: impl Fn() + Sync + Send + 'static) {
+    let mut builder = loom::model::Builder::new();
+    builder.preemption_bound = Some(PREEMPTIONS);
+    builder.check(run);
+}
+
+struct Modelled {
+    word: AtomicU32,
+    queue: Mutex<()>,
+    sleeper: Condvar,
+    /// The next sleep ends at once, as if its time were up.
+    impatient: AtomicBool,
+    /// What the ringers have published, each one sample.
+    samples: AtomicU32,
+}
+
+impl Word for Modelled {
+    fn load(&self, order: Ordering) -> u32 {
+        self.word.load(order)
+    }
+
+    fn fetch_add(&self, value: u32, order: Ordering) -> u32 {
+        self.word.fetch_add(value, order)
+    }
+
+    fn fetch_and(&self, mask: u32, order: Ordering) -> u32 {
+        self.word.fetch_and(mask, order)
+    }
+
+    fn exchange(&self, current: u32, new: u32, success: Ordering, failure: Ordering) -> bool {
+        self.word
+            .compare_exchange(current, new, success, failure)
+            .is_ok()
+    }
+
+    fn sleep_while(&self, value: u32, _: Duration) -> Ended {
+        if self.impatient.swap(false, Ordering::Relaxed) {
+            return Ended::TimedOut;
+        }
+        let queue = self.queue.lock().unwrap();
+        if self.word.load(Ordering::Relaxed) == value {
+            drop(self.sleeper.wait(queue).unwrap());
+        }
+        Ended::Awake
+    }
+
+    fn wake(&self) {
+        let _queue = self.queue.lock().unwrap();
+        self.sleeper.notify_one();
+    }
+}
+
+impl Modelled {
+    fn new() -> Arc<Self> {
+        Arc::new(Self {
+            word: AtomicU32::new(0),
+            queue: Mutex::new(()),
+            sleeper: Condvar::new(),
+            impatient: AtomicBool::new(false),
+            samples: AtomicU32::new(0),
+        })
+    }
+
+    fn publish(&self) {
+        // Relaxed: it is the ring that must make it visible.
+        self.samples.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// A service's loop: wait, drain, until `wanted` samples have come.
+    fn receive(&self, sleeper: &Sleeper, wanted: u32) {
+        let mut received = 0;
+        while received < wanted {
+            if !sleeper.rung(self) {
+                sleeper.sleep(self, Duration::MAX);
+            }
+            received = self.samples.load(Ordering::Relaxed);
+        }
+    }
+}
+
+/// Two ringers with one sample each.
+fn two_ringers(modelled: &Arc<Modelled>) -> [thread::JoinHandle<()>; 2] {
+    [(); 2].map(|()| {
+        let modelled = Arc::clone(modelled);
+        thread::spawn(move || {
+            modelled.publish();
+            word::ring(&*modelled);
+        })
+    })
+}
+
+#[test]
+fn no_ring_of_two_ringers_is_lost() {
+    under_every_interleaving(|| {
+        let modelled = Modelled::new();
+        let sleeper = Sleeper::new(&*modelled);
+        let ringers = two_ringers(&modelled);
+        modelled.receive(&sleeper, 2);
+        for ringer in ringers {
+            ringer.join().unwrap();
+        }
+    });
+}
+
+#[test]
+fn a_ringer_that_rings_again_and_again_is_heard_each_time() {
+    under_every_interleaving(|| {
+        let modelled = Modelled::new();
+        let sleeper = Sleeper::new(&*modelled);
+        let ringer = thread::spawn({
+            let modelled = Arc::clone(&modelled);
+            move || {
+                for _ in 0..3 {
+                    modelled.publish();
+                    word::ring(&*modelled);
+                }
+            }
+        });
+        modelled.receive(&sleeper, 3);
+        ringer.join().unwrap();
+    });
+}
+
+#[test]
+fn a_sleep_that_ends_by_its_time_out_loses_nothing() {
+    under_every_interleaving(|| {
+        let modelled = Modelled::new();
+        modelled.impatient.store(true, Ordering::Relaxed);
+        let sleeper = Sleeper::new(&*modelled);
+        let ringers = two_ringers(&modelled);
+        modelled.receive(&sleeper, 2);
+        for ringer in ringers {
+            ringer.join().unwrap();
+        }
+    });
+}
+
+#[test]
+fn a_ringer_killed_before_its_wake_does_not_silence_the_next() {
+    under_every_interleaving(|| {
+        let modelled = Modelled::new();
+        let sleeper = Sleeper::new(&*modelled);
+        let killed = thread::spawn({
+            let modelled = Arc::clone(&modelled);
+            move || {
+                word::count(&*modelled);
+            }
+        });
+        let next = thread::spawn({
+            let modelled = Arc::clone(&modelled);
+            move || {
+                modelled.publish();
+                word::ring(&*modelled);
+            }
+        });
+        modelled.receive(&sleeper, 1);
+        killed.join().unwrap();
+        next.join().unwrap();
+    });
+}
+
+#[test]
+fn a_waiter_killed_asleep_leaves_a_word_its_successor_can_use() {
+    under_every_interleaving(|| {
+        let modelled = Modelled::new();
+        modelled.word.store(6 | word::SLEEPING, Ordering::Relaxed);
+        let ringers = two_ringers(&modelled);
+        let sleeper = Sleeper::new(&*modelled);
+        // What was published before it came it finds by itself.
+        if modelled.samples.load(Ordering::Relaxed) < 2 {
+            modelled.receive(&sleeper, 2);
+        }
+        for ringer in ringers {
+            ringer.join().unwrap();
+        }
+    });
+}

@@ -1,0 +1,352 @@
+//! The file behind a bell board: made by the first process that needs it, removed by the last.
+//!
+//! ```text
+//!     lock on byte   held
+//!     0  door        exclusively, for the moments of joining, leaving and taking a seat
+//!     1  presence    shared, by everybody who has the board open
+//!     2+n  seat n    exclusively, by the bus whose waiter sits there
+//! ```
+//!
+//! The kernel drops all of them when a process dies, so what a killed one has left is known by a
+//! lock that can be had: its seats are cleared by whoever sweeps or needs one, and a board without
+//! presence is removed. Joining and leaving exclude each other by the door, so of two that leave at
+//! once the second knows that it is the last, and nobody joins a board that is being removed.
+//!
+//! The file lies in `/dev/shm` beside the transport's and begins with the bus's prefix. Its name
+//! holds the bus's root as a number, since the transport keeps buses with different roots apart.
+
+#![allow(unsafe_code, reason = "a mapping is shared memory")]
+
+use core::ops::Deref;
+use core::ptr::NonNull;
+use core::time::Duration;
+use std::fs::{File, OpenOptions};
+use std::io::{Error, ErrorKind};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use iceoryx2::config::Config;
+use lager_topics::Role;
+use rustix::fs::{FallocateFlags, fallocate};
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+use rustix::thread::{MembarrierCommand, membarrier};
+
+use super::board::{Board, Layout, SEATS, SEATS_PER_ROLE};
+use super::locks::{Kind, is_held, try_lock, unlock};
+use crate::name::RobotName;
+
+const FOLDER: &str = "/dev/shm";
+const SUFFIX: &str = ".bells";
+
+const DOOR: u64 = 0;
+const PRESENCE: u64 = 1;
+const FIRST_SEAT: u64 = 2;
+
+/// Longer than anybody keeps the door, which is microseconds; a stopped process may.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Why a board cannot be used.
+#[derive(Debug)]
+pub(crate) enum Fault {
+    /// Running processes of another build have one of another layout.
+    OtherLayout,
+    /// The door stays locked.
+    Busy,
+    /// No seat of this role is left.
+    NoSeat,
+    File(Error),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::File(error)
+    }
+}
+
+/// Where the board of a robot lies.
+pub(crate) fn path(config: &Config, robot: &RobotName) -> PathBuf {
+    let (head, tail) = ends(config);
+    Path::new(FOLDER).join(format!("{head}{robot}{tail}"))
+}
+
+/// The boards of all robots on a bus.
+pub(crate) fn all(config: &Config) -> Vec<PathBuf> {
+    let (head, tail) = ends(config);
+    let Ok(entries) = std::fs::read_dir(FOLDER) else {
+        return Vec::new();
+    };
+    entries
+        .filter_map(Result::ok)
+        .filter(|entry| {
+            let name = entry.file_name();
+            name.to_str()
+                .is_some_and(|name| name.starts_with(&head) && name.ends_with(&tail))
+        })
+        .map(|entry| entry.path())
+        .collect()
+}
+
+/// What stands before and behind the robot in the file's name.
+fn ends(config: &Config) -> (String, String) {
+    let root = config.global.root_path().to_string();
+    // FNV-1a.
+    let hash = root.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    });
+    (
+        format!("{}lager_", config.global.prefix),
+        format!("_{hash:016x}{SUFFIX}"),
+    )
+}
+
+/// An open board. The last one dropped removes the file.
+pub(crate) struct Segment {
+    file: File,
+    path: PathBuf,
+    board: Mapping,
+    /// The seats whose locks this holds, as bits: asking the kernel for them would only say yes.
+    own: Mutex<u32>,
+}
+
+impl Deref for Segment {
+    type Target = Board;
+
+    #[inline]
+    fn deref(&self) -> &Board {
+        &self.board
+    }
+}
+
+impl Segment {
+    /// Opens the board, or makes it.
+    pub(crate) fn join(path: &Path) -> Result<Self, Fault> {
+        loop {
+            if let Some(segment) = Self::attempt(path, true)? {
+                return Ok(segment);
+            }
+        }
+    }
+
+    /// Opens the board if there is one.
+    pub(crate) fn existing(path: &Path) -> Result<Option<Self>, Fault> {
+        match Self::attempt(path, false) {
+            Err(Fault::File(error)) if error.kind() == ErrorKind::NotFound => Ok(None),
+            other => other,
+        }
+    }
+
+    /// `None` if it was removed in the middle.
+    fn attempt(path: &Path, create: bool) -> Result<Option<Self>, Fault> {
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(create)
+            .mode(0o600)
+            .open(path)?;
+        let door = Door::lock(&file)?;
+        let state = file.metadata()?;
+        if state.nlink() == 0 {
+            return Ok(None);
+        }
+        let size = size_of::<Board>() as u64;
+        if state.len() == 0 {
+            // Backed by memory now, so that a full /dev/shm is an error here and no fault later.
+            if let Err(error) = fallocate(&file, FallocateFlags::empty(), 0, size) {
+                // Nobody uses a file without contents.
+                let _ = std::fs::remove_file(path);
+                return Err(Fault::File(error.into()));
+            }
+        } else if state.len() != size {
+            return Self::replace_foreign(&file, path);
+        }
+        let board = Mapping::of(&file)?;
+        match board.layout() {
+            // Whoever makes it signs it before the door opens.
+            Layout::Blank => board.sign(),
+            Layout::Ours => (),
+            Layout::Other => return Self::replace_foreign(&file, path),
+        }
+        if !try_lock(&file, PRESENCE, Kind::Shared)? {
+            // Only who leaves wants it for itself, and that is behind the door.
+            return Err(Fault::Busy);
+        }
+        drop(door);
+        // So that `take_seat` can make this process's ringers see a new seat at once.
+        let _ = membarrier(MembarrierCommand::RegisterGlobalExpedited);
+        Ok(Some(Self {
+            file,
+            path: path.to_owned(),
+            board,
+            own: Mutex::new(0),
+        }))
+    }
+
+    /// Removes the board of another build that nobody uses any more.
+    fn replace_foreign(file: &File, path: &Path) -> Result<Option<Self>, Fault> {
+        if !try_lock(file, PRESENCE, Kind::Exclusive)? {
+            return Err(Fault::OtherLayout);
+        }
+        let removed = std::fs::remove_file(path);
+        unlock(file, PRESENCE);
+        removed?;
+        Ok(None)
+    }
+
+    /// Takes a seat for a waiter of `role`.
+    pub(crate) fn take_seat(&self, role: Role) -> Result<usize, Fault> {
+        // The door makes counting and taking one step.
+        let _door = Door::lock(&self.file)?;
+        let mut own = self.own();
+        self.sweep_but(*own)?;
+        if self.seats_of(role).count_ones() as usize >= SEATS_PER_ROLE {
+            return Err(Fault::NoSeat);
+        }
+        for seat in 0..SEATS {
+            if *own & (1 << seat) == 0 && try_lock(&self.file, byte(seat), Kind::Exclusive)? {
+                *own |= 1 << seat;
+                self.take(seat, role, std::process::id());
+                // A ringer that has just found nobody to ring has sent its sample before: after
+                // this, whoever looks sees it. Older kernels leave that to the time-out.
+                let _ = membarrier(MembarrierCommand::GlobalExpedited);
+                return Ok(seat);
+            }
+        }
+        Err(Fault::NoSeat)
+    }
+
+    /// Gives a seat of this segment back.
+    pub(crate) fn leave_seat(&self, seat: usize) {
+        let mut own = self.own();
+        self.clear(seat);
+        *own &= !(1 << seat);
+        unlock(&self.file, byte(seat));
+    }
+
+    /// Clears the seats of killed processes.
+    pub(crate) fn sweep(&self) -> Result<(), Fault> {
+        self.sweep_but(*self.own())
+    }
+
+    fn sweep_but(&self, own: u32) -> Result<(), Fault> {
+        let taken = self.taken() & !own;
+        for seat in (0..SEATS).filter(|seat| taken & (1 << seat) != 0) {
+            if try_lock(&self.file, byte(seat), Kind::Exclusive)? {
+                self.clear(seat);
+                unlock(&self.file, byte(seat));
+            }
+        }
+        Ok(())
+    }
+
+    /// The living processes whose waiters are rung for `role`.
+    pub(crate) fn woken(&self, role: Role) -> Vec<u32> {
+        let own = *self.own();
+        let seats = self.seats_of(role);
+        (0..SEATS)
+            .filter(|seat| seats & (1 << seat) != 0)
+            .filter(|seat| {
+                own & (1 << seat) != 0 || is_held(&self.file, byte(*seat)).unwrap_or(false)
+            })
+            .map(|seat| self.pid(seat))
+            .collect()
+    }
+
+    fn own(&self) -> MutexGuard<'_, u32> {
+        // What it guards is one number, which is right at every moment.
+        self.own.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Segment {
+    fn drop(&mut self) {
+        // Without the door, or killed on the way, the next sweep removes the file.
+        if let Ok(door) = Door::lock(&self.file) {
+            if try_lock(&self.file, PRESENCE, Kind::Exclusive).unwrap_or(false)
+                && self.file.metadata().is_ok_and(|file| file.nlink() > 0)
+            {
+                let _ = std::fs::remove_file(&self.path);
+            }
+            unlock(&self.file, PRESENCE);
+            drop(door);
+        }
+        unlock(&self.file, PRESENCE);
+    }
+}
+
+fn byte(seat: usize) -> u64 {
+    FIRST_SEAT + seat as u64
+}
+
+/// A board in this process's memory.
+struct Mapping {
+    board: NonNull<Board>,
+}
+
+// SAFETY: a board consists of atomics, and it stays mapped until the drop, in whatever thread.
+unsafe impl Send for Mapping {}
+// SAFETY: as above.
+unsafe impl Sync for Mapping {}
+
+impl Mapping {
+    fn of(file: &File) -> Result<Self, Error> {
+        // SAFETY: a fresh mapping at an address of the kernel's choice; the file has the board's
+        // size and nobody ever makes it smaller.
+        let place = unsafe {
+            mmap(
+                core::ptr::null_mut(),
+                size_of::<Board>(),
+                ProtFlags::READ | ProtFlags::WRITE,
+                MapFlags::SHARED | MapFlags::POPULATE,
+                file,
+                0,
+            )?
+        };
+        Ok(Self {
+            board: NonNull::new(place.cast()).expect("the kernel maps nothing at 0 unasked"),
+        })
+    }
+}
+
+impl Deref for Mapping {
+    type Target = Board;
+
+    #[inline]
+    fn deref(&self) -> &Board {
+        // SAFETY: mapped with the size of a `Board` until the drop, page-aligned, and valid for
+        // every bit pattern; it is only ever referred to as shared, and written through atomics.
+        unsafe { self.board.as_ref() }
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        // SAFETY: mapped by `of` with this size, and nobody can refer to it any more.
+        let _ = unsafe { munmap(self.board.as_ptr().cast(), size_of::<Board>()) };
+    }
+}
+
+/// The lock that makes joining, leaving and taking a seat one step each.
+struct Door<'file> {
+    file: &'file File,
+}
+
+impl<'file> Door<'file> {
+    fn lock(file: &'file File) -> Result<Self, Fault> {
+        let start = Instant::now();
+        while !try_lock(file, DOOR, Kind::Exclusive)? {
+            if start.elapsed() > PATIENCE {
+                return Err(Fault::Busy);
+            }
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        Ok(Self { file })
+    }
+}
+
+impl Drop for Door<'_> {
+    fn drop(&mut self) {
+        unlock(self.file, DOOR);
+    }
+}

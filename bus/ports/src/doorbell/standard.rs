@@ -1,0 +1,51 @@
+//! Listeners of plain iceoryx2, for programs that know nothing of bell boards.
+//!
+//! Beside each topic stands an event service of the same name. A stock process that listens there
+//! is notified of every sample, at the price of a system call each; as long as nobody does, a
+//! writer only reads a counter in shared memory.
+
+use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
+use iceoryx2::prelude::PortFactory;
+use lager_topics::Topic;
+
+use crate::bus::Bus;
+use crate::error::PortError;
+use crate::service::{self, EventService, Fault, patiently};
+use crate::transport::Ipc;
+
+/// The standard listeners of one topic, from a writer's side.
+pub(crate) struct StandardListeners {
+    service: EventService,
+    notifier: Notifier<Ipc>,
+}
+
+impl StandardListeners {
+    pub(crate) fn of<T: Topic>(bus: &Bus) -> Result<Self, PortError> {
+        let service = service::event::<T>(bus)?;
+        let notifier = patiently(bus, T::NAME, || {
+            service
+                .notifier_builder()
+                .name(bus.port_name())
+                .create()
+                .map_err(|error| match error {
+                    NotifierCreateError::ExceedsMaxSupportedNotifiers => {
+                        Fault::Full(PortError::TooManyWriters {
+                            topic: T::NAME.to_owned(),
+                            limit: T::QOS.max_publishers(),
+                        })
+                    }
+                    other => service::no_resources(T::NAME, other),
+                })
+        })?;
+        Ok(Self { service, notifier })
+    }
+
+    /// Notifies them, if there are any.
+    #[inline]
+    pub(crate) fn notify(&self) {
+        if self.service.dynamic_config().number_of_listeners() > 0 {
+            // One that has died or is full needs no notice.
+            let _ = self.notifier.notify();
+        }
+    }
+}

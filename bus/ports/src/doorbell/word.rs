@@ -1,0 +1,102 @@
+//! The word a waiter sleeps on, and how it is rung: the protocol, without any machine.
+//!
+//! ```text
+//!      31                                1   0
+//!     ┌──────────────────────────────────┬───┐   ring:   old = word += 2
+//!     │ rings so far, wrapping           │ S │           if old has S: wake one sleeper
+//!     └──────────────────────────────────┴───┘   sleep:  word: seen -> seen|S, or it has rung
+//!                                   sleeping             wait while word == seen|S
+//!                                                        clear S; seen = word
+//! ```
+//!
+//! One waiter, any number of ringers. A ring and the decision to sleep are read-modify-writes of
+//! the same word, so one of the two comes first: either the waiter finds the ring and does not
+//! sleep, or the ringer finds `S` and wakes. Only the waiter clears `S`: a ringer that is killed
+//! between its addition and its wake leaves `S` standing, and the next one wakes.
+//!
+//! Apart and generic, so that `model.rs` can run this very source under every interleaving.
+//!
+//! **Invariant:** `S` is set only by the one waiter of the word and only while it is in
+//! [`Sleeper::sleep`]. A waiter that does not look for 2^31 rings may miss them all.
+
+use core::cell::Cell;
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+
+/// The word's lowest bit: the waiter sleeps, or is about to.
+pub(crate) const SLEEPING: u32 = 1;
+
+/// One ring.
+const ONE: u32 = 2;
+
+/// Why a sleep ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ended {
+    /// Woken, interrupted by a signal, or never asleep because the word had changed.
+    Awake,
+    /// Nobody woke it in time.
+    TimedOut,
+}
+
+/// What the protocol asks of the machine: an atomic word, and sleeping on it as a futex does.
+pub(crate) trait Word {
+    fn load(&self, order: Ordering) -> u32;
+    fn fetch_add(&self, value: u32, order: Ordering) -> u32;
+    fn fetch_and(&self, mask: u32, order: Ordering) -> u32;
+    /// Whether the word was `current` and is `new` now.
+    fn exchange(&self, current: u32, new: u32, success: Ordering, failure: Ordering) -> bool;
+    /// Sleeps if the word is still `value`, compared and put to sleep in one step.
+    fn sleep_while(&self, value: u32, timeout: Duration) -> Ended;
+    /// Wakes the sleeper, if there is one.
+    fn wake(&self);
+}
+
+/// Rings: what was written before is seen by the waiter when it has noticed the ring.
+pub(crate) fn ring(word: &impl Word) {
+    if count(word) {
+        word.wake();
+    }
+}
+
+/// The first half of a ring; says whether the second is needed.
+pub(crate) fn count(word: &impl Word) -> bool {
+    word.fetch_add(ONE, Ordering::Release) & SLEEPING != 0
+}
+
+/// The waiter's side of a word.
+pub(crate) struct Sleeper {
+    /// The word without [`SLEEPING`] when it was last looked at.
+    seen: Cell<u32>,
+}
+
+impl Sleeper {
+    /// Begins to wait on a word nobody else waits on; earlier rings do not count.
+    pub(crate) fn new(word: &impl Word) -> Self {
+        // One that was killed asleep has left its mark.
+        let old = word.fetch_and(!SLEEPING, Ordering::Acquire);
+        Self {
+            seen: Cell::new(old & !SLEEPING),
+        }
+    }
+
+    /// Whether it has rung since it was last asked. Neither writes nor waits.
+    #[inline]
+    pub(crate) fn rung(&self, word: &impl Word) -> bool {
+        let now = word.load(Ordering::Acquire);
+        now != self.seen.replace(now)
+    }
+
+    /// Sleeps until a ring, at most `timeout`; true if it was one, or a signal. A ringer whose wake
+    /// comes late, after its ring was noticed, may end a sleep as well.
+    pub(crate) fn sleep(&self, word: &impl Word, timeout: Duration) -> bool {
+        let seen = self.seen.get();
+        let asleep = seen | SLEEPING;
+        if !word.exchange(seen, asleep, Ordering::Relaxed, Ordering::Relaxed) {
+            return self.rung(word);
+        }
+        let ended = word.sleep_while(asleep, timeout);
+        let now = word.fetch_and(!SLEEPING, Ordering::Acquire) & !SLEEPING;
+        let rung = now != self.seen.replace(now);
+        rung || ended == Ended::Awake
+    }
+}

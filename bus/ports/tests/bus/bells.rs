@@ -1,0 +1,185 @@
+//! `kill -9` of ringers and waiters at random moments, and what becomes of their seats.
+
+use std::time::{Duration, Instant};
+
+use lager_ports::{Policy, Wake, remove_stale_nodes};
+use lager_topics::{Role, SensorLine};
+
+use crate::domain::{Domain, send, until};
+use crate::process::Player;
+use crate::waiting::spins_under_quick_rings;
+
+const LONG: Duration = Duration::from_secs(60);
+
+/// Rounds of killing; each starts some processes.
+const ROUNDS: u64 = 8;
+
+/// A moment that differs from round to round and from run to run.
+fn somewhere(round: u64) {
+    let now = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap();
+    std::thread::sleep(Duration::from_micros(
+        (u64::from(now.subsec_nanos()) ^ (round * 7919)) % 3000,
+    ));
+}
+
+fn bells(domain: &Domain) -> usize {
+    let left = domain.in_shared_memory();
+    left.iter().filter(|name| name.ends_with(".bells")).count()
+}
+
+#[test]
+fn a_ringer_killed_anywhere_leaves_a_bell_that_others_can_ring() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    for round in 0..ROUNDS {
+        let flood = Player::start(&domain, "line-flood");
+        let end = Instant::now() + Duration::from_millis(2);
+        while Instant::now() < end {
+            assert_eq!(waiter.wait(LONG), Wake::Rung);
+        }
+        somewhere(round);
+        flood.kill();
+        logic.sweep();
+        // Until what the killed one had rung is used up.
+        while waiter.wait(Duration::from_millis(1)) == Wake::Rung {}
+        std::thread::scope(|scope| {
+            let sleeper = scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(3));
+                bridge
+                    .publisher::<SensorLine>()
+                    .map(|publisher| send(&publisher, 1))
+            });
+            assert_eq!(waiter.wait(LONG), Wake::Rung, "round {round}");
+            sleeper.join().unwrap().unwrap();
+        });
+        send(&publisher, 2);
+        assert_eq!(waiter.wait(LONG), Wake::Rung, "round {round}");
+    }
+}
+
+#[test]
+fn waiters_killed_anywhere_give_their_seats_to_their_successors() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    let logic = domain.open(Role::Logic);
+    let witness = logic.waiter(Policy::Block).unwrap();
+    for round in 0..ROUNDS {
+        let parts = ["navigator-hurries", "navigator-waits"];
+        let victims = parts.map(|part| Player::start(&domain, part));
+        let end = Instant::now() + Duration::from_millis(1);
+        while Instant::now() < end {
+            send(&publisher, 0);
+        }
+        somewhere(round);
+        victims.into_iter().for_each(Player::kill);
+        // Nobody sweeps: every place of the role must be had all the same.
+        let successors: Vec<_> = (0..7)
+            .map(|_| logic.waiter(Policy::Block).unwrap())
+            .collect();
+        send(&publisher, 1);
+        for waiter in successors.iter().chain([&witness]) {
+            assert_eq!(waiter.wait(LONG), Wake::Rung, "round {round}");
+        }
+    }
+}
+
+#[test]
+fn a_killed_spinner_gives_its_right_back() {
+    let domain = Domain::new();
+    let bridge = domain.open(Role::Bridge);
+    // As many as may spin at a time; none is left to this one unless they give it back.
+    let cores = std::thread::available_parallelism().unwrap().get();
+    for _ in 1..cores.min(8) {
+        Player::start(&domain, "navigator-spins").kill();
+    }
+    bridge.sweep();
+    if cores > 1 {
+        spins_under_quick_rings(&bridge);
+    }
+}
+
+#[test]
+fn of_killed_processes_alone_nothing_is_left() {
+    let domain = Domain::new();
+    for round in 0..ROUNDS {
+        let parts = ["navigator-hurries", "line-flood", "navigator-waits"];
+        let victims = parts.map(|part| Player::start(&domain, part));
+        somewhere(round);
+        victims.into_iter().for_each(Player::kill);
+        assert_eq!(bells(&domain), 1, "they had a board");
+        until("all of it is swept", || {
+            if round % 2 == 0 {
+                remove_stale_nodes(&domain.config).unwrap();
+            } else {
+                domain.open(Role::Supervisor);
+            }
+            domain.in_shared_memory().is_empty()
+        });
+    }
+}
+
+#[test]
+fn the_last_to_leave_takes_the_board_away() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let bridge = domain.open(Role::Bridge);
+    assert_eq!(bells(&domain), 0, "nobody needs one yet");
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    let publisher = bridge.publisher::<SensorLine>().unwrap();
+    assert_eq!(bells(&domain), 1);
+    drop(waiter);
+    assert_eq!(bells(&domain), 1, "the writer may ring others");
+    drop(publisher);
+    assert_eq!(bells(&domain), 0);
+}
+
+#[test]
+fn boards_are_joined_and_left_by_many_at_once() {
+    let domain = Domain::new();
+    let buses: Vec<_> = (0..4).map(|_| domain.open(Role::Logic)).collect();
+    std::thread::scope(|scope| {
+        for bus in &buses {
+            scope.spawn(move || {
+                for _ in 0..200 {
+                    let waiter = bus.waiter(Policy::Block).unwrap();
+                    waiter.ringer().unwrap().ring();
+                    assert_eq!(waiter.wait(LONG), Wake::Rung);
+                }
+            });
+        }
+    });
+    assert_eq!(bells(&domain), 0);
+}
+
+#[test]
+fn robots_and_roots_have_boards_of_their_own() {
+    let domain = Domain::new();
+    let elsewhere = Domain::at(
+        domain.config.prefix.as_deref().unwrap(),
+        domain.config.root.as_ref().unwrap().with_extension("b"),
+    );
+    let writer = domain.open_robot("r1", Role::Bridge);
+    let publisher = writer.publisher::<SensorLine>().unwrap();
+    let ours = domain.open_robot("r1", Role::Logic);
+    let waiters = [
+        ours.waiter(Policy::Block).unwrap(),
+        domain
+            .open_robot("r2", Role::Logic)
+            .waiter(Policy::Block)
+            .unwrap(),
+        elsewhere
+            .open_robot("r1", Role::Logic)
+            .waiter(Policy::Block)
+            .unwrap(),
+    ];
+    assert_eq!(bells(&domain), 3);
+    send(&publisher, 0);
+    let rung = waiters
+        .each_ref()
+        .map(|waiter| waiter.wait(Duration::from_millis(2)));
+    assert_eq!(rung, [Wake::Rung, Wake::TimedOut, Wake::TimedOut]);
+}

@@ -1,0 +1,84 @@
+//! `memcpy`, `memmove` and `memset`, which the compiler calls for.
+//!
+//! Those of its own library take 1.2 kB of flash and 10 cycles a byte, because they are written for wide
+//! machines. These are loops of four instructions, 8 cycles a byte for a copy.
+
+use core::arch::asm;
+
+/// Copies `length` bytes upwards.
+///
+/// # Safety
+/// As C's `memcpy`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
+    if length > 0 {
+        // SAFETY: by the caller's promise both areas hold `length` bytes.
+        unsafe {
+            asm!(
+                "2:",
+                "ld {byte}, Z+",
+                "st X+, {byte}",
+                "sbiw {left}, 1",
+                "brne 2b",
+                byte = out(reg) _,
+                left = inout(reg_iw) length => _,
+                inout("Z") from => _,
+                inout("X") to => _,
+            );
+        }
+    }
+    to
+}
+
+/// Copies `length` bytes between areas that may overlap.
+///
+/// # Safety
+/// As C's `memmove`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn memmove(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
+    if (to as usize) <= from as usize {
+        // SAFETY: a copy upwards never overwrites what it still has to read.
+        return unsafe { memcpy(to, from, length) };
+    }
+    if length > 0 {
+        // SAFETY: by the caller's promise both areas hold `length` bytes; a copy downwards never overwrites
+        // what it still has to read.
+        unsafe {
+            asm!(
+                "2:",
+                "ld {byte}, -Z",
+                "st -X, {byte}",
+                "sbiw {left}, 1",
+                "brne 2b",
+                byte = out(reg) _,
+                left = inout(reg_iw) length => _,
+                inout("Z") from.wrapping_add(length) => _,
+                inout("X") to.wrapping_add(length) => _,
+            );
+        }
+    }
+    to
+}
+
+/// Sets `length` bytes.
+///
+/// # Safety
+/// As C's `memset`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn memset(to: *mut u8, value: i16, length: usize) -> *mut u8 {
+    if length > 0 {
+        // SAFETY: by the caller's promise the area holds `length` bytes.
+        unsafe {
+            asm!(
+                "2:",
+                "st X+, {byte}",
+                "sbiw {left}, 1",
+                "brne 2b",
+                byte = in(reg) value as u8,
+                left = inout(reg_iw) length => _,
+                inout("X") to => _,
+            );
+        }
+    }
+    to
+}

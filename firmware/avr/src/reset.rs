@@ -1,0 +1,97 @@
+//! Why the board started, the watchdog, and the way into a reset.
+//!
+//! ```text
+//!   running --64 ms without a kick--> watchdog interrupt: board made safe --16 ms--> reset
+//!   panic   --------------------------> board made safe, mark in RAM      --16 ms--> reset
+//! ```
+//!
+//! The board's program gives the interrupt and the panic handler their way to make it safe.
+
+use avr_device::asm::{nop, wdr};
+use avr_device::interrupt;
+use core::arch::asm;
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+use lager_wire::ResetCause;
+
+use crate::register::{cpu, get, put};
+
+/// What a panic leaves in RAM for the program that starts after it.
+const PANIC_MARK: u16 = 0x9A1C;
+
+const WDCE_WDE: u8 = 0b0001_1000;
+/// Interrupt and reset, 64 ms. Where interrupts are off the interrupt cannot come and the second time-out resets
+/// the chip: after 128 ms, or 142 ms of a watchdog whose oscillator is 10 % slow; with 125 ms it would be more
+/// than the 200 ms within which the motors must be off.
+const BITE_AFTER_64_MS: u8 = 0b0100_1010;
+/// Reset alone, 16 ms.
+const RESET_AFTER_16_MS: u8 = 0b0000_1000;
+/// Address of WDTCSR.
+const WDTCSR: u16 = 0x60;
+
+struct Mark(UnsafeCell<MaybeUninit<u16>>);
+
+// SAFETY: it is written with interrupts off, before a reset and once after it.
+unsafe impl Sync for Mark {}
+
+/// RAM outlives a reset, and the start-up code leaves this section alone.
+// SAFETY: the section holds nothing else and the cell's content may be anything.
+#[unsafe(link_section = ".noinit")]
+static MARK: Mark = Mark(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// Starts the watchdog and tells why the board started. Called first, with interrupts off.
+pub fn start() -> ResetCause {
+    let flags = get(cpu().mcusr());
+    // As long as the watchdog's flag is set the watchdog cannot be changed.
+    put(cpu().mcusr(), 0);
+    set_watchdog(BITE_AFTER_64_MS);
+    // SAFETY: the cell is this program's alone; whatever RAM holds after power-on is a number.
+    let panicked = unsafe { MARK.0.get().cast::<u16>().read_volatile() } == PANIC_MARK;
+    mark(0);
+    lager_control::reset_cause(flags, panicked)
+}
+
+/// Tells the watchdog that the main loop is alive.
+#[inline(always)]
+pub fn kick_watchdog() {
+    wdr();
+}
+
+/// Resets the board, which has been made safe, because its main loop hung.
+pub fn after_hang() -> ! {
+    reset()
+}
+
+/// Resets the board, which has been made safe, because its program met what it does not allow.
+pub fn after_panic() -> ! {
+    mark(PANIC_MARK);
+    reset()
+}
+
+fn reset() -> ! {
+    interrupt::disable();
+    set_watchdog(RESET_AFTER_16_MS);
+    loop {
+        nop();
+    }
+}
+
+fn mark(value: u16) {
+    // SAFETY: interrupts are off, here and at every other use.
+    unsafe { MARK.0.get().cast::<u16>().write_volatile(value) };
+}
+
+/// The timed sequence: the new value within four cycles after WDCE. Interrupts are off.
+fn set_watchdog(value: u8) {
+    wdr();
+    // SAFETY: two writes to the watchdog's register, which memory safety does not depend on.
+    unsafe {
+        asm!(
+            "sts {register}, {enable}",
+            "sts {register}, {value}",
+            register = const WDTCSR,
+            enable = in(reg) WDCE_WDE,
+            value = in(reg) value,
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! The ADC: eleven line sensors one after the other through one input, and the IR ranger (S5, S8).
+//!
+//! ```text
+//!   sensor n   |-- sample --|------- convert, 13 us -------|-- sample n + 1 --| ...
+//!   multiplexer              \ n + 1 settles meanwhile ----/
+//!   program                                                 | judges n while n + 1 is converted
+//! ```
+//!
+//! The clock of 1 MHz is above what the data sheet promises ten bits at; eight of the line sensors' bits
+//! hold, and the IR ranger's own noise is larger than the two that do not.
+
+use avr_device::asm::delay_cycles;
+use lager_avr::register::{adc, bit, get, put, set};
+
+use crate::pins;
+
+const ADEN: u8 = bit(7);
+const ADSC: u8 = bit(6);
+/// clk/16 = 1 MHz.
+const PRESCALER_16: u8 = 0b100;
+/// Reference AVCC.
+const AVCC: u8 = bit(6);
+/// The upper eight bits in one register.
+const LEFT_ADJUST: u8 = bit(5);
+
+const LINE: u8 = AVCC | LEFT_ADJUST | pins::LINE_INPUT;
+const IR: u8 = AVCC | pins::IR_INPUT;
+/// Number of line sensors.
+const CHANNELS: u8 = 11;
+/// A conversion's sample is held after a clock of the converter to start and one and a half to sample.
+const SAMPLING_CYCLES: u32 = 42;
+
+/// Switches the ADC on, with the first line sensor selected.
+pub(crate) fn start() {
+    let adc = adc();
+    put(adc.didr0(), bit(pins::LINE_INPUT) | bit(pins::IR_INPUT));
+    put(adc.admux(), LINE);
+    put(adc.adcsra(), ADEN | PRESCALER_16);
+    pins::select_line_sensor(0);
+    // The first conversion sets the converter up and takes 25 clocks.
+    convert();
+}
+
+/// Reads a line sensor. They are read in order: with the first one the chain of conversions begins, and each
+/// reading starts the next one, which runs while this one is judged.
+pub(crate) fn read_line_sensor(channel: u8) -> u8 {
+    if channel == 0 {
+        begin(0);
+    }
+    wait();
+    let reading = (get(adc().adc()) >> 8) as u8;
+    let next = channel + 1;
+    if next < CHANNELS {
+        begin(next);
+    }
+    reading
+}
+
+/// Starts to convert the sensor that is selected, and selects the one after it as soon as it is sampled.
+fn begin(channel: u8) {
+    set(adc().adcsra(), ADSC);
+    delay_cycles(SAMPLING_CYCLES);
+    let next = channel + 1;
+    pins::select_line_sensor(if next < CHANNELS { next } else { 0 });
+}
+
+/// Reads the IR ranger.
+pub(crate) fn read_ir() -> u16 {
+    let adc = adc();
+    put(adc.admux(), IR);
+    convert();
+    let reading = get(adc.adc());
+    put(adc.admux(), LINE);
+    reading
+}
+
+fn convert() {
+    set(adc().adcsra(), ADSC);
+    wait();
+}
+
+/// Until the conversion under way is over: the converter's own time bounds it.
+fn wait() {
+    while get(adc().adcsra()) & ADSC != 0 {}
+}

@@ -1,0 +1,75 @@
+//! The sending end of ExDe: `lager_exde::Transmitter`, driven by the timer's second compare interrupt.
+//!
+//! ```text
+//!   send(word) --> first bit on data --compare B--> pulse on sync --compare B--> next bit ... --> gap
+//!   INT0: return sync
+//! ```
+
+use lager_avr::clock;
+use lager_avr::register::{external, get, put, timer1};
+use lager_avr::shared::Shared;
+use lager_exde::{Action, Step, Transmitter};
+
+use crate::pins;
+
+/// INT0 on a rising edge.
+const RISING: u8 = 0b11;
+const INT0_ON: u8 = 1;
+
+/// What an interrupt takes until it sets the next one: it would lengthen every half bit.
+const INTERRUPT_TICKS: u16 = 8;
+
+static TRANSMITTER: Shared<Transmitter> = Shared::new(Transmitter::new());
+
+/// Listens for the return sync and begins to ask for it. Interrupts are still off.
+pub(crate) fn start() {
+    put(external().eicra(), RISING);
+    put(external().eimsk(), INT0_ON);
+    TRANSMITTER.with(|transmitter| carry_out(transmitter.advance()));
+}
+
+/// Begins to send a word, if the one before has left and the steering board has answered.
+pub(crate) fn send(word: u16) -> bool {
+    TRANSMITTER.with(|transmitter| transmitter.start(word).map(carry_out).is_some())
+}
+
+/// Whether bits of a word are still to be sent.
+pub(crate) fn is_sending() -> bool {
+    TRANSMITTER.with(|transmitter| transmitter.is_sending())
+}
+
+/// Sets the wires and the timer for the next step, counted from this one.
+#[inline(always)]
+fn carry_out(step: Step) {
+    match step.action {
+        Action::Pulse => pins::set_exde_sync(true),
+        Action::Place(level) => pins::set_exde_data(level),
+        Action::Release => {
+            pins::set_exde_data(false);
+            clock::wake();
+        }
+        Action::Nothing => {}
+    }
+    match step.wait_us {
+        Some(wait_us) => {
+            let ticks = (wait_us * clock::TICKS_PER_US).saturating_sub(INTERRUPT_TICKS);
+            put(timer1().ocr1b(), get(timer1().tcnt1()).wrapping_add(ticks));
+            clock::arm_compare_b();
+        }
+        None => clock::disarm_compare_b(),
+    }
+    // Setting the timer has taken the microsecond that a pulse is long.
+    if step.action == Action::Pulse {
+        pins::set_exde_sync(false);
+    }
+}
+
+#[avr_device::interrupt(atmega1284p)]
+fn TIMER1_COMPB() {
+    TRANSMITTER.with(|transmitter| carry_out(transmitter.advance()));
+}
+
+#[avr_device::interrupt(atmega1284p)]
+fn INT0() {
+    TRANSMITTER.with(Transmitter::on_return);
+}

@@ -1,0 +1,20 @@
+//! The two ways this program ends: its main loop hangs, or it meets what it does not allow. The motors first.
+
+use avr_device::interrupt;
+use core::panic::PanicInfo;
+use lager_avr::reset;
+
+use crate::motors;
+
+#[avr_device::interrupt(atmega1284p)]
+fn WDT() {
+    motors::off();
+    reset::after_hang();
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    interrupt::disable();
+    motors::off();
+    reset::after_panic();
+}

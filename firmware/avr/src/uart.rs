@@ -1,0 +1,102 @@
+//! UART 0, the line to the Pi: both directions by interrupt, so that everything else goes on meanwhile (S4).
+//!
+//! ```text
+//!   RXC  --> RECEIVED --> read()          a byte that finds the queue full is lost; its packet's check tells
+//!   write() --> TO_SEND --> UDRE          all of a packet or nothing
+//!   TXC  --> idle                         the last stop bit has left
+//! ```
+
+use avr_device::interrupt;
+
+use crate::clock;
+use crate::register::{bit, get, put, set, usart0};
+use crate::shared::{Ring, SharedByte};
+
+const RXCIE: u8 = bit(7);
+const TXCIE: u8 = bit(6);
+const UDRIE: u8 = bit(5);
+const RXEN: u8 = bit(4);
+const TXEN: u8 = bit(3);
+const TXC: u8 = bit(6);
+const EIGHT_BITS: u8 = 0b0000_0110;
+
+/// 16 MHz / (16 * baud) - 1: exact at 500 000 Bd, 0.16 % fast at 9600.
+const UBRR: u16 = if cfg!(feature = "baud-9600") { 103 } else { 1 };
+
+/// Bytes of one direction that can wait: five packets.
+const CAPACITY: usize = 64;
+
+static RECEIVED: Ring<u8, CAPACITY> = Ring::new(0);
+static TO_SEND: Ring<u8, CAPACITY> = Ring::new(0);
+/// 1 from the first byte queued to the last stop bit.
+static SENDING: SharedByte = SharedByte::new(0);
+
+/// What is on beside the interrupt that asks for bytes.
+const ON: u8 = RXCIE | TXCIE | RXEN | TXEN;
+
+/// Starts both directions. Interrupts are still off.
+pub fn start() {
+    let uart = usart0();
+    put(uart.ubrr0(), UBRR);
+    put(uart.ucsr0a(), 0);
+    put(uart.ucsr0c(), EIGHT_BITS);
+    put(uart.ucsr0b(), ON);
+}
+
+/// The oldest byte received and not yet read.
+#[inline(never)]
+pub fn read() -> Option<u8> {
+    RECEIVED.pop()
+}
+
+/// Queues bytes, all of them or none; whether they were queued.
+#[inline(never)]
+pub fn write(bytes: &[u8]) -> bool {
+    // The interrupt only takes bytes out, so the room found stays.
+    if bytes.len() > usize::from(TO_SEND.room()) {
+        return false;
+    }
+    for byte in bytes {
+        TO_SEND.push(*byte);
+    }
+    SENDING.set(1);
+    interrupt::free(|_| set(usart0().ucsr0b(), UDRIE));
+    true
+}
+
+/// Whether everything queued has left to its last stop bit.
+pub fn is_idle() -> bool {
+    SENDING.get() == 0
+}
+
+/// Private, as the vectors alone may call them.
+mod handlers {
+    use super::*;
+
+    #[avr_device::interrupt(atmega1284p)]
+    fn USART0_RX() {
+        RECEIVED.push(get(usart0().udr0()));
+        clock::wake();
+    }
+
+    #[avr_device::interrupt(atmega1284p)]
+    fn USART0_UDRE() {
+        let uart = usart0();
+        if let Some(byte) = TO_SEND.pop() {
+            put(uart.udr0(), byte);
+            // A late byte may have let the transmitter run empty: the mark of the end is not this one's.
+            put(uart.ucsr0a(), TXC);
+        }
+        if TO_SEND.is_empty() {
+            put(uart.ucsr0b(), ON);
+        }
+    }
+
+    #[avr_device::interrupt(atmega1284p)]
+    fn USART0_TX() {
+        if TO_SEND.is_empty() {
+            SENDING.set(0);
+            clock::wake();
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! Settings that outlive the power: two copies in EEPROM, each with a check value.
+//!
+//! ```text
+//!   address   0        1         2 .. 2+N    2+N          the second copy the same, from 32 on
+//!             layout   counter   settings    CRC-8 over everything before it
+//!
+//!   save: layout = 255 --> counter, settings, CRC --> layout      into the older copy
+//! ```
+//!
+//! A copy counts when its layout and its check value are right; of two, the one with the later counter. The
+//! layout byte goes first and comes last, so a save that is cut off leaves the other copy in force. A byte
+//! takes the chip some milliseconds: every step hands over at most one, and nothing waits.
+
+use lager_wire::checksum;
+
+use crate::Board;
+
+/// The layout of the settings; a program with another one takes its own defaults.
+const LAYOUT: u8 = 1;
+/// What an erased EEPROM holds.
+const ERASED: u8 = 0xFF;
+/// Where the second copy begins.
+const SECOND: u8 = 32;
+/// The longest settings: a copy with layout, counter and check value fits half the EEPROM.
+const LONGEST: usize = 11;
+/// A copy of the longest settings.
+const COPY: usize = LONGEST + 3;
+
+/// A save under way: the copy's bytes, and the one to be written next.
+#[derive(Debug, Clone)]
+struct Save {
+    copy: [u8; COPY],
+    next: u8,
+}
+
+/// The settings in EEPROM, `N` bytes.
+#[derive(Debug, Clone)]
+pub(crate) struct Store<const N: usize> {
+    /// What is in force there, or will be when the save is done.
+    kept: Option<[u8; N]>,
+    counter: u8,
+    /// Where the next save goes.
+    slot: u8,
+    save: Option<Save>,
+}
+
+impl<const N: usize> Store<N> {
+    /// The settings found, if there are any.
+    pub(crate) fn load(board: &impl Board) -> (Self, Option<[u8; N]>) {
+        const { assert!(N <= LONGEST) };
+        let first = read(board, 0);
+        let second = read(board, SECOND);
+        let second_wins = match (&first, &second) {
+            (Some((first, _)), Some((second, _))) => second.wrapping_sub(*first) < 128,
+            (None, Some(_)) => true,
+            (_, None) => false,
+        };
+        let newest = if second_wins { second } else { first };
+        let kept = newest.map(|(_, settings)| settings);
+        let store = Self {
+            kept,
+            counter: newest.map_or(0, |(counter, _)| counter),
+            slot: if second_wins || newest.is_none() {
+                0
+            } else {
+                SECOND
+            },
+            save: None,
+        };
+        (store, kept)
+    }
+
+    /// Begins to save; settings that are kept already are not written again.
+    pub(crate) fn save(&mut self, settings: [u8; N]) {
+        if self.kept == Some(settings) {
+            return;
+        }
+        if self.save.is_none() {
+            self.counter = self.counter.wrapping_add(1);
+        }
+        let mut copy = [0; COPY];
+        copy[0] = LAYOUT;
+        copy[1] = self.counter;
+        copy[2..2 + N].copy_from_slice(&settings);
+        copy[2 + N] = checksum(&copy[..2 + N]);
+        self.kept = Some(settings);
+        self.save = Some(Save { copy, next: 0 });
+    }
+
+    /// Hands over the next byte, if there is one and the EEPROM takes it.
+    pub(crate) fn poll(&mut self, board: &mut impl Board) {
+        let Some(save) = &mut self.save else { return };
+        let last = N as u8 + 3;
+        let (address, value) = match save.next {
+            0 => (0, ERASED),
+            next if next == last => (0, LAYOUT),
+            next => (next, save.copy[usize::from(next)]),
+        };
+        if !board.eeprom_write(self.slot + address, value) {
+            return;
+        }
+        save.next += 1;
+        if save.next > last {
+            self.slot = SECOND - self.slot;
+            self.save = None;
+        }
+    }
+
+    /// Whether a save is under way.
+    pub(crate) fn is_saving(&self) -> bool {
+        self.save.is_some()
+    }
+}
+
+/// The counter and the settings of the copy at `slot`, if it counts.
+fn read<const N: usize>(board: &impl Board, slot: u8) -> Option<(u8, [u8; N])> {
+    let mut copy = [0; COPY];
+    for (byte, address) in copy.iter_mut().zip(slot..).take(N + 3) {
+        *byte = board.eeprom_read(address);
+    }
+    let counts = copy[0] == LAYOUT && copy[2 + N] == checksum(&copy[..2 + N]);
+    let settings = copy[2..].first_chunk().copied()?;
+    counts.then_some((copy[1], settings))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lager_wire::ResetCause;
+
+    /// An EEPROM that takes every `slow`-th write.
+    struct Chip {
+        bytes: [u8; crate::EEPROM_LENGTH as usize],
+        slow: usize,
+        asked: usize,
+        writes: usize,
+    }
+
+    impl Chip {
+        fn erased() -> Self {
+            Self {
+                bytes: [ERASED; crate::EEPROM_LENGTH as usize],
+                slow: 1,
+                asked: 0,
+                writes: 0,
+            }
+        }
+    }
+
+    impl Board for Chip {
+        fn now_us(&self) -> u32 {
+            0
+        }
+        fn uart_read(&mut self) -> Option<u8> {
+            None
+        }
+        fn uart_write(&mut self, _: &[u8]) -> bool {
+            false
+        }
+        fn uart_idle(&self) -> bool {
+            true
+        }
+        fn reset_cause(&self) -> ResetCause {
+            ResetCause::Unknown
+        }
+        fn kick_watchdog(&mut self) {}
+        fn eeprom_read(&self, address: u8) -> u8 {
+            self.bytes[usize::from(address)]
+        }
+        fn eeprom_write(&mut self, address: u8, value: u8) -> bool {
+            self.asked += 1;
+            let takes = self.asked.is_multiple_of(self.slow);
+            if takes {
+                self.writes += 1;
+                self.bytes[usize::from(address)] = value;
+            }
+            takes
+        }
+    }
+
+    fn loaded(chip: &Chip) -> Option<[u8; 3]> {
+        Store::load(chip).1
+    }
+
+    fn finish(store: &mut Store<3>, chip: &mut Chip) {
+        while store.is_saving() {
+            store.poll(chip);
+        }
+    }
+
+    #[test]
+    fn an_erased_eeprom_holds_nothing() {
+        assert_eq!(loaded(&Chip::erased()), None);
+    }
+
+    #[test]
+    fn what_was_saved_is_loaded_however_slow_the_eeprom_is() {
+        for slow in [1, 3] {
+            let mut chip = Chip::erased();
+            chip.slow = slow;
+            for round in 0..600_u16 {
+                let settings = [round as u8, (round >> 8) as u8, 255];
+                let (mut store, _) = Store::load(&chip);
+                store.save(settings);
+                finish(&mut store, &mut chip);
+                assert_eq!(loaded(&chip), Some(settings), "round {round}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_save_cut_off_anywhere_leaves_the_one_before() {
+        for cut in 0..=7 {
+            let mut chip = Chip::erased();
+            let (mut store, _) = Store::load(&chip);
+            for settings in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
+                store.save(settings);
+                finish(&mut store, &mut chip);
+            }
+            store.save([9, 9, 9]);
+            for _ in 0..cut {
+                store.poll(&mut chip);
+            }
+            let expected = if cut < 7 { [7, 8, 9] } else { [9, 9, 9] };
+            assert_eq!(loaded(&chip), Some(expected), "cut after {cut}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_copy_gives_way_to_the_other() {
+        let mut chip = Chip::erased();
+        let (mut store, _) = Store::load(&chip);
+        for settings in [[1, 2, 3], [4, 5, 6]] {
+            store.save(settings);
+            finish(&mut store, &mut chip);
+        }
+        let whole = chip.bytes;
+        for slot in [0, SECOND] {
+            for byte in 0..6 {
+                for bit in 0..8 {
+                    chip.bytes = whole;
+                    chip.bytes[usize::from(slot + byte)] ^= 1 << bit;
+                    let other = if slot == 0 { [4, 5, 6] } else { [1, 2, 3] };
+                    assert_eq!(loaded(&chip), Some(other), "slot {slot} byte {byte}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_settings_are_not_written_again() {
+        let mut chip = Chip::erased();
+        let (mut store, _) = Store::load(&chip);
+        store.save([1, 2, 3]);
+        finish(&mut store, &mut chip);
+        let (mut store, _) = Store::load(&chip);
+        store.save([1, 2, 3]);
+        assert!(!store.is_saving());
+        assert_eq!(chip.writes, 7);
+    }
+
+    #[test]
+    fn settings_changed_during_a_save_are_saved_in_its_place() {
+        let mut chip = Chip::erased();
+        let (mut store, _) = Store::load(&chip);
+        store.save([1, 2, 3]);
+        finish(&mut store, &mut chip);
+        store.save([4, 5, 6]);
+        store.poll(&mut chip);
+        store.poll(&mut chip);
+        store.save([7, 8, 9]);
+        finish(&mut store, &mut chip);
+        assert_eq!(loaded(&chip), Some([7, 8, 9]));
+        store.save([1, 1, 1]);
+        store.poll(&mut chip);
+        assert_eq!(
+            loaded(&chip),
+            Some([7, 8, 9]),
+            "the older copy is the one written"
+        );
+    }
+}

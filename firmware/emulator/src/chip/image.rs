@@ -1,0 +1,189 @@
+//! A firmware image: what an ELF file puts into the chip's flash and EEPROM.
+//!
+//! Read here and not by simavr, which ends the process when a file is not to its liking.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// Bytes of flash of the ATmega1284P.
+pub const FLASH: usize = 128 * 1024;
+/// Bytes of EEPROM of the ATmega1284P.
+pub const EEPROM: usize = 4 * 1024;
+
+/// Where the linker puts what exists in RAM only.
+const RAM_ORIGIN: usize = 0x80_0000;
+/// Where the linker puts EEPROM content.
+const EEPROM_ORIGIN: usize = 0x81_0000;
+const MACHINE_AVR: u16 = 83;
+const LOAD: u32 = 1;
+
+/// Why an image cannot be loaded.
+#[derive(Debug, Error)]
+pub enum ImageError {
+    /// The file cannot be read.
+    #[error("cannot read {path}: {source}; build the images with firmware/avr/build")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is not a program for an AVR.
+    #[error("{0} is not an ELF file for an AVR; give the ELF file of a board, not a hex file")]
+    NotAvr(PathBuf),
+    /// The file ends in the middle of what it describes.
+    #[error("{0} is cut off; build the image again")]
+    CutOff(PathBuf),
+    /// Something lies beyond the memory.
+    #[error("{path} wants address {address:#x}, which the ATmega1284P does not have")]
+    Beyond {
+        /// The file.
+        path: PathBuf,
+        /// The first byte's place.
+        address: usize,
+    },
+    /// simavr does not know the chip.
+    #[error("this simavr knows no atmega1284p; build the emulator anew")]
+    NoChip,
+}
+
+/// An image, ready for as many chips as are wanted.
+#[derive(Clone, Debug)]
+pub struct Image {
+    pub(crate) flash: Vec<(usize, Vec<u8>)>,
+    pub(crate) eeprom: Vec<(usize, Vec<u8>)>,
+}
+
+impl Image {
+    /// Reads an ELF file.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no image for this chip.
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let bytes = fs::read(path).map_err(|source| ImageError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&bytes, path)
+    }
+
+    /// Bytes of flash the image fills.
+    pub fn flash_bytes(&self) -> usize {
+        self.flash.iter().map(|(_, bytes)| bytes.len()).sum()
+    }
+
+    fn parse(bytes: &[u8], path: &Path) -> Result<Self, ImageError> {
+        let is_avr =
+            bytes.starts_with(b"\x7FELF\x01\x01") && half(bytes, 0x12) == Some(MACHINE_AVR);
+        if !is_avr {
+            return Err(ImageError::NotAvr(path.to_owned()));
+        }
+        let mut image = Self {
+            flash: Vec::new(),
+            eeprom: Vec::new(),
+        };
+        let cut_off = || ImageError::CutOff(path.to_owned());
+        let table = word(bytes, 0x1C).ok_or_else(cut_off)?;
+        let size = usize::from(half(bytes, 0x2A).ok_or_else(cut_off)?);
+        let count = usize::from(half(bytes, 0x2C).ok_or_else(cut_off)?);
+        for index in 0..count {
+            let header = table + index * size;
+            let field = |offset| word(bytes, header + offset).ok_or_else(cut_off);
+            let (offset, address, length) = (field(4)?, field(12)?, field(16)?);
+            if field(0)? != LOAD as usize || length == 0 {
+                continue;
+            }
+            let content = bytes.get(offset..offset + length).ok_or_else(cut_off)?;
+            image.place(address, content, path)?;
+        }
+        if image.flash.is_empty() {
+            return Err(ImageError::NotAvr(path.to_owned()));
+        }
+        Ok(image)
+    }
+
+    fn place(&mut self, address: usize, content: &[u8], path: &Path) -> Result<(), ImageError> {
+        if address + content.len() <= FLASH {
+            self.flash.push((address, content.to_owned()));
+        } else if (EEPROM_ORIGIN..EEPROM_ORIGIN + 0x1_0000).contains(&address) {
+            let start = address - EEPROM_ORIGIN;
+            if start + content.len() > EEPROM {
+                return Err(ImageError::Beyond {
+                    path: path.to_owned(),
+                    address,
+                });
+            }
+            self.eeprom.push((start, content.to_owned()));
+        } else if address < RAM_ORIGIN {
+            return Err(ImageError::Beyond {
+                path: path.to_owned(),
+                address,
+            });
+        }
+        // No programmer writes RAM; fuses, lock bits and signature are its own business.
+        Ok(())
+    }
+}
+
+fn half(bytes: &[u8], at: usize) -> Option<u16> {
+    let field = bytes.get(at..at + 2)?;
+    Some(u16::from_le_bytes([field[0], field[1]]))
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    let field: [u8; 4] = bytes.get(at..at + 4)?.try_into().ok()?;
+    Some(u32::from_le_bytes(field) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn elf(machine: u16, address: u32) -> Vec<u8> {
+        let mut bytes = vec![0; 0x34 + 0x20];
+        bytes[..6].copy_from_slice(b"\x7FELF\x01\x01");
+        bytes[0x12..0x14].copy_from_slice(&machine.to_le_bytes());
+        bytes[0x1C] = 0x34;
+        bytes[0x2A] = 0x20;
+        bytes[0x2C] = 1;
+        let mut put = |at: usize, value: u32| {
+            bytes[0x34 + at..0x34 + at + 4].copy_from_slice(&value.to_le_bytes());
+        };
+        put(0, LOAD);
+        put(4, 0x54);
+        put(12, address);
+        put(16, 2);
+        bytes.extend([0xFF, 0xCF]);
+        bytes
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Image, ImageError> {
+        Image::parse(bytes, Path::new("image.elf"))
+    }
+
+    #[test]
+    fn a_segment_lands_where_it_says() {
+        let image = parse(&elf(MACHINE_AVR, 0x100)).unwrap();
+        assert_eq!(image.flash, [(0x100, vec![0xFF, 0xCF])]);
+        assert_eq!(image.flash_bytes(), 2);
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_with_its_reason() {
+        assert!(matches!(parse(b":1000"), Err(ImageError::NotAvr(_))));
+        assert!(matches!(parse(&elf(62, 0)), Err(ImageError::NotAvr(_))));
+        let cut = elf(MACHINE_AVR, 0);
+        let cut = &cut[..cut.len() - 1];
+        assert!(matches!(parse(cut), Err(ImageError::CutOff(_))));
+        let beyond = parse(&elf(MACHINE_AVR, 0x2_0000));
+        assert!(matches!(
+            beyond,
+            Err(ImageError::Beyond {
+                address: 0x2_0000,
+                ..
+            })
+        ));
+    }
+}

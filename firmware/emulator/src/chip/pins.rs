@@ -1,0 +1,189 @@
+//! Pins, and wires from a pin of one chip to a pin of another, by simavr's own IRQ connections.
+//!
+//! ```text
+//!   driving chip's pin --notify: the other chip catches up, edges are counted, faults--.
+//!                      '--connected IRQ--> other chip's pin: INTx, PIN register <------'
+//! ```
+//! A chip in reset drives nothing; a wire it drives then reads low, by the receiver's pull-down.
+
+use core::cell::{Cell, RefCell};
+use core::ffi::c_void;
+use std::rc::{Rc, Weak};
+
+use simavr_ffi as ffi;
+
+use super::Chip;
+
+/// A pin's place on the chip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pin {
+    /// The port's letter, 'A' to 'D'.
+    pub port: char,
+    /// The bit in the port.
+    pub bit: u8,
+}
+
+/// What stands on a pin, seen from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Not driven by the chip; its pull-up does not count.
+    Floating,
+    /// Driven low.
+    Low,
+    /// Driven high.
+    High,
+}
+
+impl Pin {
+    /// A pin by its data sheet name, as `Pin::new('D', 5)` for PD5.
+    pub const fn new(port: char, bit: u8) -> Self {
+        Self { port, bit }
+    }
+
+    /// Address of PINx; DDRx and PORTx follow it.
+    fn base(self) -> u8 {
+        0x20 + 3 * (self.port as u8 - b'A')
+    }
+
+    /// What the chip does with the pin. PWM outputs are not told here.
+    pub fn level(self, chip: &Chip) -> Level {
+        let bit = |offset| chip.register(self.base() + offset) >> self.bit & 1 == 1;
+        match (bit(1), bit(2)) {
+            (false, _) => Level::Floating,
+            (true, false) => Level::Low,
+            (true, true) => Level::High,
+        }
+    }
+
+    fn irq(self, chip: &Chip) -> *mut ffi::avr_irq_t {
+        let request = u32::from_be_bytes([b'i', b'o', b'g', self.port as u8]);
+        // SAFETY: the chip lives; simavr gives null for what it does not know.
+        unsafe { ffi::avr_io_getirq(chip.avr, request, i32::from(self.bit)) }
+    }
+}
+
+/// A wire, as faults and tests see it.
+pub struct Wire {
+    to: Weak<Chip>,
+    from: Weak<Chip>,
+    source: *mut ffi::avr_irq_t,
+    target: *mut ffi::avr_irq_t,
+    level: Cell<bool>,
+    lose: Cell<u64>,
+    rises: Cell<u64>,
+    lost: Cell<u64>,
+    edges: RefCell<Option<Vec<(u64, bool)>>>,
+}
+
+/// The wires a chip drives and the wires that drive it.
+#[derive(Default)]
+pub(super) struct Wires {
+    driven: Vec<Rc<Wire>>,
+    driving: Vec<Rc<Wire>>,
+}
+
+impl Wire {
+    /// Rises so far, lost ones included.
+    pub fn rises(&self) -> u64 {
+        self.rises.get()
+    }
+
+    /// Rises that were lost.
+    pub fn lost(&self) -> u64 {
+        self.lost.get()
+    }
+
+    /// Lets the next `count` pulses get lost on the way.
+    pub fn lose(&self, count: u64) {
+        self.lose.set(count);
+    }
+
+    /// From now on remembers every edge with its cycle.
+    pub fn record(&self) {
+        *self.edges.borrow_mut() = Some(Vec::new());
+    }
+
+    /// The edges remembered since the last call.
+    pub fn take_edges(&self) -> Vec<(u64, bool)> {
+        let mut edges = self.edges.borrow_mut();
+        edges.as_mut().map(core::mem::take).unwrap_or_default()
+    }
+
+    /// The level is about to change; whether it gets through.
+    fn passes(&self, high: bool) -> bool {
+        let (Some(from), Some(to)) = (self.from.upgrade(), self.to.upgrade()) else {
+            return false;
+        };
+        let cycle = from.cycle();
+        if let Some(edges) = self.edges.borrow_mut().as_mut() {
+            edges.push((cycle, high));
+        }
+        if high {
+            self.rises.set(self.rises.get() + 1);
+            if self.lose.get() > 0 {
+                self.lose.set(self.lose.get() - 1);
+                self.lost.set(self.lost.get() + 1);
+                return false;
+            }
+        }
+        self.level.set(high);
+        to.catch_up(cycle);
+        true
+    }
+}
+
+/// Joins two chips' pins.
+pub fn wire(from: &Rc<Chip>, source: Pin, to: &Rc<Chip>, target: Pin) -> Rc<Wire> {
+    let wire = Rc::new(Wire {
+        to: Rc::downgrade(to),
+        from: Rc::downgrade(from),
+        source: source.irq(from),
+        target: target.irq(to),
+        level: Cell::new(false),
+        lose: Cell::new(0),
+        rises: Cell::new(0),
+        lost: Cell::new(0),
+        edges: RefCell::new(None),
+    });
+    // SAFETY: both lines belong to living chips. The wire is kept by both, so it lives as long as
+    // either can call back.
+    unsafe {
+        let param = Rc::as_ptr(&wire).cast_mut().cast();
+        ffi::avr_irq_register_notify(wire.source, Some(on_edge), param);
+        ffi::avr_connect_irq(wire.source, wire.target);
+    }
+    from.wires.borrow_mut().driven.push(Rc::clone(&wire));
+    to.wires.borrow_mut().driving.push(Rc::clone(&wire));
+    wire
+}
+
+/// A chip in reset lets go of its outputs.
+pub(super) fn release(wires: &Wires) {
+    for wire in &wires.driven {
+        // SAFETY: the line belongs to a living chip.
+        unsafe { ffi::avr_raise_irq(wire.source, 0) };
+    }
+}
+
+/// A chip that starts sees the levels that stand on its inputs.
+pub(super) fn refresh(wires: &Wires) {
+    for wire in &wires.driving {
+        if wire.from.upgrade().is_some() {
+            // SAFETY: the line belongs to a living chip.
+            unsafe { ffi::avr_raise_irq(wire.target, u32::from(wire.level.get())) };
+        }
+    }
+}
+
+unsafe extern "C" fn on_edge(irq: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
+    // SAFETY: the parameter is a wire that both its chips keep; simavr asks us before it follows
+    // the connection, and stops there when the flag is set.
+    unsafe {
+        let wire: &Wire = &*param.cast_const().cast();
+        // simavr's own note of the level is lost at a reset.
+        let high = value & 1 == 1;
+        if wire.level.get() != high && !wire.passes(high) {
+            (*irq).flags |= ffi::IRQ_FLAG_NTF_STOP as u8;
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Running a chip: instructions, sleep, interrupts' entry, resets.
+//!
+//! ```text
+//!            horizon reached
+//!   .------------------------------ back to the caller
+//!   |  held in reset: the clock jumps to its end, then the program starts
+//!   |  own events due --> simavr's timers due --> asleep: the clock jumps to the next of both
+//!   '--- an interrupt is entered, or instructions run up to the next event <--' awake
+//! ```
+//! Nothing here waits: simavr's own loop calls `usleep` when the program sleeps, and counts one
+//! cycle too many doing so.
+
+use core::ffi::c_int;
+
+use simavr_ffi as ffi;
+
+use super::pins;
+use super::queue::Event;
+use super::{Chip, FREQUENCY, ResetLine, avr_run_one, chip, register};
+
+/// From a reset's cause to the first instruction: 65 ms and 14 cycles, the fuses for a crystal
+/// and slowly rising power.
+const START_UP: u64 = FREQUENCY * 65 / 1_000 + 14;
+/// Cycles from an interrupt's acceptance to the first instruction at its vector: the program
+/// counter of two bytes is pushed (datasheet, interrupt response time).
+const ENTRY: u64 = 4;
+/// And as many more when the core slept.
+const ENTRY_FROM_SLEEP: u64 = 4;
+
+impl Chip {
+    /// Runs until the cycle count is at least `horizon`; it passes it by one instruction at most.
+    pub fn run_until(&self, horizon: u64) {
+        if self.running.replace(true) {
+            return;
+        }
+        while self.cycle() < horizon {
+            self.advance(horizon);
+        }
+        self.running.set(false);
+    }
+
+    /// Brings a chip that lags up to `cycle`. One that is running is not touched.
+    pub(crate) fn catch_up(&self, cycle: u64) {
+        if self.cycle() < cycle {
+            self.run_until(cycle);
+        }
+    }
+
+    /// The cycle at which the chip does something by itself next: now, unless it sleeps or is
+    /// held in reset.
+    pub fn next_action(&self) -> u64 {
+        let now = self.cycle();
+        if let Some(until) = self.held_until.get() {
+            return until.min(self.queue.next()).max(now);
+        }
+        if self.core_state() == ffi::cpu_Running as c_int {
+            return now;
+        }
+        // SAFETY: the head of simavr's list of timers is null or a slot inside the chip.
+        let timer = unsafe {
+            let head = (*self.avr).cycle_timers.timer;
+            if head.is_null() {
+                u64::MAX
+            } else {
+                (*head).when
+            }
+        };
+        timer.min(self.queue.next()).max(now)
+    }
+
+    /// Resets the chip now, as by its pin, its supply or power.
+    pub fn reset(&self, line: ResetLine) {
+        let flag = match line {
+            ResetLine::Power => 0x01,
+            ResetLine::External => 0x02,
+            ResetLine::BrownOut => 0x04,
+        };
+        self.reset_with(flag);
+    }
+
+    /// Resets the chip with a flag in MCUSR.
+    pub(super) fn reset_with(&self, flag: u8) {
+        self.set_register(register::MCUSR, self.register(register::MCUSR) | flag);
+        self.reset_core();
+        self.resets.set(self.resets.get() + 1);
+        self.begin_reset(0);
+    }
+
+    /// Makes simavr tell us of resets, its own included.
+    pub(super) fn hook_reset(self: &std::rc::Rc<Self>) {
+        // SAFETY: zero is a valid value of every field of this C structure.
+        let mut hook: Box<ffi::avr_io_t> = Box::new(unsafe { core::mem::zeroed() });
+        hook.kind = c"emulator".as_ptr();
+        hook.reset = Some(on_reset);
+        // simavr never looks at this field of ours.
+        hook.irq_names = self.param().cast();
+        let hook = Box::into_raw(hook);
+        self.reset_hook.set(hook);
+        // SAFETY: the hook lives until the chip is dropped.
+        unsafe { ffi::avr_register_io(self.avr, hook) };
+    }
+
+    /// Everything an event means.
+    pub(super) fn schedule(&self, at: u64, event: Event) {
+        self.queue.push(at, event);
+        // A program that runs must not pass the event.
+        let ahead = at.saturating_sub(self.cycle());
+        // SAFETY: plain fields of a living chip.
+        unsafe {
+            let count = &raw mut (*self.avr).run_cycle_count;
+            *count = (*count).min(ahead);
+        }
+    }
+
+    /// The lines of a chip that has just been reset, until its program starts `delay` cycles
+    /// after the usual time.
+    pub(super) fn begin_reset(&self, delay: u64) {
+        self.held_until.set(Some(self.cycle() + START_UP + delay));
+        self.asleep.set(false);
+        self.interrupts.forget(self.cycle());
+        self.release_peripherals();
+        self.release_ports();
+        pins::release(&self.wires.borrow());
+        self.tell_watcher();
+    }
+
+    fn advance(&self, horizon: u64) {
+        let now = self.cycle();
+        if self.queue.next() <= now {
+            self.happen(now);
+            return;
+        }
+        let limit = horizon.min(self.queue.next());
+        if let Some(until) = self.held_until.get() {
+            self.set_cycle(limit.min(until));
+            if until <= limit {
+                self.start_program();
+            }
+            return;
+        }
+        // The limit of one makes the core come back after any instruction that sets a timer:
+        // simavr would otherwise count the whole span again from there.
+        // SAFETY: the chip lives, and no reference into it is held across the call.
+        let to_timer = unsafe {
+            (*self.avr).run_cycle_limit = 1;
+            ffi::avr_cycle_timer_process(self.avr)
+        };
+        if let Some(at) = self.reset_seen.take() {
+            // simavr's watchdog resets by itself and begins to count at 0.
+            self.set_cycle(at);
+            self.resets.set(self.resets.get() + 1);
+            self.begin_reset(0);
+            return;
+        }
+        // A timer may have set an event of ours.
+        let limit = horizon.min(self.queue.next());
+        if self.core_state() == ffi::cpu_Running as c_int {
+            if !self.enter_interrupt() {
+                self.run_instructions(to_timer.min(limit.saturating_sub(now)));
+            }
+        } else {
+            // Asleep, or crashed: only time passes, and the watchdog's is part of it.
+            let next = now + to_timer.max(1);
+            let then = next.min(limit).max(now);
+            self.set_cycle(then);
+            if self.core_state() == ffi::cpu_Sleeping as c_int {
+                self.slept.set(self.slept.get() + then - now);
+            }
+        }
+    }
+
+    /// Lets simavr enter an interrupt that is due; whether it did.
+    fn enter_interrupt(&self) -> bool {
+        // SAFETY: plain fields of a living chip; the call takes no reference of ours.
+        unsafe {
+            if (*self.avr).interrupt_state == 0 {
+                return false;
+            }
+            let depth = (*self.avr).interrupts.running_ptr;
+            ffi::avr_service_interrupts(self.avr);
+            if (*self.avr).interrupts.running_ptr <= depth {
+                return false;
+            }
+            let from = (*self.avr).cycle;
+            (*self.avr).cycle += if self.asleep.take() {
+                ENTRY + ENTRY_FROM_SLEEP
+            } else {
+                ENTRY
+            };
+            let running = (*self.avr).interrupts.running[usize::from(depth)];
+            self.interrupts
+                .entered((*running).vector, depth, from, (*self.avr).cycle);
+            true
+        }
+    }
+
+    /// Runs instructions for at least `count` cycles, and less when something comes up.
+    fn run_instructions(&self, count: u64) {
+        // SAFETY: the chip lives; callbacks reach it through shared references and raw pointers
+        // only, as this does.
+        unsafe {
+            let depth = (*self.avr).interrupts.running_ptr;
+            (*self.avr).run_cycle_count = count.max(1);
+            let next = avr_run_one(self.avr);
+            (*self.avr).pc = next;
+            let left = (*self.avr).interrupts.running_ptr;
+            if left < depth {
+                self.interrupts.left(left, (*self.avr).cycle);
+            }
+        }
+        let state = self.core_state();
+        if state == ffi::cpu_Sleeping as c_int {
+            self.asleep.set(true);
+        } else if state == ffi::cpu_Running as c_int {
+            self.asleep.set(false);
+        } else if state == ffi::cpu_Crashed as c_int {
+            self.crashes.set(self.crashes.get() + 1);
+        }
+    }
+
+    fn happen(&self, now: u64) {
+        let Some(event) = self.queue.pop(now) else {
+            return;
+        };
+        match event {
+            Event::Sent { usart, life } => self.frame_sent(usart, life),
+            Event::StartBit { usart, byte, bit } => self.frame_begins(usart, byte, bit),
+            Event::Received { usart, life } => self.frame_received(usart, life),
+            Event::WatchdogAgain { life } => self.watchdog_again(life),
+            Event::EepromDone { life } => self.eeprom_done(life),
+            Event::Alarm { tag } => {
+                if let Some(action) = self.on_alarm.borrow().as_ref() {
+                    action(tag, now);
+                }
+            }
+        }
+    }
+
+    /// The reset is over: the program starts with everything at its initial value.
+    fn start_program(&self) {
+        self.reset_core();
+        self.held_until.set(None);
+        self.release_peripherals();
+        self.release_ports();
+        pins::refresh(&self.wires.borrow());
+    }
+
+    /// simavr's reset without its jump of the clock.
+    fn reset_core(&self) {
+        let at = self.cycle();
+        // SAFETY: the chip lives and is between two instructions.
+        unsafe { ffi::avr_reset(self.avr) };
+        self.reset_seen.set(None);
+        self.set_cycle(at);
+    }
+
+    fn set_cycle(&self, cycle: u64) {
+        // SAFETY: a plain field of a living chip.
+        unsafe { (*self.avr).cycle = cycle };
+    }
+
+    fn core_state(&self) -> c_int {
+        // SAFETY: a plain field of a living chip.
+        unsafe { (*self.avr).state }
+    }
+}
+
+unsafe extern "C" fn on_reset(io: *mut ffi::avr_io_t) {
+    // SAFETY: the hook carries the chip's parameter in a field simavr does not use.
+    let chip = unsafe { chip((*io).irq_names.cast()) };
+    chip.reset_seen.set(Some(chip.cycle()));
+}

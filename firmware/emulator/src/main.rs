@@ -1,0 +1,152 @@
+//! The emulator's command line. No behaviour lives here.
+
+use std::fs;
+use std::io::{self, BufRead};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::Parser;
+use lager_emulator::chip::Image;
+use lager_emulator::measure::measure;
+use lager_emulator::rig::{Images, RigOptions};
+use lager_emulator::shell::{EmulatorConfig, run};
+use lager_emulator::truth::Truth;
+use lager_plant::Warehouse;
+
+/// The robot's two boards as chips: the real firmware images in simavr, wired to each other and
+/// to a warehouse, behind two serial ports.
+#[derive(Debug, Parser)]
+#[command(
+    name = "lager-emulator",
+    version,
+    after_help = "Examples:
+  lager-emulator --sensor-elf sensor.elf --steering-elf steering.elf \\
+      --sensor-link /tmp/sensor --steering-link /tmp/steering
+  lager up --sensor /tmp/sensor --steering /tmp/steering      drives what that emulates
+  lager-emulator --sensor-elf sensor.elf --steering-elf steering.elf --trace
+
+Exit codes: 0 done, 1 failed, 2 wrong usage."
+)]
+struct Cli {
+    /// The sensor board's image, an ELF file
+    #[arg(long, value_name = "FILE")]
+    sensor_elf: PathBuf,
+    /// The steering board's image, an ELF file
+    #[arg(long, value_name = "FILE")]
+    steering_elf: PathBuf,
+    /// Where the sensor board's serial port is to appear
+    #[arg(long, value_name = "PATH", required_unless_present = "trace")]
+    sensor_link: Option<PathBuf>,
+    /// Where the steering board's serial port is to appear
+    #[arg(long, value_name = "PATH", required_unless_present = "trace")]
+    steering_link: Option<PathBuf>,
+    /// A built-in warehouse (small, curved, large) or the path of a warehouse file
+    #[arg(long, value_name = "NAME|FILE", default_value = "small")]
+    warehouse: String,
+    /// Chooses every imperfection of robot and world
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Baud rate of the Pi's ends of both lines: that of the images
+    #[arg(long, default_value_t = 500_000)]
+    baud: u32,
+    /// Chip time in real time; more than the machine can do means as fast as it can
+    #[arg(long, default_value_t = 1.0, value_parser = positive)]
+    speed: f64,
+    /// Publishes the chips' time in this file, a shared page (src/clock.rs says what is in it)
+    #[arg(long, value_name = "FILE")]
+    clock: Option<PathBuf>,
+    /// Keeps both boards' EEPROM, and so their settings, in this folder
+    #[arg(long, value_name = "FOLDER")]
+    eeprom: Option<PathBuf>,
+    /// Writes how the robot really is to standard output, a line of JSON 50 times a second
+    #[arg(long)]
+    truth: bool,
+    /// Goes on with the world of a line that --truth wrote, read from standard input
+    #[arg(long)]
+    resume: bool,
+    /// Instead of serving ports: measures the images in cycles and prints the result as JSON
+    #[arg(long, conflicts_with_all = ["clock", "eeprom", "truth", "resume"])]
+    trace: bool,
+}
+
+fn main() -> ExitCode {
+    match serve(Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("lager-emulator: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
+    let images = Images {
+        sensor: Image::read(&cli.sensor_elf)?,
+        steering: Image::read(&cli.steering_elf)?,
+    };
+    let rig = RigOptions {
+        warehouse: warehouse(&cli.warehouse)?,
+        seed: cli.seed,
+        baud: cli.baud,
+    };
+    let (Some(sensor_link), Some(steering_link), false) =
+        (cli.sensor_link, cli.steering_link, cli.trace)
+    else {
+        let report = measure(&images, &rig)?;
+        println!("{}", serde_json::to_string_pretty(&report)?);
+        return Ok(());
+    };
+    let config = EmulatorConfig {
+        rig,
+        sensor_link,
+        steering_link,
+        speed: cli.speed,
+        clock: cli.clock,
+        eeprom: cli.eeprom,
+        truth: cli.truth,
+        resume: cli.resume.then(kept).transpose()?,
+    };
+    let shutdown = Arc::new(AtomicBool::new(false));
+    for signal in [
+        signal_hook::consts::SIGINT,
+        signal_hook::consts::SIGTERM,
+        signal_hook::consts::SIGHUP,
+    ] {
+        signal_hook::flag::register(signal, Arc::clone(&shutdown))?;
+    }
+    run(&images, &config, &shutdown)?;
+    Ok(())
+}
+
+fn warehouse(name: &str) -> Result<Warehouse, String> {
+    if let Some(warehouse) = Warehouse::builtin(name) {
+        return Ok(warehouse);
+    }
+    let text = fs::read_to_string(Path::new(name)).map_err(|error| {
+        format!(
+            "there is no warehouse `{name}`: the built-in ones are {}, anything else is read as a file ({error})",
+            Warehouse::BUILTIN.join(", ")
+        )
+    })?;
+    toml::from_str(&text)
+        .map_err(|error| format!("the warehouse file {name} is not valid: {error}"))
+}
+
+fn kept() -> Result<Truth, String> {
+    let mut line = String::new();
+    io::stdin()
+        .lock()
+        .read_line(&mut line)
+        .map_err(|error| format!("the kept world cannot be read from standard input: {error}"))?;
+    serde_json::from_str(&line)
+        .map_err(|error| format!("standard input has no line of --truth: {error}"))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|speed: &f64| speed.is_finite() && *speed > 0.0)
+        .ok_or_else(|| "give a number above 0, such as 1 or 0.5".into())
+}

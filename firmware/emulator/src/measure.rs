@@ -1,0 +1,269 @@
+//! What the images do, in cycles: exact, and the same in every run.
+//!
+//! ```text
+//!   robot follows a straight line, settled; at one of many phases of the sensor board's loop
+//!   the tape jumps two sensors aside
+//!       |----- tape to UART: the first start bit of the line packet that tells
+//!       |----- tape to duty: the write that gives a motor another duty
+//! ```
+//! Only `real_time_factor` depends on the machine.
+
+use core::time::Duration;
+
+use lager_plant::Pose;
+use lager_wire::{Command, LineState, Payload, WheelCommand};
+use rustix::time::{ClockId, clock_gettime};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::chip::{FREQUENCY, InterruptStatistics};
+use crate::pi::{Pi, run_for, run_until};
+use crate::rig::{Board, Images, Rig, RigError, RigOptions};
+
+/// How long both boards have to come up.
+const COMING_UP: Duration = Duration::from_millis(600);
+/// From one trial's start to its jump, in cycles: 60 ms, and a phase.
+const SETTLING: u64 = FREQUENCY * 60 / 1_000;
+/// How long a jump may take to show, in cycles: 60 ms.
+const SHOWING: u64 = FREQUENCY * 60 / 1_000;
+/// Phases tried. Their distance has no common divisor with any period of the boards.
+const PHASES: u64 = 100;
+const PHASE: u64 = 1_613;
+/// Where the robot stands on its first edge, and how far the tape jumps, in mm.
+const PLACE: f64 = 60.0;
+const JUMP: f64 = 14.0;
+/// How long the interrupts are watched while the robot drives.
+const DRIVE: Duration = Duration::from_secs(2);
+
+/// Why nothing was measured.
+#[derive(Debug, Error)]
+pub enum MeasureError {
+    /// The rig cannot be built.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// A board did not answer the Pi.
+    #[error(
+        "the {0:?} board did not shake hands; is it the image of that board, and its baud rate --baud?"
+    )]
+    NotUp(Board),
+    /// A jump of the tape was not answered.
+    #[error("the tape jumped and {0} did not follow within 60 ms; the images do not follow a line")]
+    NoAnswer(&'static str),
+}
+
+/// Times in cycles of 62.5 ns over all phases.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Span {
+    /// The shortest.
+    pub best: u64,
+    /// The middle one.
+    pub median: u64,
+    /// The longest: the worst phase.
+    pub worst: u64,
+    /// The longest, in microseconds.
+    pub worst_us: f64,
+}
+
+impl Span {
+    fn of(mut cycles: Vec<u64>) -> Self {
+        cycles.sort_unstable();
+        let worst = cycles.last().copied().unwrap_or(0);
+        Self {
+            best: cycles.first().copied().unwrap_or(0),
+            median: cycles.get(cycles.len() / 2).copied().unwrap_or(0),
+            worst,
+            worst_us: microseconds(worst),
+        }
+    }
+}
+
+/// One board while the robot drives.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BoardFigures {
+    /// Bytes of flash the image fills.
+    pub flash_bytes: usize,
+    /// The longest time from an interrupt's flag to its first instruction, in cycles.
+    pub worst_interrupt_latency: u64,
+    /// Share of time in interrupts, 0 to 1.
+    pub interrupt_share: f64,
+    /// Share of time the core is awake, 0 to 1.
+    pub awake_share: f64,
+    /// All vectors, in cycles.
+    pub interrupts: InterruptStatistics,
+}
+
+/// Everything measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The chips' clock.
+    pub frequency_hz: u64,
+    /// The lines' baud rate.
+    pub baud: u32,
+    /// Phases of the sensor board's loop tried.
+    pub phases: u64,
+    /// From the tape's jump to the write of another duty. The pin follows at the end of the PWM
+    /// period under way.
+    pub tape_to_duty: Span,
+    /// One PWM period, in cycles.
+    pub pwm_period: u64,
+    /// From the tape's jump to the first start bit of the packet that tells.
+    pub tape_to_uart: Span,
+    /// The sensor board.
+    pub sensor: BoardFigures,
+    /// The steering board.
+    pub steering: BoardFigures,
+    /// Chip time in processor time while the robot drove: how fast a core of its own runs both
+    /// boards. Depends on the machine.
+    pub real_time_factor: f64,
+}
+
+/// Measures two images.
+///
+/// # Errors
+/// The rig cannot be built, or the images do not do what is measured.
+pub fn measure(images: &Images, options: &RigOptions) -> Result<Figures, MeasureError> {
+    let mut bench = Bench::new(images, options)?;
+    let (to_duty, to_uart) = bench.jumps()?;
+    let factor = bench.drive();
+    let figures = |board: Board, image: &crate::chip::Image| {
+        let chip = bench.rig.chip(board);
+        let interrupts = chip.interrupts();
+        BoardFigures {
+            flash_bytes: image.flash_bytes(),
+            worst_interrupt_latency: interrupts.worst_latency,
+            interrupt_share: interrupts.share(),
+            awake_share: 1.0
+                - (chip.slept() - bench.slept[board as usize]) as f64 / interrupts.cycles as f64,
+            interrupts,
+        }
+    };
+    let prescaler = match bench
+        .rig
+        .chip(Board::Steering)
+        .register(crate::chip::register::TCCR2B)
+        & 7
+    {
+        0 => 0,
+        1 => 1,
+        2 => 8,
+        3 => 32,
+        4 => 64,
+        5 => 128,
+        6 => 256,
+        _ => 1_024,
+    };
+    Ok(Figures {
+        frequency_hz: FREQUENCY,
+        baud: options.baud,
+        phases: PHASES,
+        tape_to_duty: Span::of(to_duty),
+        pwm_period: 256 * prescaler,
+        tape_to_uart: Span::of(to_uart),
+        sensor: figures(Board::Sensor, &images.sensor),
+        steering: figures(Board::Steering, &images.steering),
+        real_time_factor: factor,
+    })
+}
+
+struct Bench {
+    rig: Rig,
+    sensor: Pi,
+    steering: Pi,
+    slept: [u64; 2],
+}
+
+impl Bench {
+    fn new(images: &Images, options: &RigOptions) -> Result<Self, MeasureError> {
+        let mut bench = Self {
+            rig: Rig::new(images, options)?,
+            sensor: Pi::new(Board::Sensor),
+            steering: Pi::new(Board::Steering),
+            slept: [0; 2],
+        };
+        bench.run(COMING_UP);
+        for (pi, board) in [
+            (&bench.sensor, Board::Sensor),
+            (&bench.steering, Board::Steering),
+        ] {
+            if !pi.is_up() {
+                return Err(MeasureError::NotUp(board));
+            }
+        }
+        bench.place(0.0);
+        let follow = Command::Wheel(WheelCommand::ActiveForward);
+        bench.steering.order(&mut bench.rig, follow);
+        Ok(bench)
+    }
+
+    fn jumps(&mut self) -> Result<(Vec<u64>, Vec<u64>), MeasureError> {
+        let (mut to_duty, mut to_uart) = (Vec::new(), Vec::new());
+        for phase in 0..PHASES {
+            self.place(0.0);
+            let jump = self.rig.cycle() + SETTLING + phase * PHASE;
+            self.run_until(jump);
+            self.rig.take_motor_changes();
+            self.sensor.packets.clear();
+            self.place(JUMP);
+            self.run_until(jump + SHOWING);
+            let duty = self.rig.take_motor_changes();
+            let duty = duty.iter().find(|change| change.cycle > jump);
+            let told = self.sensor.packets.iter().find(|arrived| {
+                arrived.from > jump
+                    && arrived.packet.payload == Payload::Line(LineState::RightOfLine)
+                    || arrived.packet.payload == Payload::Line(LineState::LeftOfLine)
+            });
+            to_duty.push(duty.ok_or(MeasureError::NoAnswer("the motors"))?.cycle - jump);
+            to_uart.push(told.ok_or(MeasureError::NoAnswer("the line packets"))?.from - jump);
+        }
+        Ok((to_duty, to_uart))
+    }
+
+    /// Drives along the line with a clean slate; the real-time factor.
+    fn drive(&mut self) -> f64 {
+        self.place(0.0);
+        for board in Board::BOTH {
+            let chip = self.rig.chip(board);
+            chip.clear_interrupts();
+            self.slept[board as usize] = chip.slept();
+        }
+        let start = processor_time();
+        self.run(DRIVE);
+        DRIVE.as_secs_f64() / (processor_time() - start).as_secs_f64()
+    }
+
+    /// The robot stands on its first edge, this far left of the line.
+    fn place(&mut self, left: f64) {
+        let pose = Pose {
+            x: PLACE,
+            y: left,
+            heading: 0.0,
+        };
+        self.rig.world_mut().place(pose);
+    }
+
+    fn run(&mut self, time: Duration) {
+        run_for(
+            &mut self.rig,
+            &mut [&mut self.sensor, &mut self.steering],
+            time,
+        );
+    }
+
+    fn run_until(&mut self, cycle: u64) {
+        run_until(
+            &mut self.rig,
+            &mut [&mut self.sensor, &mut self.steering],
+            cycle,
+        );
+    }
+}
+
+/// Processor time of this thread.
+fn processor_time() -> Duration {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+}
+
+fn microseconds(cycles: u64) -> f64 {
+    cycles as f64 * 1e6 / FREQUENCY as f64
+}

@@ -1,0 +1,164 @@
+//! A pty in place of a board's USB cable, under a fixed name.
+//!
+//! ```text
+//!   bridge --open--> /run/.../sensor --link--> /dev/pts/7 <==kernel==> master, held here
+//! ```
+//! Like a USB adapter, the port carries nothing while nobody has it open, and what its reader
+//! does not fetch is lost; a write never waits. The link is replaced in one step, so that there is
+//! no moment without a port, and removed at the end if it is still ours.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::io::Errno;
+use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
+use thiserror::Error;
+
+/// Why a port could not be made.
+#[derive(Debug, Error)]
+pub enum PtyError {
+    /// The system gives no pty.
+    #[error("there is no pty to be had ({0}); is /dev/pts mounted, and is its limit reached?")]
+    Open(#[source] io::Error),
+    /// The link's place is taken.
+    #[error("{0} exists and is not a link; choose another place for the emulated port")]
+    Taken(PathBuf),
+    /// The link cannot be made.
+    #[error("cannot link the emulated port at {path}: {source}; does its folder exist?")]
+    Link {
+        /// Where the link should be.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// The board's end of a port.
+#[derive(Debug)]
+pub(crate) struct Port {
+    master: OwnedFd,
+    device: PathBuf,
+    link: PathBuf,
+    open: bool,
+}
+
+impl Port {
+    /// A new port, linked at `link`.
+    pub(crate) fn create(link: &Path) -> Result<Self, PtyError> {
+        let (master, device) = open_master().map_err(|errno| PtyError::Open(errno.into()))?;
+        let port = Self {
+            master,
+            device,
+            link: link.to_owned(),
+            open: false,
+        };
+        port.place_link()?;
+        Ok(port)
+    }
+
+    /// Whether somebody has the port open, as far as the last look told.
+    pub(crate) fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// What to wait on while the port is open.
+    pub(crate) fn fd(&self) -> BorrowedFd<'_> {
+        self.master.as_fd()
+    }
+
+    /// Looks whether somebody has the port open.
+    pub(crate) fn look(&mut self) {
+        let mut fds = [PollFd::new(&self.master, PollFlags::IN)];
+        let no_time = Timespec {
+            tv_sec: 0,
+            tv_nsec: 0,
+        };
+        if poll(&mut fds, Some(&no_time)).is_err() {
+            return;
+        }
+        let open = !fds[0].revents().contains(PollFlags::HUP);
+        if self.open && !open {
+            // What the last reader left must not greet the next one.
+            if let Ok(device) = ioctl_tiocgptpeer(&self.master, device_flags()) {
+                let _ = tcflush(&device, QueueSelector::IFlush);
+            }
+        }
+        self.open = open;
+    }
+
+    /// Appends what was written to the port.
+    pub(crate) fn read(&self, into: &mut Vec<u8>) {
+        let mut chunk = [0; 256];
+        // A closed port reads as an error once it is empty.
+        while let Ok(count @ 1..) = rustix::io::read(&self.master, &mut chunk) {
+            into.extend_from_slice(&chunk[..count]);
+        }
+    }
+
+    /// Sends bytes to whoever reads; returns how many were lost.
+    pub(crate) fn write(&self, bytes: &[u8]) -> usize {
+        if !self.open {
+            return bytes.len();
+        }
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            match rustix::io::write(&self.master, rest) {
+                Ok(count) => rest = &rest[count..],
+                Err(Errno::INTR) => {}
+                Err(_) => break,
+            }
+        }
+        rest.len()
+    }
+
+    fn place_link(&self) -> Result<(), PtyError> {
+        let taken = |link: &Path| fs::symlink_metadata(link).is_ok_and(|found| !found.is_symlink());
+        if taken(&self.link) {
+            return Err(PtyError::Taken(self.link.clone()));
+        }
+        let failed = |source| PtyError::Link {
+            path: self.link.clone(),
+            source,
+        };
+        let mut fresh = self.link.as_os_str().to_owned();
+        fresh.push(format!(".{}", std::process::id()));
+        let _ = fs::remove_file(&fresh);
+        std::os::unix::fs::symlink(&self.device, &fresh).map_err(failed)?;
+        fs::rename(&fresh, &self.link).map_err(failed)
+    }
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        if fs::read_link(&self.link).is_ok_and(|target| target == self.device) {
+            let _ = fs::remove_file(&self.link);
+        }
+    }
+}
+
+/// The bridge's end is opened without becoming anybody's terminal.
+fn device_flags() -> OpenptFlags {
+    OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC
+}
+
+/// A pty's master, not blocking, and the path of its device, which is raw: 8 bits, no echo, no
+/// line discipline.
+fn open_master() -> Result<(OwnedFd, PathBuf), Errno> {
+    let master = openpt(device_flags())?;
+    grantpt(&master)?;
+    unlockpt(&master)?;
+    let name = ptsname(&master, Vec::new())?;
+    let device = ioctl_tiocgptpeer(&master, device_flags())?;
+    let mut settings = tcgetattr(&device)?;
+    settings.make_raw();
+    tcsetattr(&device, OptionalActions::Now, &settings)?;
+    fcntl_setfl(&master, OFlags::NONBLOCK)?;
+    Ok((master, PathBuf::from(OsStr::from_bytes(name.as_bytes()))))
+}

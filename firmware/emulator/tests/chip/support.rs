@@ -1,0 +1,56 @@
+//! Small images, compiled with avr-gcc when they are wanted.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::rc::Rc;
+
+use lager_emulator::chip::{Chip, FREQUENCY, Image};
+
+/// Cycles from power to the first instruction: 65 ms and 14.
+pub(crate) const START: u64 = FREQUENCY * 65 / 1_000 + 14;
+
+/// Where the images note what they saw.
+const LOG: u16 = 0x3F00;
+
+/// Compiles an image of `tests/images`; every test has its own output.
+fn image(source: &str, test: &str) -> Image {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images");
+    let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{source}-{test}.elf"));
+    let status = Command::new("avr-gcc")
+        .args([
+            "-mmcu=atmega1284p",
+            "-DF_CPU=16000000UL",
+            "-Os",
+            "-Wall",
+            "-o",
+        ])
+        .arg(&out)
+        .arg(folder.join(source))
+        .status()
+        .expect("avr-gcc is installed, as the emulator's build needs avr-libc");
+    assert!(status.success(), "{source} compiles");
+    Image::read(&out).expect("avr-gcc writes images for AVRs")
+}
+
+/// A chip with that image, power just on.
+pub(crate) fn chip(source: &str, test: &str) -> Rc<Chip> {
+    Chip::new(&image(source, test), 0, 1).expect("simavr knows the chip")
+}
+
+/// Bytes the program noted.
+pub(crate) fn noted(chip: &Chip, count: usize) -> Vec<u8> {
+    chip.memory(LOG, count)
+}
+
+/// Words the program noted.
+pub(crate) fn noted_words(chip: &Chip, count: usize) -> Vec<u16> {
+    noted(chip, 2 * count)
+        .chunks_exact(2)
+        .map(|pair| u16::from_le_bytes([pair[0], pair[1]]))
+        .collect()
+}
+
+/// Cycles of so many milliseconds.
+pub(crate) const fn milliseconds(count: u64) -> u64 {
+    FREQUENCY * count / 1_000
+}

@@ -1,0 +1,284 @@
+//! The emulator as a process: real ptys, the clock page, truth lines, an end and a restart.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_emulator::truth::Truth;
+use lager_wire::link::{HostEvent, HostLink, HostTransmitter};
+use lager_wire::{Callsign, Payload, ResetCause, SteerCommand, WheelCommand};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// What must happen happens before this, or the test fails instead of hanging.
+const WATCHDOG: Duration = Duration::from_secs(120);
+
+/// A folder of the test's own.
+struct Place(PathBuf);
+
+impl Place {
+    fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let name = format!("lager-emulator-{}-{number}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        fs::create_dir_all(&folder).expect("there is room for a folder");
+        Self(folder)
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    fn start(&self, resume: Option<&str>) -> Emulator {
+        let images = std::env::var_os("LAGER_IMAGES").map_or_else(
+            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../avr/target/avr-none/release"),
+            PathBuf::from,
+        );
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lager-emulator"));
+        command
+            .arg("--sensor-elf")
+            .arg(images.join("sensor.elf"))
+            .arg("--steering-elf")
+            .arg(images.join("steering.elf"))
+            .arg("--sensor-link")
+            .arg(self.at("sensor"))
+            .arg("--steering-link")
+            .arg(self.at("steering"))
+            .arg("--clock")
+            .arg(self.at("clock"))
+            .arg("--truth")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped());
+        if resume.is_some() {
+            command.arg("--resume");
+        }
+        let mut child = command.spawn().expect("it is built");
+        let mut stdin = child.stdin.take().expect("it is piped");
+        if let Some(line) = resume {
+            stdin.write_all(line.as_bytes()).expect("it reads");
+        }
+        drop(stdin);
+        let truth = BufReader::new(child.stdout.take().expect("it is piped"));
+        Emulator { child, truth }
+    }
+
+    /// Chip time in the clock page.
+    fn chip_ns(&self) -> u64 {
+        let page = fs::read(self.at("clock")).expect("there is a page");
+        u64::from_ne_bytes(page[24..32].try_into().expect("eight bytes"))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+struct Emulator {
+    child: Child,
+    truth: BufReader<std::process::ChildStdout>,
+}
+
+impl Emulator {
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.truth.read_line(&mut line).expect("it is text");
+        line
+    }
+
+    fn truth(&mut self) -> Truth {
+        let line = self.line();
+        serde_json::from_str(&line).expect("a line of truth")
+    }
+
+    fn signal(&mut self, signal: Signal) -> Option<i32> {
+        let id = Pid::from_child(&self.child);
+        kill_process(id, signal).expect("it runs");
+        self.child.wait().expect("it ends").code()
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The Pi's end of a port.
+struct Cable {
+    file: File,
+    link: HostLink,
+    transmitter: HostTransmitter,
+    start: Instant,
+    reset: Option<ResetCause>,
+}
+
+impl Cable {
+    fn open(path: &Path) -> Self {
+        let start = Instant::now();
+        let file = loop {
+            let nonblocking = rustix::fs::OFlags::NONBLOCK.bits() as i32;
+            match OpenOptions::new()
+                .read(true)
+                .write(true)
+                .custom_flags(nonblocking)
+                .open(path)
+            {
+                Ok(file) => break file,
+                Err(error) => assert!(start.elapsed() < WATCHDOG, "no port: {error}"),
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        Self {
+            file,
+            link: HostLink::new(),
+            transmitter: HostTransmitter::new(),
+            start,
+            reset: None,
+        }
+    }
+
+    /// Answers the board until `wanted` of a packet.
+    fn until(&mut self, mut wanted: impl FnMut(&Payload) -> bool) {
+        let mut bytes = [0; 256];
+        loop {
+            assert!(self.start.elapsed() < WATCHDOG, "it never comes");
+            let count = self.file.read(&mut bytes).unwrap_or(0);
+            let now = self.start.elapsed();
+            for &byte in &bytes[..count] {
+                let event = self.link.push(byte, now);
+                if let Some(HostEvent::Packet(packet)) = event
+                    && wanted(&packet.payload)
+                {
+                    return;
+                }
+                self.answer(event);
+            }
+            let due = self.link.poll(now);
+            self.answer(due);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn answer(&mut self, event: Option<HostEvent>) {
+        let bytes = match event {
+            Some(HostEvent::SendSyn) => self.transmitter.syn(),
+            Some(HostEvent::SendAck { up }) => {
+                self.reset = up.map(|up| up.reset).or(self.reset);
+                let version = self.link.version().expect("it asked");
+                self.transmitter.ack(version)
+            }
+            _ => return,
+        };
+        self.file.write_all(&bytes).expect("the port takes it");
+    }
+}
+
+#[test]
+fn the_boards_answer_on_their_ports_and_drive_on_command() {
+    let place = Place::new();
+    let mut emulator = place.start(None);
+    let mut steering = Cable::open(&place.at("steering"));
+    steering.until(|payload| matches!(payload, Payload::SteerData(_)));
+    assert_eq!(steering.link.callsign(), Some(Callsign::Steering));
+    assert_eq!(steering.reset, Some(ResetCause::PowerOn));
+    let mut sensor = Cable::open(&place.at("sensor"));
+    sensor.until(|payload| matches!(payload, Payload::Line(_)));
+
+    let before = emulator.truth();
+    assert_eq!((before.left_duty, before.right_duty), (0, 0));
+    let code = lager_wire::Command::Wheel(WheelCommand::ManualForward).code();
+    let command = SteerCommand { code, seq: 1 };
+    let mut ordered = Instant::now();
+    let order = |steering: &mut Cable| {
+        let bytes = steering.transmitter.encode(Payload::SteerCommand(command));
+        steering
+            .file
+            .write_all(&bytes.expect("it is up"))
+            .expect("the port takes it");
+    };
+    order(&mut steering);
+    loop {
+        let truth = emulator.truth();
+        if truth.left_duty == 100 && truth.x_mm > before.x_mm + 1.0 {
+            break;
+        }
+        if ordered.elapsed() > Duration::from_millis(20) {
+            ordered = Instant::now();
+            order(&mut steering);
+        }
+        assert!(steering.start.elapsed() < WATCHDOG, "it never moves");
+    }
+    // Nobody renews: the steering board stops by itself, in chip time.
+    while emulator.truth().left_duty != 0 {}
+
+    let first = place.chip_ns();
+    let truth = emulator.truth();
+    while place.chip_ns() <= first {
+        assert!(steering.start.elapsed() < WATCHDOG, "the clock stands");
+    }
+    assert!(truth.time_ns > before.time_ns);
+    assert_eq!(emulator.signal(Signal::TERM), Some(0));
+    assert!(!place.at("steering").is_symlink(), "the links are gone");
+    assert_eq!(
+        fs::read(place.at("clock")).expect("it stays")[48..56],
+        [0; 8]
+    );
+}
+
+#[test]
+fn a_killed_emulator_goes_on_where_it_was() {
+    let place = Place::new();
+    let mut emulator = place.start(None);
+    let mut line = String::new();
+    let start = Instant::now();
+    while place.at("clock").metadata().is_err() || place.chip_ns() < 100_000_000 {
+        line = emulator.line();
+        assert!(start.elapsed() < WATCHDOG, "the clock stands");
+    }
+    emulator.signal(Signal::KILL);
+    let (kept, clock): (Truth, u64) = (
+        serde_json::from_str(&line).expect("a line"),
+        place.chip_ns(),
+    );
+
+    let mut emulator = place.start(Some(&line));
+    let mut steering = Cable::open(&place.at("steering"));
+    let first = emulator.truth();
+    assert!(first.time_ns >= kept.time_ns);
+    assert!((first.x_mm - kept.x_mm).abs() < 1.0);
+    assert_eq!(first.goods, kept.goods);
+    assert!(place.chip_ns() >= clock, "the clock never goes back");
+    steering.until(|payload| matches!(payload, Payload::SteerData(_)));
+    assert_eq!(emulator.signal(Signal::INT), Some(0));
+}
+
+#[test]
+fn what_is_wrong_is_said_in_a_sentence() {
+    let place = Place::new();
+    let run = |sensor: &Path, warehouse: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_lager-emulator"))
+            .args(["--steering-elf", "/dev/null", "--warehouse", warehouse])
+            .arg("--sensor-elf")
+            .arg(sensor)
+            .arg("--sensor-link")
+            .arg(place.at("sensor"))
+            .arg("--steering-link")
+            .arg(place.at("steering"))
+            .output()
+            .expect("it runs");
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).expect("it is text")
+    };
+    let missing = run(&place.at("nothing.elf"), "small");
+    assert!(missing.contains("firmware/avr/build"), "{missing}");
+    fs::write(place.at("hex"), ":10000000").expect("there is room");
+    let hex = run(&place.at("hex"), "small");
+    assert!(hex.contains("not an ELF file for an AVR"), "{hex}");
+}

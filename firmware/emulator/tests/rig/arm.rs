@@ -1,0 +1,266 @@
+//! The arm's servos on their wire: golden bytes, faults, the lock.
+
+use std::time::Duration;
+
+use lager_ax12::ErrorBits;
+use lager_emulator::chip::UsartId;
+use lager_emulator::rig::Board;
+use lager_plant::ServoFault;
+use lager_wire::{ArmCommand, Command, SteerFlags, WheelCommand};
+
+use crate::support::Robot;
+
+/// The longest any arm command may take: its longest sequence has three parts of 4 s each.
+const LONGEST: Duration = Duration::from_secs(14);
+
+/// A robot whose servos are in service.
+fn ready(seed: u64) -> Robot {
+    let mut robot = Robot::up(seed);
+    robot.run(Duration::from_millis(1_000));
+    assert_eq!(robot.report().servo_errors, 0);
+    robot
+}
+
+/// Gives an arm command and waits for its end; the flags told with it.
+fn carry_out(robot: &mut Robot, command: ArmCommand) -> SteerFlags {
+    let seq = robot.steering.order(&mut robot.rig, Command::Arm(command));
+    let mut waited = Duration::ZERO;
+    let step = Duration::from_millis(20);
+    while robot.report().finished_seq != seq {
+        robot.run(step);
+        waited += step;
+        assert!(waited < LONGEST, "{command:?} never ends");
+    }
+    robot.report().flags
+}
+
+/// Whole packets that the board wrote to the wire.
+fn packets(robot: &Robot) -> Vec<Vec<u8>> {
+    let bytes: Vec<u8> = robot
+        .rig
+        .servo_wire()
+        .take()
+        .iter()
+        .filter(|byte| byte.from_board)
+        .map(|byte| byte.byte)
+        .collect();
+    let mut packets = Vec::new();
+    let mut rest = &bytes[..];
+    while let [0xFF, 0xFF, _, length, ..] = rest {
+        let (packet, others) = rest.split_at(usize::from(*length) + 4);
+        packets.push(packet.to_owned());
+        rest = others;
+    }
+    assert!(rest.is_empty(), "{rest:02X?} belongs to no packet");
+    packets
+}
+
+/// Packets that write something (instruction 3); the others are questions.
+fn writes(robot: &Robot) -> Vec<Vec<u8>> {
+    let mut packets = packets(robot);
+    packets.retain(|packet| packet[4] == 3);
+    packets
+}
+
+/// The first writes of a command in the pose the arm is carried in: position, speed and torque of
+/// each joint's servo, checked by hand against the AX-12's manual. If this fails do not change it.
+#[test]
+fn each_command_writes_its_golden_bytes() {
+    const GOLDEN: [(ArmCommand, &[&str]); 11] = [
+        (
+            ArmCommand::Left,
+            &["FF FF 01 09 03 1E 03 02 00 00 FF 03 CD"],
+        ),
+        (
+            ArmCommand::Right,
+            &["FF FF 01 09 03 1E FD 01 00 00 FF 03 D4"],
+        ),
+        (
+            ArmCommand::Up,
+            &[
+                "FF FF 02 09 03 1E 5B 02 00 00 FF 03 74",
+                "FF FF 03 09 03 1E A4 01 00 00 FF 03 2B",
+            ],
+        ),
+        (
+            ArmCommand::Down,
+            &[
+                "FF FF 02 09 03 1E 55 02 00 00 FF 03 7A",
+                "FF FF 03 09 03 1E AA 01 00 00 FF 03 25",
+            ],
+        ),
+        (
+            ArmCommand::Out,
+            &[
+                "FF FF 04 09 03 1E 93 01 00 00 FF 03 3B",
+                "FF FF 05 09 03 1E 6C 02 00 00 FF 03 60",
+            ],
+        ),
+        (
+            ArmCommand::In,
+            &[
+                "FF FF 04 09 03 1E 8D 01 00 00 FF 03 41",
+                "FF FF 05 09 03 1E 72 02 00 00 FF 03 5A",
+            ],
+        ),
+        (
+            ArmCommand::CounterClockwise,
+            &["FF FF 07 09 03 1E 03 02 00 00 FF 03 C7"],
+        ),
+        (
+            ArmCommand::Clockwise,
+            &["FF FF 07 09 03 1E FD 01 00 00 FF 03 CE"],
+        ),
+        // Three steps of the claw, 3 units each.
+        (
+            ArmCommand::Squeeze,
+            &[
+                "FF FF 08 09 03 1E FD 01 00 00 FF 03 CD",
+                "FF FF 08 09 03 1E FA 01 00 00 FF 03 D0",
+                "FF FF 08 09 03 1E F7 01 00 00 FF 03 D3",
+            ],
+        ),
+        // Opening, softly: speed 100.
+        (
+            ArmCommand::Release,
+            &["FF FF 08 09 03 1E 00 02 64 00 FF 03 65"],
+        ),
+        // To the drop pose (512, 300 and 723, 512 and 511, 512), open, and back.
+        (
+            ArmCommand::Drop,
+            &[
+                "FF FF 01 09 03 1E 00 02 64 00 FF 03 6C",
+                "FF FF 02 09 03 1E 2C 01 64 00 FF 03 40",
+                "FF FF 03 09 03 1E D3 02 64 00 FF 03 97",
+                "FF FF 04 09 03 1E 00 02 64 00 FF 03 69",
+                "FF FF 05 09 03 1E FF 01 64 00 FF 03 6A",
+                "FF FF 06 09 03 1E 00 02 64 00 FF 03 67",
+                "FF FF 08 09 03 1E 00 02 64 00 FF 03 65",
+                "FF FF 01 09 03 1E 00 02 64 00 FF 03 6C",
+                "FF FF 02 09 03 1E 58 02 64 00 FF 03 13",
+                "FF FF 03 09 03 1E A7 01 64 00 FF 03 C4",
+                "FF FF 04 09 03 1E 90 01 64 00 FF 03 DA",
+                "FF FF 05 09 03 1E 6F 02 64 00 FF 03 F9",
+                "FF FF 06 09 03 1E 00 02 64 00 FF 03 67",
+            ],
+        ),
+    ];
+    for (command, golden) in GOLDEN {
+        let mut robot = ready(1);
+        robot.rig.servo_wire().record();
+        carry_out(&mut robot, command);
+        let writes = writes(&robot);
+        let written: Vec<String> = writes
+            .iter()
+            .map(|packet| {
+                let bytes: Vec<String> = packet.iter().map(|byte| format!("{byte:02X}")).collect();
+                bytes.join(" ")
+            })
+            .collect();
+        let count = golden.len();
+        assert!(written.len() >= count, "{command:?}: {written:#?}");
+        assert_eq!(written[..count], *golden, "{command:?}");
+        if command != ArmCommand::Squeeze {
+            assert_eq!(written.len(), count, "{command:?} writes no more");
+        }
+        assert_eq!(robot.rig.servo_wire().strange_bytes(), 0);
+    }
+}
+
+#[test]
+fn no_byte_of_an_answer_is_lost_while_words_come_in() {
+    let mut robot = ready(1);
+    carry_out(&mut robot, ArmCommand::Drop);
+    let chip = robot.rig.chip(Board::Steering);
+    assert_eq!(chip.overruns(UsartId::One), 0);
+}
+
+#[test]
+fn an_arm_command_is_refused_while_the_robot_drives() {
+    let mut robot = ready(2);
+    robot.wheels(WheelCommand::ManualForward);
+    robot.run(Duration::from_millis(100));
+    robot.rig.servo_wire().record();
+    robot.rig.take_motor_changes();
+    let seq = robot
+        .steering
+        .order(&mut robot.rig, Command::Arm(ArmCommand::Left));
+    robot.run(Duration::from_millis(50));
+    let report = robot.report();
+    assert_eq!(report.finished_seq, seq);
+    assert!(
+        report
+            .flags
+            .contains(SteerFlags::REFUSED.with(SteerFlags::ARM_LOCKED))
+    );
+    assert_eq!(robot.rig.take_motor_changes(), [], "it drives on");
+    assert_eq!(writes(&robot), Vec::<Vec<u8>>::new());
+}
+
+#[test]
+fn an_unplugged_servo_holds_up_nobody_for_long() {
+    let mut robot = ready(3);
+    robot.rig.world_mut().servos().set_present(3, false);
+    let flags = carry_out(&mut robot, ArmCommand::Up);
+    assert!(flags.contains(SteerFlags::ABORTED), "it needs servo 3");
+    assert_eq!(robot.report().servo_errors, 1 << 2);
+    let flags = carry_out(&mut robot, ArmCommand::Left);
+    assert!(!flags.contains(SteerFlags::ABORTED), "servo 1 works");
+    assert!(robot.steering_status().servo_timeouts > 0);
+    // Plugged in again it is brought into service in its turn.
+    robot.rig.world_mut().servos().set_present(3, true);
+    robot.run(Duration::from_secs(3));
+    assert_eq!(robot.report().servo_errors, 0);
+    let flags = carry_out(&mut robot, ArmCommand::Up);
+    assert!(!flags.contains(SteerFlags::ABORTED));
+}
+
+#[test]
+fn answers_with_a_bad_checksum_are_no_answers() {
+    let mut robot = ready(4);
+    let fault = ServoFault {
+        garbled: true,
+        ..ServoFault::default()
+    };
+    robot.rig.world_mut().servos().set_fault(1, fault);
+    let flags = carry_out(&mut robot, ArmCommand::Left);
+    assert!(flags.contains(SteerFlags::ABORTED));
+    assert_eq!(robot.report().servo_errors, 1);
+    let flags = carry_out(&mut robot, ArmCommand::Clockwise);
+    assert!(!flags.contains(SteerFlags::ABORTED), "servo 7 works");
+}
+
+#[test]
+fn an_overloaded_servo_is_told_of_and_the_others_work() {
+    let mut robot = ready(5);
+    let fault = ServoFault {
+        errors: ErrorBits::OVERLOAD,
+        ..ServoFault::default()
+    };
+    robot.rig.world_mut().servos().set_fault(2, fault);
+    carry_out(&mut robot, ArmCommand::Up);
+    assert_eq!(robot.report().servo_errors, 1 << 1);
+    let flags = carry_out(&mut robot, ArmCommand::Out);
+    assert!(!flags.contains(SteerFlags::ABORTED), "the elbow works");
+    robot
+        .rig
+        .world_mut()
+        .servos()
+        .set_fault(2, ServoFault::default());
+    robot.run(Duration::from_secs(3));
+    assert_eq!(robot.report().servo_errors, 0);
+}
+
+#[test]
+fn an_arm_command_is_broken_off_by_a_silent_pi() {
+    let mut robot = ready(6);
+    let drop = Command::Arm(ArmCommand::Drop);
+    let seq = robot.steering.order(&mut robot.rig, drop);
+    robot.run(Duration::from_millis(300));
+    assert!(robot.report().flags.contains(SteerFlags::BUSY));
+    robot.steering.fall_silent();
+    robot.run(Duration::from_millis(400));
+    let report = robot.report();
+    assert_eq!(report.finished_seq, seq);
+    assert!(report.flags.contains(SteerFlags::ABORTED));
+}

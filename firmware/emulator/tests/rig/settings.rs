@@ -1,0 +1,74 @@
+//! Settings at run time, and what is left of them without power.
+
+use std::time::Duration;
+
+use lager_emulator::rig::Board;
+use lager_wire::{Payload, Setting, SettingKey, SettingReply, SettingStatus};
+
+use crate::support::Robot;
+
+/// Bytes of EEPROM the boards use.
+const USED: usize = 64;
+
+/// Sends a setting to the steering board; its answer.
+fn set(robot: &mut Robot, value: i16) -> SettingReply {
+    let setting = Setting {
+        key: SettingKey::GainP,
+        seq: 5,
+        value,
+    };
+    robot.steering.packets.clear();
+    robot
+        .steering
+        .send(&mut robot.rig, Payload::Setting(setting));
+    robot.run(Duration::from_millis(400));
+    let answer = robot
+        .steering
+        .packets
+        .iter()
+        .find_map(|arrived| match arrived.packet.payload {
+            Payload::SettingReply(reply) => Some(reply),
+            _ => None,
+        });
+    answer.expect("the board answers")
+}
+
+/// The gain in force, found out by asking for one that no board has.
+fn in_force(robot: &mut Robot) -> i16 {
+    let reply = set(robot, 300);
+    assert_eq!(reply.status, SettingStatus::OutOfRange);
+    reply.value
+}
+
+/// A robot whose steering board begins with this EEPROM.
+fn with_eeprom(content: &[u8]) -> Robot {
+    let mut robot = Robot::new(2);
+    robot.rig.chip(Board::Steering).set_eeprom(content);
+    robot.run(Duration::from_millis(500));
+    assert!(robot.steering.is_up());
+    robot
+}
+
+#[test]
+fn a_gain_outlives_the_power() {
+    let mut robot = Robot::up(1);
+    assert_eq!(in_force(&mut robot), 2, "the original's");
+    assert_eq!(set(&mut robot, 9).status, SettingStatus::Accepted);
+    let kept = robot.rig.chip(Board::Steering).eeprom(USED);
+    assert_ne!(kept, [0xFF; USED]);
+    assert_eq!(in_force(&mut with_eeprom(&kept)), 9);
+}
+
+#[test]
+fn a_damaged_eeprom_is_not_believed() {
+    let mut robot = Robot::up(3);
+    set(&mut robot, 9);
+    let kept = robot.rig.chip(Board::Steering).eeprom(USED);
+    let written = kept.iter().filter(|byte| **byte != 0xFF).count();
+    assert!(written > 0);
+    for place in (0..USED).filter(|place| kept[*place] != 0xFF) {
+        let mut damaged = kept.clone();
+        damaged[place] ^= 0x10;
+        assert_eq!(in_force(&mut with_eeprom(&damaged)), 2, "byte {place}");
+    }
+}

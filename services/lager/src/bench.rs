@@ -1,0 +1,92 @@
+//! `lager bench`: the scenarios of `benches/` for anybody, as a table or as JSON.
+//!
+//! Nothing is measured here; the same code runs under criterion and in the guard.
+
+use anyhow::{Context, Result};
+use lager_benches::{Mode, Options, Regime, fanout, hop, path};
+
+use crate::cli::{BenchArgs, Scenario};
+
+/// Measures and returns what is to be printed.
+pub fn run(args: &BenchArgs) -> Result<String> {
+    let options = options(args);
+    let (name, measured) = match args.scenario {
+        Scenario::Hop => ("hop", hop::measure(&options)),
+        Scenario::Path => ("path", path::measure(&options)),
+        Scenario::Fanout => ("fanout", fanout::measure(&options)),
+    };
+    let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
+    Ok(if args.json {
+        report.to_json()
+    } else {
+        report.to_string().trim_end().to_owned()
+    })
+}
+
+/// What was not chosen is measured in full.
+fn options(args: &BenchArgs) -> Options {
+    let or_all = |chosen: &[Mode]| {
+        let all = Mode::ALL.into_iter();
+        all.filter(|mode| chosen.is_empty() || chosen.contains(mode))
+            .collect()
+    };
+    Options {
+        runs: args.runs,
+        quick: args.quick,
+        modes: or_all(&args.mode),
+        regimes: Regime::ALL
+            .into_iter()
+            .filter(|regime| args.regime.is_empty() || args.regime.contains(regime))
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::{Cli, Command};
+
+    fn parsed(flags: &[&str]) -> Result<BenchArgs, clap::Error> {
+        let words = ["lager", "bench"].iter().chain(flags);
+        Cli::try_parse_from(words).map(|cli| match cli.command {
+            Command::Bench(args) => args,
+            other => unreachable!("{other:?}"),
+        })
+    }
+
+    #[test]
+    fn what_is_not_chosen_is_measured_in_full_and_a_choice_once() {
+        let all = options(&parsed(&["hop"]).expect("valid"));
+        assert_eq!(all, Options::default());
+        let args = parsed(&[
+            "hop",
+            "--runs",
+            "9",
+            "--mode",
+            "block,spin",
+            "--mode",
+            "block",
+            "--regime",
+            "no-halt",
+        ]);
+        let some = options(&args.expect("valid"));
+        assert_eq!(some.runs, 9);
+        assert_eq!(some.modes, [Mode::Spin, Mode::Block]);
+        assert_eq!(some.regimes, [Regime::NoHalt]);
+    }
+
+    #[test]
+    fn wrong_choices_say_what_there_is() {
+        for (flags, words) in [
+            (&["leap"][..], "hop, path, fanout"),
+            (&["hop", "--mode", "busy"], "spin, adaptive or block"),
+            (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
+            (&["hop", "--runs", "0"], "the least"),
+        ] {
+            let said = parsed(flags).expect_err("wrong").to_string();
+            assert!(said.contains(words), "{said}");
+        }
+    }
+}

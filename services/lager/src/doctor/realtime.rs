@@ -1,0 +1,356 @@
+//! What `lager doctor` finds out about real time: what `lager up` would be granted, tried for
+//! real, and what in this machine's settings makes reactions late.
+//!
+//! What was asked for and is refused is bad; what nobody asked for is at most a hint.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use lager_topics::Role;
+
+use super::Finding::{self, Bad, Good, Hint};
+use crate::config::{Config, RealtimeSection, Waiting};
+use crate::realtime::{self, RealtimeError, Wanted};
+
+/// The priority that is tried where none is configured.
+const SUGGESTED_PRIORITY: u8 = 20;
+/// The priority of the kernel's interrupt threads on `PREEMPT_RT`.
+const INTERRUPT_PRIORITY: u8 = 50;
+/// An idle core that takes longer than this to come back shows in a hop, in µs.
+const LATE_IDLE_US: u64 = 20;
+/// The kernel's default slack, in ns.
+const USUAL_SLACK_NS: u64 = 50_000;
+
+/// All of them, each with its name.
+pub fn findings(config: &Config) -> Vec<(&'static str, Finding)> {
+    let cpus = Path::new("/sys/devices/system/cpu");
+    vec![
+        ("real time", priority(config.realtime.priority)),
+        ("locked memory", memory(config.realtime.lock_memory)),
+        ("cores", cores(config)),
+        ("waiting", waiting(config)),
+        ("real-time share", share(realtime::throttle(), config)),
+        ("core speed", governor(&governors(cpus))),
+        ("core idling", idling(&idle_states(cpus))),
+        ("timer slack", slack()),
+    ]
+}
+
+fn priority(configured: u8) -> Finding {
+    let tried = if configured == 0 {
+        SUGGESTED_PRIORITY
+    } else {
+        configured
+    };
+    let wanted = Wanted {
+        priority: tried,
+        ..Wanted::default()
+    };
+    let preemptible = rustix::system::uname()
+        .version()
+        .to_string_lossy()
+        .contains("PREEMPT_RT");
+    match (wanted.rehearse(), configured) {
+        (Ok(()), INTERRUPT_PRIORITY..) if preemptible => Hint(format!(
+            "priority {tried} is granted, but it goes before the interrupt threads (at {INTERRUPT_PRIORITY}) that bring the boards' bytes; choose one below"
+        )),
+        (Ok(()), 0) => Good(format!(
+            "not used, but granted: `lager up --realtime {tried}` keeps other load from delaying the robot"
+        )),
+        (Ok(()), _) => Good(format!("priority {tried} is granted")),
+        (Err(error), 0) => unasked(&format!("--realtime {tried}"), &error),
+        (Err(error), _) => Bad(error.to_string()),
+    }
+}
+
+fn memory(configured: bool) -> Finding {
+    let wanted = Wanted {
+        lock_memory: true,
+        ..Wanted::default()
+    };
+    match (wanted.rehearse(), configured) {
+        (Ok(()), true) => Good("each service may lock what it needs".into()),
+        (Ok(()), false) => Good(
+            "not used, but granted: with `lager up --lock-memory` no part of a service is ever paged out"
+                .into(),
+        ),
+        (Err(error), true) => Bad(error.to_string()),
+        (Err(error), false) => unasked("--lock-memory", &error),
+    }
+}
+
+/// What is refused, but was not asked for either.
+fn unasked(flag: &str, error: &RealtimeError) -> Finding {
+    Hint(format!("not used; with {flag}: {error}"))
+}
+
+fn cores(config: &Config) -> Finding {
+    for role in [Role::Bridge, Role::Logic, Role::Simulator] {
+        let wanted = Wanted {
+            cores: config.realtime.wanted(role).cores,
+            ..Wanted::default()
+        };
+        if let Err(error) = wanted.rehearse() {
+            return Bad(error.to_string());
+        }
+    }
+    let existing = realtime::existing_cores();
+    match realtime::allowed_cores() {
+        Err(error) => Bad(error.to_string()),
+        Ok(allowed) if allowed.len() < existing.len() => Good(format!(
+            "this process may use {allowed} of the machine's {existing}"
+        )),
+        Ok(allowed) if allowed.len() == 1 => Hint(
+            "there is only one: whatever else runs delays the robot unless it has a real-time priority"
+                .into(),
+        ),
+        Ok(allowed) => Good(format!("{allowed} may be used, {} in all", allowed.len())),
+    }
+}
+
+fn waiting(config: &Config) -> Finding {
+    if config.bus.waiting != Waiting::Spin {
+        return Good("services sleep when nothing comes".into());
+    }
+    let roles = RealtimeSection::ON_PATH.map(|role| config.realtime.wanted(role).cores);
+    let allowed = match realtime::allowed_cores() {
+        Ok(allowed) => allowed,
+        Err(error) => return Bad(error.to_string()),
+    };
+    match realtime::refuse_starvation(&roles, &allowed) {
+        Err(error) if config.realtime.priority > 0 => Bad(error.to_string()),
+        Err(_) => Hint(format!(
+            "waiting = \"spin\" keeps {} cores busy and leaves too few of {allowed} for the rest; waiting = \"adaptive\" is as fast while samples come fast",
+            roles.len()
+        )),
+        Ok(()) => Good(format!(
+            "waiting = \"spin\" keeps {} of the cores {allowed} busy for good",
+            roles.len()
+        )),
+    }
+}
+
+/// What the kernel lets real-time threads take.
+fn share(throttle: Option<(i64, i64)>, config: &Config) -> Finding {
+    let spins = config.bus.waiting == Waiting::Spin && config.realtime.priority > 0;
+    match throttle {
+        None => Good("the kernel has no limit on real-time threads that could be read".into()),
+        Some((0, _)) => {
+            let text = "real-time threads get no time at all; `sysctl kernel.sched_rt_runtime_us=950000` gives them the usual 95 %";
+            if config.realtime.priority > 0 {
+                Bad(text.into())
+            } else {
+                Hint(text.into())
+            }
+        }
+        Some((runtime, period)) if runtime < 0 || runtime >= period => {
+            if spins {
+                Hint(
+                    "a spinning service keeps its core for good: before Linux 6.12 nothing is reserved for others; `sysctl kernel.sched_rt_runtime_us=950000` gives them 5 %"
+                        .into(),
+                )
+            } else {
+                Good("real-time threads may take all of a core's time".into())
+            }
+        }
+        Some((runtime, period)) => {
+            let (runtime, period) = (runtime / 1000, period / 1000);
+            if spins {
+                Hint(format!(
+                    "a spinning service loses its core for {} of every {period} ms when others want it; isolcpus= on the kernel's command line keeps them away from that core",
+                    period - runtime
+                ))
+            } else {
+                Good(format!(
+                    "real-time threads may take {runtime} of every {period} ms, more than services that sleep ever do"
+                ))
+            }
+        }
+    }
+}
+
+/// Each core's governor of its clock frequency, where it has one.
+fn governors(cpus: &Path) -> Vec<String> {
+    folders(cpus, "cpu")
+        .iter()
+        .filter_map(|cpu| line(&cpu.join("cpufreq/scaling_governor")))
+        .collect()
+}
+
+fn governor(governors: &[String]) -> Finding {
+    match governors.iter().find(|governor| *governor != "performance") {
+        None if governors.is_empty() => {
+            Good("the clock's frequency is not this kernel's to choose".into())
+        }
+        None => Good("every core keeps its full clock (performance)".into()),
+        Some(other) => Hint(format!(
+            "cores run under `{other}`, so the clock rises only once there has been load; `cpupower frequency-set -g performance` keeps it up"
+        )),
+    }
+}
+
+/// A state in which an idle core rests.
+#[derive(Debug)]
+struct IdleState {
+    name: String,
+    exit_us: u64,
+}
+
+/// The states of the first core that are in use.
+fn idle_states(cpus: &Path) -> Vec<IdleState> {
+    folders(&cpus.join("cpu0/cpuidle"), "state")
+        .iter()
+        .filter(|state| line(&state.join("disable")).is_none_or(|disable| disable == "0"))
+        .filter_map(|state| {
+            Some(IdleState {
+                name: line(&state.join("name"))?,
+                exit_us: line(&state.join("latency"))?.parse().ok()?,
+            })
+        })
+        .collect()
+}
+
+fn idling(states: &[IdleState]) -> Finding {
+    match states.iter().max_by_key(|state| state.exit_us) {
+        None => Good("how cores rest is not shown by this kernel".into()),
+        Some(deepest) if deepest.exit_us > LATE_IDLE_US => Hint(format!(
+            "a core that rests in `{}` needs {} µs to come back, which every wake pays that meets it; `cpupower idle-set -D {LATE_IDLE_US}` turns off what is slower than {LATE_IDLE_US} µs, for more power drawn",
+            deepest.name, deepest.exit_us
+        )),
+        Some(deepest) => Good(format!(
+            "an idle core comes back within {} µs as far as this kernel knows (a virtual machine's host may take longer)",
+            deepest.exit_us
+        )),
+    }
+}
+
+fn slack() -> Finding {
+    match rustix::thread::current_timer_slack() {
+        Ok(slack) if slack > USUAL_SLACK_NS => Hint(format!(
+            "time-outs may be {} µs late because this shell was started so; services at a real-time priority are exempt",
+            slack / 1000
+        )),
+        Ok(slack) => Good(format!(
+            "time-outs may be {} µs late, none at a real-time priority",
+            slack / 1000
+        )),
+        Err(error) => Good(format!("not known ({error})")),
+    }
+}
+
+/// The folders of `parent` that are named `prefix` and a number.
+fn folders(parent: &Path, prefix: &str) -> Vec<PathBuf> {
+    fs::read_dir(parent)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| {
+            path.file_name()
+                .and_then(|name| name.to_str()?.strip_prefix(prefix))
+                .is_some_and(|number| number.parse::<u32>().is_ok())
+        })
+        .collect()
+}
+
+fn line(file: &Path) -> Option<String> {
+    Some(fs::read_to_string(file).ok()?.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(finding: &Finding) -> (&'static str, &str) {
+        match finding {
+            Good(text) => ("good", text),
+            Hint(text) => ("hint", text),
+            Bad(text) => ("bad", text),
+        }
+    }
+
+    fn config(text: &str) -> Config {
+        toml::from_str(text).expect("valid TOML")
+    }
+
+    #[test]
+    fn the_kernels_limit_matters_to_those_who_spin_and_none_at_all_to_those_who_asked() {
+        let plain = config("");
+        let sleeping = config("[realtime]\npriority = 20");
+        let spinning = config("[realtime]\npriority = 20\n[bus]\nwaiting = \"spin\"");
+        for (throttle, config, expected) in [
+            (
+                (950_000, 1_000_000),
+                &sleeping,
+                ("good", "950 of every 1000 ms"),
+            ),
+            (
+                (950_000, 1_000_000),
+                &spinning,
+                ("hint", "50 of every 1000 ms"),
+            ),
+            ((-1, 1_000_000), &sleeping, ("good", "all of a core")),
+            ((-1, 1_000_000), &spinning, ("hint", "for good")),
+            ((0, 1_000_000), &sleeping, ("bad", "950000")),
+            ((0, 1_000_000), &plain, ("hint", "950000")),
+        ] {
+            let finding = share(Some(throttle), config);
+            let (mark, text) = said(&finding);
+            assert_eq!(mark, expected.0, "{throttle:?}: {text}");
+            assert!(text.contains(expected.1), "{throttle:?}: {text}");
+        }
+    }
+
+    #[test]
+    fn slow_clocks_and_deep_rest_are_hints_with_a_command() {
+        let folder = std::env::temp_dir().join(format!("lager-doctor-{}", std::process::id()));
+        let write = |file: &str, text: &str| {
+            let file = folder.join(file);
+            fs::create_dir_all(file.parent().expect("a folder")).expect("a temporary folder");
+            fs::write(file, text).expect("a temporary file");
+        };
+        for (state, name, latency, disable) in [
+            (0, "POLL", 0, 0),
+            (1, "C1", 2, 0),
+            (2, "C6", 133, 0),
+            (3, "C10", 900, 1),
+        ] {
+            let at = |file| format!("cpu0/cpuidle/state{state}/{file}");
+            write(&at("name"), &format!("{name}\n"));
+            write(&at("latency"), &format!("{latency}\n"));
+            write(&at("disable"), &format!("{disable}\n"));
+        }
+        write("cpu0/cpufreq/scaling_governor", "performance\n");
+        write("cpu1/cpufreq/scaling_governor", "ondemand\n");
+        write("cpufreq/policy0/scaling_governor", "not a core\n");
+
+        let finding = idling(&idle_states(&folder));
+        let (mark, text) = said(&finding);
+        assert_eq!(mark, "hint");
+        assert!(
+            text.contains("`C6` needs 133 µs") && text.contains("idle-set -D"),
+            "{text}"
+        );
+
+        let finding = governor(&governors(&folder));
+        let (mark, text) = said(&finding);
+        assert_eq!(mark, "hint");
+        assert!(
+            text.contains("`ondemand`") && text.contains("frequency-set"),
+            "{text}"
+        );
+
+        write("cpu1/cpufreq/scaling_governor", "performance\n");
+        assert_eq!(said(&governor(&governors(&folder))).0, "good");
+        assert_eq!(said(&governor(&[])).0, "good");
+        assert_eq!(said(&idling(&[])).0, "good");
+        fs::remove_dir_all(folder).expect("a temporary folder");
+    }
+
+    #[test]
+    fn a_core_that_is_not_there_is_bad_for_real_time_or_not() {
+        let finding = cores(&config("[realtime]\ncores = { logic = [1000] }"));
+        let (mark, text) = said(&finding);
+        assert_eq!(mark, "bad");
+        assert!(text.contains("no core 1000"), "{text}");
+    }
+}

@@ -1,0 +1,128 @@
+//! The guard notices: with a deliberate slow-down in what it measures it fails and names the right
+//! figure, and without one the same build passes.
+//!
+//! Each test runs `benches/guard` as people do. A slow-down adds to what is measured at all times,
+//! so a test that wants the guard to fail cannot be disturbed by whatever else the machine does;
+//! that unchanged code keeps its ratios is for `.ci/run` to show, which runs the guard itself.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// What the guard said.
+struct Said {
+    code: Option<i32>,
+    failing: Vec<String>,
+    everything: String,
+}
+
+fn guard(arguments: &[&str]) -> Said {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let output = Command::new(root.join("benches/guard"))
+        .args(arguments)
+        .arg("--json")
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let everything = format!("{text}{}", String::from_utf8_lossy(&output.stderr));
+    let findings: Value = serde_json::from_str(&text).unwrap_or_default();
+    let failing = findings["limits"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter(|limit| limit["verdict"] == "broken" || limit["verdict"] == "missing")
+        .map(|limit| limit["figure"].as_str().unwrap().to_owned())
+        .collect();
+    Said {
+        code: output.status.code(),
+        failing,
+        everything,
+    }
+}
+
+/// The guard with a slow-down, which fails and names all of `figures`.
+fn trips(slow: &str, only: &str, figures: &[&str]) {
+    let said = guard(&[
+        "--slow",
+        slow,
+        "--only",
+        only,
+        "--runs",
+        "1",
+        "--attempts",
+        "2",
+    ]);
+    assert_eq!(said.code, Some(1), "{}", said.everything);
+    for figure in figures {
+        assert!(
+            said.failing
+                .iter()
+                .any(|failing| failing.starts_with(figure)),
+            "{figure} is not among the failing:\n{}",
+            said.everything
+        );
+    }
+}
+
+#[test]
+fn an_allocation_beside_each_sample_is_noticed() {
+    let unchanged = guard(&["--slow", "none", "--only", "instructions"]);
+    assert_eq!(unchanged.code, Some(0), "{}", unchanged.everything);
+    assert!(unchanged.failing.is_empty(), "{}", unchanged.everything);
+    if unchanged
+        .everything
+        .contains("limits were measured with rustc")
+    {
+        // The checked-in counts are another compiler's and leave room for more than an
+        // allocation, so they say nothing here. `.ci/run` has the compiler they are for.
+        eprintln!("not judged: {}", unchanged.everything);
+        return;
+    }
+    trips(
+        "allocation",
+        "instructions",
+        &["publish/to-1", "receive/sample"],
+    );
+}
+
+#[test]
+fn a_spin_of_five_microseconds_in_the_hop_is_noticed() {
+    trips(
+        "spin",
+        "hop",
+        &[
+            "hop spin plain: lager / iceoryx2/header p50",
+            "hop block same-core: lager / iceoryx2/event p50",
+        ],
+    );
+}
+
+#[test]
+fn a_system_call_for_each_observer_is_noticed() {
+    trips(
+        "system-call",
+        "hop,fanout",
+        &[
+            "ring-64 block same-core: lager/ring / iceoryx2/notify p50",
+            "publish-64 spin plain: lager / iceoryx2/header p50",
+        ],
+    );
+}
+
+#[test]
+fn a_slow_down_that_does_not_exist_is_refused() {
+    let said = guard(&["--slow", "everything"]);
+    assert_eq!(said.code, Some(2), "{}", said.everything);
+}
+
+#[test]
+fn a_source_without_limits_is_refused() {
+    let said = guard(&["--only", "weather"]);
+    assert_eq!(said.code, Some(2), "{}", said.everything);
+    assert!(
+        said.everything.contains("instructions"),
+        "{}",
+        said.everything
+    );
+}

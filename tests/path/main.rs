@@ -1,0 +1,249 @@
+//! The path from a sensor frame to a steering command, with bridge and logic as processes of
+//! their own under `strace`: what each hop asks of the kernel, what the stamps tell, and what
+//! `latency/path` counts.
+//!
+//! The navigator gives a new order for each frame here: it takes line frames for old at once, so a
+//! distance frame after a line frame halts the robot, and the next line frame sets it going.
+
+mod boards;
+mod robot;
+mod strace;
+
+use std::io::Read;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+use lager_bridge::BridgeConfig;
+use lager_logic::LogicConfig;
+use lager_ports::{Bus, BusConfig, Shutdown};
+use lager_tests::Domain;
+use lager_topics::{Role, SensorDistance, SensorLine, Topic};
+
+use robot::Robot;
+use strace::{Calls, Part};
+
+const PREFIX: &str = "LAGER_PATH_TEST_PREFIX";
+const ROOT: &str = "LAGER_PATH_TEST_ROOT";
+const PORTS: &str = "LAGER_PATH_TEST_PORTS";
+
+/// Commands to be seen.
+const COMMANDS: u64 = 400;
+
+/// Runs one service in a thread of its own until the standard input closes.
+fn play(name: &str, role: Role, service: impl FnOnce(&Bus, &Shutdown) + Send) {
+    let Ok(prefix) = std::env::var(PREFIX) else {
+        return;
+    };
+    let config = BusConfig {
+        prefix: Some(prefix),
+        root: std::env::var(ROOT).ok().map(PathBuf::from),
+        ..BusConfig::default()
+    };
+    let shutdown = Shutdown::new();
+    std::thread::scope(|scope| {
+        std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn_scoped(scope, || {
+                let bus = Bus::open(&config, role).expect("the bus opens");
+                service(&bus, &shutdown);
+            })
+            .expect("a thread");
+        let _ = std::io::stdin().read_to_end(&mut Vec::new());
+        shutdown.request();
+    });
+}
+
+#[test]
+#[ignore = "a part that the other tests start"]
+fn bridge() {
+    play("bridge-loop", Role::Bridge, |bus, shutdown| {
+        let ports = std::env::var(PORTS).expect("two ports");
+        let (sensor, steering) = ports.split_once(':').expect("two ports");
+        let config = BridgeConfig {
+            ports: [sensor.into(), steering.into()],
+            ..BridgeConfig::default()
+        };
+        lager_bridge::run(bus, &config, shutdown).expect("the bridge");
+    });
+}
+
+#[test]
+#[ignore = "a part that the other tests start"]
+fn logic() {
+    play("logic-loop", Role::Logic, |bus, shutdown| {
+        let config = LogicConfig {
+            blind_after: Duration::ZERO,
+            ..LogicConfig::default()
+        };
+        lager_logic::run(bus, &config, shutdown).expect("logic");
+    });
+}
+
+/// That something was done at most so often. A ring can end two sleeps: the ringer adds to the
+/// word, the sleeper sees that on its way to sleep and comes back, and the ringer's wake-up call
+/// meets the next sleep. That is rare, so one call in fifty is let pass.
+#[track_caller]
+fn at_most(limit: u64, actual: u64, what: &str, calls: &Calls) {
+    assert!(
+        actual <= limit + limit / 50 + 2,
+        "{what}: {actual}, at most {limit} are needed; {calls:?}"
+    );
+}
+
+#[test]
+fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
+    let domain = Domain::new();
+    let mut robot = Robot::start(&domain, true);
+    robot.frames(20);
+
+    let before = robot.seen.samples();
+    let (written, reports) = (robot.boards.written, robot.boards.reports);
+    let from = SystemTime::now();
+    robot.frames(COMMANDS);
+    let to = SystemTime::now();
+    let after = robot.seen.samples();
+    let written = robot.boards.written - written;
+    let reports = robot.boards.reports - reports;
+    let frames = after.frames - before.frames;
+    let orders = after.orders - before.orders;
+    let states = after.states - before.states;
+    let lapsed = after.lapsed - before.lapsed;
+
+    let calls = |part: &Part, thread: &str| {
+        let threads = part.threads();
+        let id = threads
+            .get(thread)
+            .unwrap_or_else(|| panic!("no thread {thread} in {threads:?}"));
+        let calls = part.calls(id, from, to);
+        println!("{thread}: {calls:?}");
+        assert!(calls.others.is_empty(), "{thread}: {:?}", calls.others);
+        calls
+    };
+    println!("{frames} frames, {orders} orders, {written} packets, {states} states");
+    // Now and then a report or an idle moment is faster than a frame and takes its place.
+    assert!(frames.min(orders).min(written) + reports >= COMMANDS);
+
+    // Sleeping for the port, reading it, ringing logic.
+    let reader = calls(&robot.bridge, "sensor-port");
+    at_most(frames, reader.polls, "waits for the sensor port", &reader);
+    at_most(frames, reader.reads, "reads of the sensor port", &reader);
+    at_most(frames, reader.wakes, "rings for a frame", &reader);
+    assert_eq!((reader.sleeps, reader.writes), (0, 0), "{reader:?}");
+    assert!(reader.reads + 2 >= frames, "strace has seen every read");
+
+    // Sleeping for a ring, ringing the bridge.
+    let logic = calls(&robot.logic, "logic-loop");
+    at_most(frames + states, logic.sleeps, "sleeps of logic", &logic);
+    at_most(orders, logic.wakes, "rings for an order", &logic);
+    assert_eq!(
+        (logic.polls, logic.reads, logic.writes),
+        (0, 0, 0),
+        "{logic:?}"
+    );
+
+    // Sleeping for a ring, writing the port; ringing logic for reports alone.
+    let bridge = calls(&robot.bridge, "bridge-loop");
+    at_most(
+        orders + reports,
+        bridge.sleeps,
+        "sleeps of the bridge",
+        &bridge,
+    );
+    at_most(states, bridge.wakes, "rings for a report", &bridge);
+    at_most(written, bridge.writes, "writes of a packet", &bridge);
+    at_most(reports + lapsed, states, "reports published", &bridge);
+    assert_eq!((bridge.polls, bridge.reads), (0, 0), "{bridge:?}");
+    assert!(bridge.writes + 2 >= written, "strace has seen every write");
+
+    let reports_reader = calls(&robot.bridge, "steering-port");
+    at_most(
+        reports,
+        reports_reader.reads,
+        "reads of a report",
+        &reports_reader,
+    );
+    at_most(
+        reports,
+        reports_reader.wakes,
+        "rings for a report",
+        &reports_reader,
+    );
+
+    robot.end();
+    domain.assert_clean();
+}
+
+#[test]
+fn a_command_tells_its_way_and_only_what_a_frame_has_caused_counts() {
+    let domain = Domain::new();
+    let mut robot = Robot::start(&domain, false);
+    robot.frames(COMMANDS);
+    // Without frames logic halts by the clock and renews its order; a report now and then.
+    let counted = robot.seen.last.since_start;
+    let sent = robot.seen.sent;
+    robot.step_until("the order has been renewed for a while", |robot| {
+        robot.seen.sent >= sent + 20 && robot.seen.last.since_start > counted
+    });
+    robot.step_until("a window without frames is told", |robot| {
+        robot.seen.last.total.count == 0
+    });
+
+    assert_eq!(robot.seen.missed(), 0, "every order is seen");
+    let caused: Vec<_> = robot
+        .seen
+        .orders
+        .iter()
+        .filter(|stamp| [SensorLine::ID, SensorDistance::ID].contains(&stamp.cause_topic))
+        .collect();
+    // A report that comes at the very moment of a distance frame halts the robot in its place.
+    assert!(caused.len() as u64 + robot.boards.reports >= COMMANDS);
+    for stamp in &caused {
+        let way = [
+            stamp.source_time_ns,
+            stamp.cause_publish_time_ns,
+            stamp.cause_receive_time_ns,
+            stamp.publish_time_ns,
+        ];
+        assert!(way.is_sorted(), "{stamp:?}");
+        let within = |[sent, read]: &[u64; 2]| *sent <= way[0] && way[3] <= *read;
+        assert!(robot.spans.iter().any(within), "at no frame: {stamp:?}");
+    }
+    // Renewals say nothing of a cause, and an order that halts a robot that sees no frames none
+    // of a frame.
+    assert!(robot.seen.sent > caused.len() as u64);
+    assert!(robot.seen.orders.len() > caused.len());
+
+    // A report that comes right after a line frame can replace the frame's order before it is
+    // written.
+    let counted = robot.seen.last.since_start;
+    let replaced = caused.len() as u64 - counted;
+    assert!(
+        replaced <= robot.boards.reports,
+        "{counted} of {}",
+        caused.len()
+    );
+
+    let path = robot.seen.fullest;
+    let stages = [
+        path.read_publish,
+        path.publish_receive,
+        path.decide,
+        path.order_receive,
+        path.receive_write,
+    ];
+    println!("{path:#?}");
+    assert!(stages.iter().all(|stage| stage.count == path.total.count));
+    let means: u64 = stages.iter().map(|stage| stage.mean_ns).sum();
+    assert!(
+        means.abs_diff(path.total.mean_ns) <= 5,
+        "the stages are the whole"
+    );
+    let longest = robot.spans.iter().map(|[sent, read]| read - sent).max();
+    assert!(Some(path.total.max_ns) <= longest, "{longest:?}");
+
+    let shown = domain.run(&["topic", "echo", "latency/path", "--json", "--count", "1"]);
+    let shown: serde_json::Value = serde_json::from_slice(&shown.stdout).expect("a JSON line");
+    assert_eq!(shown["payload"]["since_start"], counted, "{shown}");
+    robot.end();
+    domain.assert_clean();
+}

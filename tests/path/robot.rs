@@ -1,0 +1,279 @@
+//! A robot whose bridge and logic are processes of their own, driven frame by frame, and what an
+//! observer sees of it on the bus.
+
+use std::time::{Duration, Instant};
+
+use lager_ports::{Bus, Cause, Clock, Publisher, Subscriber};
+use lager_tests::{Domain, WATCHDOG};
+use lager_topics::{
+    Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MapProduct, MissionOrder, Mode, NavMap,
+    NavStatus, Order, PathLatency, Phase, Role, SensorDistance, SensorLine, Side, Stamp,
+    SteeringCommand, SteeringState, WarehouseMap,
+};
+use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCommand};
+
+use crate::boards::Boards;
+use crate::strace::Part;
+use crate::{PORTS, PREFIX, ROOT};
+
+/// Between a command and the next frame: everybody sleeps again.
+const PAUSE: Duration = Duration::from_millis(3);
+
+/// After this a frame is taken for one that changed nothing.
+const UNANSWERED: Duration = Duration::from_secs(1);
+
+/// A robot that looks for its product on the first edge, with its wheels in the air.
+pub(crate) struct Robot {
+    // The services end before their boards, and everything before the bus.
+    pub(crate) bridge: Part,
+    pub(crate) logic: Part,
+    pub(crate) boards: Boards,
+    pub(crate) seen: Seen,
+    map: Publisher<NavMap>,
+    orders: Publisher<MissionOrder>,
+    operator: Bus,
+    /// From before each answered frame was sent until after its command was read, in ns.
+    pub(crate) spans: Vec<[u64; 2]>,
+}
+
+/// What an observer has seen on the bus.
+pub(crate) struct Seen {
+    commands: Subscriber<SteeringCommand>,
+    line: Subscriber<SensorLine>,
+    distance: Subscriber<SensorDistance>,
+    state: Subscriber<SteeringState>,
+    latency: Subscriber<LatencyPath>,
+    health: Subscriber<LinkHealth>,
+    /// Orders that ended because nobody renewed them in time: the machine was too busy.
+    lapsed: u32,
+    /// Stamps of the orders with a number of their own, in turn.
+    pub(crate) orders: Vec<Stamp>,
+    last_id: u32,
+    /// Samples on `steering/command`, renewals included.
+    pub(crate) sent: u64,
+    /// What `latency/path` said last, and what it said of its fullest window.
+    pub(crate) last: PathLatency,
+    pub(crate) fullest: PathLatency,
+}
+
+/// Samples published.
+#[derive(Clone, Copy)]
+pub(crate) struct Samples {
+    /// On `sensor/line` and `sensor/distance`.
+    pub(crate) frames: u64,
+    /// On `steering/command`, renewals included.
+    pub(crate) orders: u64,
+    /// On `steering/state`.
+    pub(crate) states: u64,
+    /// Orders that lapsed; the end of each is told on `steering/state`.
+    pub(crate) lapsed: u64,
+}
+
+impl Seen {
+    fn new(bus: &Bus) -> Self {
+        Self {
+            commands: bus.subscriber().expect("a topic"),
+            line: bus.subscriber().expect("a topic"),
+            distance: bus.subscriber().expect("a topic"),
+            state: bus.subscriber().expect("a topic"),
+            latency: bus.subscriber().expect("a topic"),
+            health: bus.subscriber().expect("a topic"),
+            lapsed: 0,
+            orders: Vec::new(),
+            last_id: 0,
+            sent: 0,
+            last: PathLatency::default(),
+            fullest: PathLatency::default(),
+        }
+    }
+
+    fn look(&mut self) {
+        while let Some(order) = self.commands.receive().expect("readable") {
+            self.sent += 1;
+            if order.id != self.last_id {
+                self.last_id = order.id;
+                self.orders.push(*order.stamp());
+            }
+        }
+        self.line.latest().expect("readable");
+        self.distance.latest().expect("readable");
+        self.state.latest().expect("readable");
+        if let Some(health) = self.health.latest().expect("readable") {
+            self.lapsed = health.leases_expired;
+        }
+        if let Some(path) = self.latency.latest().expect("readable") {
+            self.last = *path;
+            if path.total.count >= self.fullest.total.count {
+                self.fullest = *path;
+            }
+        }
+    }
+
+    /// Orders that came and went between two looks.
+    pub(crate) fn missed(&self) -> u64 {
+        self.commands.lost()
+    }
+
+    /// Samples so far.
+    pub(crate) fn samples(&self) -> Samples {
+        Samples {
+            frames: self.line.received()
+                + self.line.lost()
+                + self.distance.received()
+                + self.distance.lost(),
+            orders: self.sent + self.commands.lost(),
+            states: self.state.received() + self.state.lost(),
+            lapsed: self.lapsed.into(),
+        }
+    }
+}
+
+impl Robot {
+    pub(crate) fn start(domain: &Domain, traced: bool) -> Self {
+        let boards = Boards::new(domain.folder());
+        let bus = domain.bus("r1", 1.0);
+        let ports = boards
+            .ports
+            .each_ref()
+            .map(|port| port.to_str().expect("UTF-8"));
+        let environment = [
+            (PREFIX, bus.prefix.clone().expect("a prefix")),
+            (
+                ROOT,
+                bus.root.as_ref().expect("a root").display().to_string(),
+            ),
+            (PORTS, ports.join(":")),
+        ];
+        let part = |name: &str| {
+            let log = traced.then(|| domain.folder().join(format!("{name}.strace")));
+            let arguments = [name, "--exact", "--ignored", "--nocapture"];
+            Part::start(log, &arguments, &environment)
+        };
+        let operator = Bus::open(&bus, Role::Operator).expect("the bus opens");
+        let mut robot = Self {
+            bridge: part("bridge"),
+            logic: part("logic"),
+            boards,
+            seen: Seen::new(&domain.observe("r1", 1.0)),
+            map: operator.publisher().expect("a topic"),
+            orders: operator.publisher().expect("a topic"),
+            operator,
+            spans: Vec::new(),
+        };
+        robot.set_out();
+        robot
+    }
+
+    /// Brings both boards up, gives the map and the order, and waits until logic drives.
+    fn set_out(&mut self) {
+        let own = Cause::OWN;
+        self.map.send(own, one_square()).expect("sent");
+        let mut health = self.operator.subscriber::<LinkHealth>().expect("a topic");
+        self.step_until("both boards are up", |_| {
+            let health = health.latest().expect("readable");
+            health.is_some_and(|health| health.sensor.up != 0 && health.steering.up != 0)
+        });
+        let ask = Ask {
+            kind: AskKind::SetMode.into(),
+            mode: Mode::Autonomous.into(),
+            ..Ask::default()
+        };
+        let client = self.operator.client::<BridgeRequest>().expect("a request");
+        client
+            .call(ask, Duration::from_secs(30))
+            .expect("an answer");
+        let mut status = self.operator.subscriber::<NavStatus>().expect("a topic");
+        let mut asked = false;
+        self.step_until("logic looks for the product", |robot| {
+            robot.map.tick();
+            let phase = status
+                .latest()
+                .expect("readable")
+                .and_then(|status| status.phase.get());
+            if phase == Some(Phase::WaitingForOrder) && !asked {
+                asked = true;
+                let order = Order { id: 1, product: 1 };
+                robot.orders.send(own, order).expect("sent");
+            }
+            phase == Some(Phase::Approaching)
+        });
+        // Until a board has reported, the bridge tells in its place what it was told.
+        self.step_until("the board has reported", |robot| {
+            robot.seen.state.received() > 1
+        });
+        // The first sample of a topic is the one that connects its writer with the observer.
+        self.step_until("the path is told", |robot| {
+            robot.seen.latency.received() > 1
+        });
+    }
+
+    pub(crate) fn step_until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+        let give_up = Instant::now() + WATCHDOG;
+        while !done(self) {
+            assert!(Instant::now() < give_up, "waited in vain until {what}");
+            self.boards.step(Duration::from_millis(5));
+            self.seen.look();
+        }
+    }
+
+    /// Sends a frame that makes logic change its mind and waits for the command; whether it came.
+    fn frame(&mut self) -> bool {
+        let follows = |command: &SteerCommand| {
+            command.code == Command::Wheel(WheelCommand::ActiveForward).code()
+        };
+        // An idle moment or a report halts the robot as well.
+        let given = self.boards.commands.len();
+        let is_following = self.boards.commands.last().is_some_and(follows);
+        let sent_ns = Clock::monotonic_ns();
+        self.boards.send(if is_following {
+            Payload::Distance(Centimetres(200))
+        } else {
+            Payload::Line(LineState::OnLine)
+        });
+        let sent = Instant::now();
+        let mut answered = false;
+        while !answered && sent.elapsed() < UNANSWERED {
+            self.boards.step(Duration::from_millis(1));
+            self.seen.look();
+            let mut new = self.boards.commands[given..].iter();
+            answered = new.any(|command| follows(command) != is_following);
+        }
+        self.spans.push([sent_ns, Clock::monotonic_ns()]);
+        self.seen.look();
+        std::thread::sleep(PAUSE);
+        answered
+    }
+
+    /// Frames until so many commands have come.
+    pub(crate) fn frames(&mut self, commands: u64) {
+        let give_up = Instant::now() + WATCHDOG;
+        let mut seen = 0;
+        while seen < commands {
+            assert!(Instant::now() < give_up, "only {seen} commands came");
+            seen += u64::from(self.frame());
+        }
+    }
+
+    pub(crate) fn end(self) {
+        let Self { bridge, logic, .. } = self;
+        bridge.end();
+        logic.end();
+    }
+}
+
+/// A warehouse of one square: the product stands beside the edge the robot looks along.
+fn one_square() -> WarehouseMap {
+    let mut map = WarehouseMap {
+        width: 1,
+        height: 1,
+        side_length_cm: 50,
+        product_count: 1,
+        ..WarehouseMap::default()
+    };
+    map.products[0] = MapProduct {
+        id: 1,
+        side: Side::Down.into(),
+        ..MapProduct::default()
+    };
+    map
+}

@@ -1,0 +1,351 @@
+//! Real time as the kernel sees it: what `/proc` says of the services that `up` starts, of their
+//! successors after `kill -9`, and what people are told who lack the rights.
+//!
+//! Run by somebody who may not do the first, it checks that he is refused with a sentence.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use lager_tests::{Domain, Running, pid, wait_for};
+use rustix::process::{Resource, Signal, getrlimit, kill_process};
+use rustix::thread::{CapabilitySet, capabilities};
+
+/// The documented exit code of what is not granted.
+const NOT_GRANTED: Option<i32> = Some(5);
+
+/// What the kernel numbers `SCHED_OTHER` and `SCHED_FIFO`.
+const OTHER: u32 = 0;
+const FIFO: u32 = 1;
+
+/// How a thread is scheduled.
+#[derive(Debug, PartialEq, Eq)]
+struct Scheduled {
+    policy: u32,
+    priority: u32,
+    cores: String,
+}
+
+/// Every thread of a process; empty when it is gone.
+fn threads(process: u32) -> Vec<Scheduled> {
+    fs::read_dir(format!("/proc/{process}/task"))
+        .into_iter()
+        .flatten()
+        .filter_map(|task| {
+            let task = task.ok()?.path();
+            let stat = fs::read_to_string(task.join("stat")).ok()?;
+            // The name before it is in parentheses and may contain anything; proc(5) counts from
+            // 1, and the state that follows the name is field 3.
+            let fields: Vec<&str> = stat.rsplit(") ").next()?.split_whitespace().collect();
+            let field = |number: usize| fields[number - 3].parse().ok();
+            Some(Scheduled {
+                priority: field(40)?,
+                policy: field(41)?,
+                cores: status(&task, "Cpus_allowed_list")?,
+            })
+        })
+        .collect()
+}
+
+/// One line of a `status` file.
+fn status(process: &Path, name: &str) -> Option<String> {
+    let text = fs::read_to_string(process.join("status")).ok()?;
+    let line = text.lines().find(|line| line.starts_with(name))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+/// How many mappings of the bus a process has, and how many of them are locked.
+fn bus_mappings(process: u32) -> (usize, usize) {
+    let smaps = fs::read_to_string(format!("/proc/{process}/smaps")).unwrap_or_default();
+    let mut counts = (0, 0);
+    let mut of_the_bus = false;
+    for line in smaps.lines() {
+        match line.strip_prefix("VmFlags:") {
+            Some(flags) if of_the_bus => {
+                counts.0 += 1;
+                counts.1 += usize::from(flags.split_whitespace().any(|flag| flag == "lo"));
+            }
+            Some(_) => {}
+            // A mapping's first line begins with its addresses, each further one with a name.
+            None if line
+                .split(' ')
+                .next()
+                .is_some_and(|word| !word.ends_with(':')) =>
+            {
+                of_the_bus = line.contains("/dev/shm/");
+            }
+            None => {}
+        }
+    }
+    counts
+}
+
+/// The first and the last core of this process: the same one on a machine with one.
+fn two_cores() -> [String; 2] {
+    let list = status(Path::new("/proc/self"), "Cpus_allowed_list").expect("cores");
+    let end = |pick: fn(&str) -> Option<&str>| pick(&list).expect("a core").to_owned();
+    [
+        end(|list| list.split([',', '-']).next()),
+        end(|list| list.split([',', '-']).next_back()),
+    ]
+}
+
+/// Whether whoever runs this may use `priority` and lock as much memory as he likes.
+fn may_be_real_time(priority: u64) -> bool {
+    let effective = capabilities(None).expect("the kernel says").effective;
+    let unlimited = |resource, wanted| {
+        let limit = getrlimit(resource).maximum;
+        limit.is_none_or(|limit| limit >= wanted)
+    };
+    (effective.contains(CapabilitySet::SYS_NICE) || unlimited(Resource::Rtprio, priority))
+        && (effective.contains(CapabilitySet::IPC_LOCK) || unlimited(Resource::Memlock, 1 << 30))
+}
+
+/// The same command for a user without the rights, whoever runs this.
+fn without_rights(command: &Command) -> Command {
+    let mut poor;
+    if rustix::process::geteuid().is_root() {
+        let lost = "-sys_nice,-ipc_lock";
+        poor = Command::new("setpriv");
+        poor.args(["--bounding-set", lost, "--inh-caps", lost, "prlimit"]);
+    } else {
+        poor = Command::new("prlimit");
+    }
+    poor.args(["--rtprio=0", "--memlock=65536"])
+        .arg(command.get_program())
+        .args(command.get_args())
+        .current_dir(command.get_current_dir().expect("the domain's folder"));
+    for (name, value) in command.get_envs() {
+        poor.env(name, value.expect("only values are set"));
+    }
+    poor
+}
+
+/// Runs `lager` with `args` as a user without the rights.
+fn run_without_rights(domain: &Domain, args: &[&str]) -> Output {
+    without_rights(&domain.lager(args))
+        .output()
+        .expect("setpriv and prlimit of util-linux")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Waits until `service` is a process with all its threads on the bus, other than `before`.
+fn at_work(up: &Running, service: &str, before: Option<u32>) -> u32 {
+    // The bridge has a thread for each port and every child the one that ends it for certain.
+    let wanted = if service == "bridge" { 4 } else { 2 };
+    wait_for(service, || {
+        up.service(service)
+            .filter(|process| Some(*process) != before)
+            .filter(|process| threads(*process).len() >= wanted && bus_mappings(*process).0 > 0)
+    })
+}
+
+#[test]
+fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
+    let domain = Domain::new();
+    let [first, last] = two_cores();
+    let cores = [("bridge", &first), ("logic", &last)];
+    let flags = cores.map(|(service, core)| format!("{service}={core}"));
+    let args = [
+        "up",
+        "--realtime",
+        "20",
+        "--lock-memory",
+        "--core",
+        &flags[0],
+        "--core",
+        &flags[1],
+    ];
+    if !may_be_real_time(20) {
+        let refused = domain.run(&args);
+        assert_eq!(refused.status.code(), NOT_GRANTED, "{}", said(&refused));
+        return domain.assert_clean();
+    }
+    let up = domain.start(&args);
+    let mut before = [None; 2];
+    for life in 0..2 {
+        for (place, (service, core)) in cores.iter().enumerate() {
+            let process = at_work(&up, service, before[place]);
+            before[place] = Some(process);
+            for thread in threads(process) {
+                let wanted = Scheduled {
+                    policy: FIFO,
+                    priority: 20,
+                    cores: (*core).clone(),
+                };
+                assert_eq!(thread, wanted, "{service} in life {life}");
+            }
+            let (mapped, locked) = bus_mappings(process);
+            assert_eq!(mapped, locked, "{service} in life {life}");
+            let folder = format!("/proc/{process}");
+            let locked = status(Path::new(&folder), "VmLck").expect("a living process");
+            println!("{service}: {locked} locked");
+            let kib: u64 = locked
+                .split(' ')
+                .next()
+                .and_then(|kib| kib.parse().ok())
+                .expect("a size in kB");
+            // At most what people are told to allow.
+            assert!(
+                (1..=64 << 10).contains(&kib),
+                "{service} in life {life}: {locked}"
+            );
+        }
+        if life == 0 {
+            for process in before.into_iter().flatten() {
+                kill_process(pid(process), Signal::KILL).expect("a living service");
+            }
+        }
+    }
+    // What starts the services is no part of the path, nor is what stands for the boards.
+    let simulator = up.service("simulator").expect("a simulated robot");
+    for process in [up.pid(), simulator] {
+        let all = threads(process);
+        let normal = |thread: &Scheduled| (thread.policy, thread.priority) == (OTHER, 0);
+        assert!(!all.is_empty() && all.iter().all(normal), "{all:?}");
+    }
+    drop(up);
+    domain.assert_clean();
+}
+
+#[test]
+fn a_mission_is_delivered_in_real_time_with_locked_memory() {
+    if !may_be_real_time(20) {
+        return;
+    }
+    let domain = Domain::new();
+    let config = domain.folder().join("robot.toml");
+    fs::write(&config, "[realtime]\npriority = 20\nlock_memory = true\n").expect("a file");
+    let mut up = domain.start(&[
+        "--config",
+        config.to_str().expect("a path in UTF-8"),
+        "up",
+        "--headless",
+        "--exit-when-done",
+        "--json",
+        "--speed",
+        "3",
+    ]);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], serde_json::json!([1]));
+    assert_eq!(told["restarts"], 0, "{told}\n{}", up.log());
+    domain.assert_clean();
+}
+
+#[test]
+fn a_service_on_its_own_takes_the_same_flags() {
+    if !may_be_real_time(7) {
+        return;
+    }
+    let domain = Domain::new();
+    let [_, last] = two_cores();
+    let logic = domain.start(&["logic", "--realtime", "7", "--core", &last]);
+    wait_for("logic", || (bus_mappings(logic.pid()).0 > 0).then_some(()));
+    for thread in threads(logic.pid()) {
+        assert_eq!((thread.policy, thread.priority), (FIFO, 7));
+        assert_eq!(thread.cores, last);
+    }
+    drop(logic);
+    domain.assert_clean();
+}
+
+#[test]
+fn who_lacks_a_right_is_told_what_to_do_before_anything_runs() {
+    let domain = Domain::new();
+    for (flags, words) in [
+        (
+            &["--realtime", "20"][..],
+            &[
+                "LimitRTPRIO=20",
+                "ulimit -r 20",
+                "CAP_SYS_NICE",
+                "priority = 0",
+            ][..],
+        ),
+        (
+            &["--lock-memory"],
+            &[
+                "64 KiB",
+                "LimitMEMLOCK=",
+                "ulimit -l",
+                "CAP_IPC_LOCK",
+                "lock_memory = false",
+            ],
+        ),
+    ] {
+        for command in ["up", "bridge", "logic"] {
+            let refused = run_without_rights(&domain, &[&[command], flags].concat());
+            let said = said(&refused);
+            assert_eq!(refused.status.code(), NOT_GRANTED, "{command}: {said}");
+            for word in words {
+                assert!(
+                    said.contains(word),
+                    "{command}: `{word}` is missing: {said}"
+                );
+            }
+            assert_eq!(said.lines().count(), 1, "{command}: one sentence: {said}");
+        }
+    }
+    domain.assert_clean();
+}
+
+#[test]
+fn cores_that_are_not_there_and_spinning_on_all_of_them_are_refused() {
+    let domain = Domain::new();
+    let spin = domain.folder().join("spin.toml");
+    fs::write(&spin, "[bus]\nwaiting = \"spin\"\n").expect("a file");
+    let spin = spin.to_str().expect("a path in UTF-8");
+    let [first, _] = two_cores();
+    for (args, word) in [
+        (&["up", "--core", "1000"][..], "no core 1000"),
+        (&["simulator", "--core", "1000"], "no core 1000"),
+        // Two that never sleep on one core: too many for it, on any machine.
+        (
+            &["--config", spin, "up", "--realtime", "20", "--core", &first],
+            "adaptive",
+        ),
+    ] {
+        let refused = domain.run(args);
+        let said = said(&refused);
+        assert_eq!(refused.status.code(), NOT_GRANTED, "{args:?}: {said}");
+        assert!(said.contains(word), "{args:?}: {said}");
+    }
+    domain.assert_clean();
+}
+
+#[test]
+fn the_doctor_tries_what_was_asked_for_and_does_not_guess() {
+    let domain = Domain::new();
+    let asked = ["doctor", "--realtime", "20", "--lock-memory"];
+    let poor = run_without_rights(&domain, &asked);
+    let text = String::from_utf8_lossy(&poor.stdout).into_owned();
+    assert_eq!(poor.status.code(), Some(1), "{text}");
+    for (what, cure) in [
+        ("real time", "LimitRTPRIO=20"),
+        ("locked memory", "LimitMEMLOCK="),
+    ] {
+        let bad = |line: &&str| line.starts_with("BAD") && line.contains(what);
+        let line = text
+            .lines()
+            .find(bad)
+            .unwrap_or_else(|| panic!("{what}: {text}"));
+        assert!(line.contains(cure), "{line}");
+    }
+    // Nobody has to have rights that he does not use.
+    let poor = run_without_rights(&domain, &["doctor"]);
+    let text = String::from_utf8_lossy(&poor.stdout).into_owned();
+    assert_eq!(poor.status.code(), Some(0), "{text}");
+    assert!(text.contains("not used; with --realtime 20"), "{text}");
+
+    if may_be_real_time(20) {
+        let rich = domain.run(&asked);
+        let text = String::from_utf8_lossy(&rich.stdout).into_owned();
+        assert_eq!(rich.status.code(), Some(0), "{text}");
+        assert!(text.contains("priority 20 is granted"), "{text}");
+    }
+    domain.assert_clean();
+}
