@@ -29,7 +29,7 @@ use lager_topics::{Role, Stamp, Topic};
 use crate::baseline::iceoryx::{Header, Member, Stream};
 use crate::domain::Domain;
 use crate::error::BenchError;
-use crate::machine::{self, Awake, cores_for};
+use crate::machine::{self, Awake, Bound, cores_for};
 use crate::parts::{Part, interrupted};
 use crate::report::{Mode, Options, Regime, Report, Row};
 use crate::run::{self, Entry};
@@ -143,7 +143,7 @@ fn group<const WORDS: usize>(
 pub type Small = Session<SMALL>;
 
 /// A writer of each contender and the process of their readers. Stays in the thread that opened it,
-/// which is bound to a core from then on.
+/// which is bound to a core meanwhile.
 pub struct Session<const WORDS: usize> {
     ours: Publisher<Fan<WORDS>>,
     bare: BarePublisher<ipc::Service, Block<WORDS>, Stamp>,
@@ -156,6 +156,7 @@ pub struct Session<const WORDS: usize> {
     readers: Part,
     _member: Member,
     _bus: Bus,
+    _bound: Bound,
     _domain: Domain,
 }
 
@@ -184,7 +185,6 @@ impl<const WORDS: usize> Session<WORDS> {
             readers,
             counter: counter.number(),
         })?;
-        machine::pin(first)?;
         let mut session = Self {
             ours,
             bare,
@@ -196,6 +196,7 @@ impl<const WORDS: usize> Session<WORDS> {
             readers: part,
             _member: member,
             _bus: bus,
+            _bound: Bound::to(first)?,
             _domain: domain,
         };
         // The first sample connects the ports, which takes long.

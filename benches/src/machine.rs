@@ -3,6 +3,8 @@
 //! Apart, because every scenario binds its processes and says on what it ran. It never changes
 //! anything for other processes.
 
+use core::marker::PhantomData;
+
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
 use crate::error::BenchError;
@@ -84,6 +86,35 @@ pub fn pin(core: usize) -> Result<(), BenchError> {
         core,
         detail: error.to_string(),
     })
+}
+
+/// The thread that made this is bound to a core as long as this lives; stays in that thread.
+#[derive(Debug)]
+pub(crate) struct Bound {
+    before: CpuSet,
+    _in_its_thread: PhantomData<*const ()>,
+}
+
+impl Bound {
+    /// Binds the calling thread to `core`.
+    pub(crate) fn to(core: usize) -> Result<Self, BenchError> {
+        let before = sched_getaffinity(None).map_err(|error| BenchError::Affinity {
+            core,
+            detail: error.to_string(),
+        })?;
+        pin(core)?;
+        Ok(Self {
+            before,
+            _in_its_thread: PhantomData,
+        })
+    }
+}
+
+impl Drop for Bound {
+    fn drop(&mut self) {
+        // Refused only if the cores have been taken away meanwhile, and then nothing is to be done.
+        let _ = sched_setaffinity(None, &self.before);
+    }
 }
 
 /// Processes that keep cores from halting, for as long as this lives.
@@ -168,6 +199,19 @@ mod tests {
             usable_cores()
         });
         assert_eq!(seen.join().unwrap(), [last]);
+    }
+
+    #[test]
+    fn a_bound_thread_is_free_again_afterwards() {
+        let cores = usable_cores();
+        let last = *cores.last().unwrap();
+        let seen = std::thread::spawn(move || {
+            let bound = Bound::to(last).unwrap();
+            let meanwhile = usable_cores();
+            drop(bound);
+            (meanwhile, usable_cores())
+        });
+        assert_eq!(seen.join().unwrap(), (vec![last], cores));
     }
 
     #[test]

@@ -23,6 +23,7 @@
 //! **Cores**: the boards, the bridge and the floor's ends are bound to the first core, logic and
 //! the floor's middle to the second; in the regime of one core all are on that one.
 
+mod board;
 mod cable;
 mod floor;
 mod pace;
@@ -34,7 +35,7 @@ mod stages;
 use lager_topics::PathLatency;
 
 use crate::error::BenchError;
-use crate::machine::{self, Awake, cores_for};
+use crate::machine::{self, Awake, Bound, cores_for};
 use crate::report::{Mode, Options, Regime, Report, Row};
 use crate::run::{self, Entry};
 use floor::Floor;
@@ -228,9 +229,10 @@ fn path_observed(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchErr
 }
 
 /// One chain for the criterion bench. Stays in the thread that opened it, which is bound to a core
-/// from then on.
+/// meanwhile.
 pub struct Session {
     chain: Box<dyn Chain>,
+    _bound: Bound,
 }
 
 impl Session {
@@ -254,9 +256,9 @@ impl Session {
 
     fn of(mut chain: impl Chain + 'static, core: usize) -> Result<Self, BenchError> {
         chain.end()?;
-        machine::pin(core)?;
         Ok(Self {
             chain: Box::new(chain),
+            _bound: Bound::to(core)?,
         })
     }
 

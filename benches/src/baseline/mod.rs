@@ -6,6 +6,8 @@
 pub(crate) mod iceoryx;
 pub(crate) mod memory;
 pub(crate) mod stream;
+#[cfg(feature = "zenoh")]
+pub(crate) mod zenoh;
 
 use core::time::Duration;
 use std::time::Instant;

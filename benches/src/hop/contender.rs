@@ -32,11 +32,17 @@ pub enum Contender {
     Uds,
     /// A TCP connection over loopback.
     Tcp,
+    /// Two Zenoh peers on a Unix socket, each with a channel to sleep on.
+    #[cfg(feature = "zenoh")]
+    Zenoh,
 }
+
+/// How many take part; one is there only with its feature.
+const COUNT: usize = if cfg!(feature = "zenoh") { 14 } else { 13 };
 
 impl Contender {
     /// Everything that takes part, in the order of the tables.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; COUNT] = [
         Self::Lager(Mode::Spin),
         Self::IceoryxHeader,
         Self::IceoryxBare,
@@ -50,6 +56,8 @@ impl Contender {
         Self::Pipe,
         Self::Uds,
         Self::Tcp,
+        #[cfg(feature = "zenoh")]
+        Self::Zenoh,
     ];
 
     /// How its receiver waits.
@@ -66,6 +74,8 @@ impl Contender {
             | Self::Pipe
             | Self::Uds
             | Self::Tcp => Mode::Block,
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh => Mode::Block,
         }
     }
 
@@ -101,6 +111,8 @@ impl Contender {
             Self::Pipe => ("pipe", ""),
             Self::Uds => ("uds", ""),
             Self::Tcp => ("tcp", ""),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh => ("zenoh", ""),
         };
         let against: &[&str] = match self {
             Self::Lager(Mode::Spin) => &["iceoryx2/header", "iceoryx2/bare", "iceoryx2/defaults"],
@@ -109,6 +121,8 @@ impl Contender {
             Self::IceoryxHeader | Self::IceoryxEvent => &[],
             Self::IceoryxBare | Self::IceoryxDefaults | Self::CacheLine => &["iceoryx2/header"],
             Self::Futex | Self::EventFd | Self::Pipe | Self::Uds | Self::Tcp => &["iceoryx2/event"],
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh => &["iceoryx2/event"],
         };
         Entry {
             name,

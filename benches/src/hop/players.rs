@@ -15,6 +15,8 @@ use crate::ball::Ball;
 use crate::baseline::iceoryx::{Listening, Member, Polling};
 use crate::baseline::memory::{CacheLine, EventFd, Futex, Lane};
 use crate::baseline::stream::Stream;
+#[cfg(feature = "zenoh")]
+use crate::baseline::zenoh;
 use crate::baseline::{End, Fault, LIMIT};
 use crate::error::BenchError;
 use crate::machine;
@@ -310,6 +312,8 @@ impl Table<'_> {
             }
             Contender::Uds => self.both_ways(player, &self.lines.uds, round),
             Contender::Tcp => self.both_ways(player, &self.lines.tcp, round),
+            #[cfg(feature = "zenoh")]
+            Contender::Zenoh => self.with(player, self.peer(first, round)?, round),
         }
     }
 
@@ -325,6 +329,19 @@ impl Table<'_> {
     ) -> Result<Polling<H>, BenchError> {
         let limits = limits.map(|()| &SensorLine::QOS);
         Polling::new(self.member()?, names(first), limits)
+    }
+
+    #[cfg(feature = "zenoh")]
+    fn peer(&self, first: bool, round: &Round) -> Result<zenoh::Peer, BenchError> {
+        let folder = self.config.root.as_deref().unwrap_or("".as_ref());
+        // A name of its own for each round: the one before may still be closing.
+        let socket = folder.join(format!("zenoh-{}", round.number));
+        let side = if first {
+            zenoh::Side::Listens
+        } else {
+            zenoh::Side::Connects
+        };
+        zenoh::Peer::meet(&socket, side, names(first))
     }
 
     fn both_ways<P: Player>(

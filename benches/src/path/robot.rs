@@ -20,16 +20,15 @@ use std::time::Instant;
 
 use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
 use lager_topics::{
-    Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MapProduct, MissionOrder, Mode as Driver,
-    NavMap, NavStatus, Order, PathLatency, Phase, Role, Side, WarehouseMap,
+    Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MissionOrder, Mode as Driver, NavMap,
+    NavStatus, Order, PathLatency, Phase, Role,
 };
-use lager_wire::link::{BoardEvent, BoardLink};
+use lager_wire::link::BoardEvent;
 use lager_wire::{
-    Callsign, Centimetres, Command, LineState, Payload, ResetCause, SteerData, SteerFlags,
-    WheelCommand,
+    Callsign, Centimetres, Command, LineState, Payload, SteerData, SteerFlags, WheelCommand,
 };
 
-use super::cable::Cable;
+use super::board::{Board, map, now_us};
 use super::pace::{ANSWER_WITHIN, Chain, now_ns, sleep_until_due};
 use super::players::{BRIDGE, LOGIC, OBSERVER, Place, RealTime, Script, bus_error};
 use super::processes::Processes;
@@ -40,10 +39,6 @@ use crate::report::Mode;
 
 /// How long the robot may take to come up, and to come back after it stood still.
 const UP_WITHIN: Duration = Duration::from_secs(10);
-
-/// How long a board waits for the next byte of a packet, in us. The bridge writes packets whole,
-/// but a process that is put to sleep may be cut off in one.
-const GAP_US: u32 = 50_000;
 
 /// Reports come this often, in ns: often enough for the link (1 s) and for the order in force.
 const REPORT_EVERY: u64 = 200_000_000;
@@ -58,50 +53,6 @@ const TOO_FEW_TO_JUDGE: u64 = 20;
 const OPERATOR: &str = "the operator of the measurement";
 
 const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
-
-/// One board: its end of the wire and its end of the link.
-struct Board {
-    cable: Cable,
-    link: BoardLink,
-}
-
-impl Board {
-    fn new(sign: Callsign) -> Result<Self, BenchError> {
-        Ok(Self {
-            cable: Cable::new()?,
-            link: BoardLink::new(sign, ResetCause::PowerOn, GAP_US),
-        })
-    }
-
-    /// Sends a handshake if one is due.
-    fn shake_hands(&mut self) -> Result<(), BenchError> {
-        match self.link.poll(now_us()) {
-            Some(syn) => self.cable.write(&syn),
-            None => Ok(()),
-        }
-    }
-
-    fn send(&mut self, payload: Payload) -> Result<(), BenchError> {
-        match self.link.encode(payload) {
-            Some(packet) => self.cable.write(&packet),
-            None => Ok(()),
-        }
-    }
-
-    /// Takes what has come and is not a command.
-    fn drain(&mut self) -> Result<(), BenchError> {
-        let mut buffer = [0; 256];
-        loop {
-            let count = self.cable.read(&mut buffer)?;
-            if count == 0 {
-                return Ok(());
-            }
-            for byte in &buffer[..count] {
-                self.link.push(*byte, now_us());
-            }
-        }
-    }
-}
 
 /// What became of a frame.
 enum Answer {
@@ -455,26 +406,4 @@ impl core::fmt::Debug for Robot {
             .field("domain", &self.domain)
             .finish_non_exhaustive()
     }
-}
-
-/// One square with a product on the edge along which the robot looks: no turn, no crossing.
-fn map() -> WarehouseMap {
-    let mut map = WarehouseMap {
-        width: 1,
-        height: 1,
-        side_length_cm: 50,
-        product_count: 1,
-        ..WarehouseMap::default()
-    };
-    map.products[0] = MapProduct {
-        id: 1,
-        side: Side::Down.into(),
-        ..MapProduct::default()
-    };
-    map
-}
-
-/// A board's clock: microseconds that wrap.
-fn now_us() -> u32 {
-    (now_ns() / 1_000) as u32
 }

@@ -73,6 +73,10 @@ pub fn wake() {
 
 /// Sleeps until something happens or the clock reads `due_us`. Returns early after a long sleep.
 pub fn sleep_until(due_us: u32) {
+    if EVENT.get() != 0 {
+        EVENT.set(0);
+        return;
+    }
     let left_us = due_us.wrapping_sub(now_us());
     if !(SHORTEST_US..1 << 31).contains(&left_us) {
         return;
@@ -117,7 +121,8 @@ mod handlers {
 
     #[avr_device::interrupt(atmega1284p)]
     fn TIMER1_OVF() {
-        BASE_US.with(|base_us| *base_us = base_us.wrapping_add(ROUND_US));
+        // SAFETY: this is an interrupt.
+        unsafe { BASE_US.in_interrupt(|base_us| *base_us = base_us.wrapping_add(ROUND_US)) };
     }
 
     #[avr_device::interrupt(atmega1284p)]

@@ -26,6 +26,18 @@ impl<T: Send> Shared<T> {
             action(unsafe { &mut *self.0.borrow(alone).get() })
         })
     }
+
+    /// The same in an interrupt, which is alone without a lock: 9 cycles less.
+    ///
+    /// # Safety
+    /// Called by interrupts only, and they do not nest.
+    #[inline(always)]
+    pub unsafe fn in_interrupt<R>(&self, action: impl FnOnce(&mut T) -> R) -> R {
+        // SAFETY: by the caller's promise interrupts are off, as in `with`.
+        let alone = unsafe { interrupt::CriticalSection::new() };
+        // SAFETY: as in `with`.
+        action(unsafe { &mut *self.0.borrow(alone).get() })
+    }
 }
 
 /// A byte that an interrupt and the main loop share: the chip reads and writes it in one instruction, so no
@@ -100,7 +112,13 @@ impl<T: Copy, const N: usize> Ring<T, N> {
             return;
         }
         // SAFETY: the index is below N, and the other end does not read this slot before `added` passes it.
-        unsafe { self.slots.get().cast::<T>().add(usize::from(added)).write_volatile(element) };
+        unsafe {
+            self.slots
+                .get()
+                .cast::<T>()
+                .add(usize::from(added))
+                .write_volatile(element)
+        };
         self.added.set(next);
     }
 
@@ -112,7 +130,13 @@ impl<T: Copy, const N: usize> Ring<T, N> {
             return None;
         }
         // SAFETY: the index is below N, and the other end does not write this slot before `taken` passes it.
-        let element = unsafe { self.slots.get().cast::<T>().add(usize::from(taken)).read_volatile() };
+        let element = unsafe {
+            self.slots
+                .get()
+                .cast::<T>()
+                .add(usize::from(taken))
+                .read_volatile()
+        };
         self.taken.set(taken.wrapping_add(1) & Self::MASK);
         Some(element)
     }
@@ -125,7 +149,11 @@ impl<T: Copy, const N: usize> Ring<T, N> {
 
     /// How many more elements it takes.
     pub fn room(&self) -> u8 {
-        self.taken.get().wrapping_sub(self.added.get()).wrapping_sub(1) & Self::MASK
+        self.taken
+            .get()
+            .wrapping_sub(self.added.get())
+            .wrapping_sub(1)
+            & Self::MASK
     }
 }
 

@@ -62,6 +62,11 @@ pub trait SteeringBoard: Board {
     /// The oldest word received and not yet read, and when its last bit came.
     fn exde_word(&mut self) -> Option<(u16, u32)>;
 
+    /// Whether some bits of a word have come and others are still to come; never where words come whole.
+    fn exde_is_receiving(&self) -> bool {
+        false
+    }
+
     /// Words lost to missing pulses, and disturbing pulses; stays at 255.
     fn exde_errors(&self) -> u8;
 

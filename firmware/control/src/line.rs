@@ -33,7 +33,6 @@ pub const MAX_ERROR: i8 = 10;
 /// Up to this error, in half sensor steps, the robot counts as on the line.
 pub const ON_LINE_ERROR: i8 = 2;
 
-const LEFT_EDGE: u16 = 0b100_0000_0000;
 const LEFT_MARK: u16 = 0b111_1100_0000;
 const RIGHT_MARK: u16 = 0b000_0001_1111;
 /// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the line
@@ -144,15 +143,23 @@ impl LineReader {
 /// Mean place of the set bits in half sensor steps from the middle, halves rounded away from it.
 fn centroid(bits: u16) -> i8 {
     let mut sum = 0_i8;
-    let mut count = 0_i8;
-    let mut sensor = LEFT_EDGE;
-    for place in (-MAX_ERROR..=MAX_ERROR).step_by(2) {
-        if bits & sensor != 0 {
+    let mut count = 0_u8;
+    let mut place = MAX_ERROR;
+    let mut sensors = bits;
+    while sensors != 0 {
+        if sensors & 1 != 0 {
             sum += place;
             count += 1;
         }
-        sensor >>= 1;
+        place -= 2;
+        sensors >>= 1;
     }
-    let size = (2 * sum.abs() + count) / (2 * count);
-    size * sum.signum()
+    // The quotient is 10 at most, so taking away is faster than the chip's division of 200 cycles.
+    let mut rest = 2 * sum.unsigned_abs() + count;
+    let mut size = 0;
+    while rest >= 2 * count {
+        rest -= 2 * count;
+        size += 1;
+    }
+    if sum < 0 { -size } else { size }
 }

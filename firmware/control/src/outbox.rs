@@ -29,8 +29,12 @@ impl Outbox {
         self.packets.is_empty()
     }
 
-    /// Puts a packet behind the others. The callers make at most four at a time and only into an empty box.
-    pub(crate) fn push(&mut self, packet: [u8; PACKET_LENGTH]) {
+    /// Hands a packet to the UART, or puts it behind the others that wait for room there. The callers make at
+    /// most four at a time and only into an empty box.
+    pub(crate) fn send(&mut self, board: &mut impl Board, packet: [u8; PACKET_LENGTH]) {
+        if self.packets.is_empty() && board.uart_write(&packet) {
+            return;
+        }
         let stored = self.packets.push_back(packet).is_ok();
         debug_assert!(stored, "a loop made more packets than the outbox holds");
     }

@@ -110,7 +110,8 @@ impl Pd {
     }
 
     fn remember(&mut self, sample: Sample) {
-        self.samples.rotate_right(1);
+        let last = self.samples.len() - 1;
+        self.samples.copy_within(..last, 1);
         self.samples[0] = sample;
         self.count = (self.count + 1).min(self.samples.len() as u8);
     }

@@ -71,7 +71,7 @@ impl Default for SensorConfig {
     }
 }
 
-/// The longest a step may be put off, in microseconds; well inside the watchdog's 125 ms.
+/// The longest a step may be put off, in microseconds; well inside the watchdog's 64 ms.
 const LONGEST_SLEEP_US: u32 = 20_000;
 
 /// What the next pass tells the Pi (S3).
@@ -193,8 +193,7 @@ impl SensorUnit {
         if self.outbox.is_empty()
             && let Some(syn) = self.link.poll(now_us)
         {
-            self.outbox.push(syn);
-            self.outbox.flush(board);
+            self.outbox.send(board, syn);
         }
     }
 
@@ -213,19 +212,18 @@ impl SensorUnit {
         match self.flip_flop {
             FlipFlop::Line => {
                 if self.raw_line {
-                    self.send(Payload::RawLine(bits));
+                    self.send(board, Payload::RawLine(bits));
                 }
-                self.send(Payload::Line(reading.state));
+                self.send(board, Payload::Line(reading.state));
                 self.flip_flop = FlipFlop::Distance;
             }
             FlipFlop::Distance => {
                 let distance = self.config.ir_model.distance(board.read_ir());
-                self.send(Payload::Distance(distance));
+                self.send(board, Payload::Distance(distance));
                 self.flip_flop = FlipFlop::Line;
             }
         }
-        self.send_rarer_things(now_us);
-        self.outbox.flush(board);
+        self.send_rarer_things(board, now_us);
     }
 
     fn note_pass(&mut self, now_us: u32) {
@@ -275,17 +273,17 @@ impl SensorUnit {
         });
     }
 
-    fn send_rarer_things(&mut self, now_us: u32) {
+    fn send_rarer_things<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
         if !self.link.is_up() {
             return;
         }
         if let Some(reply) = self.replies.pop() {
-            self.send(Payload::SettingReply(reply));
+            self.send(board, Payload::SettingReply(reply));
         }
         if reached(now_us, self.status_due_us) {
             self.status_due_us = now_us.wrapping_add(self.config.status_period_us);
             let (load_percent, longest_loop_100us) = self.load.report(now_us);
-            self.send(Payload::BoardStatus(BoardStatus {
+            let status = BoardStatus {
                 reset: self.reset,
                 bad_packets: self.link.bad_packets(),
                 lost_packets: self.link.lost_packets(),
@@ -294,13 +292,14 @@ impl SensorUnit {
                 servo_timeouts: 0,
                 load_percent,
                 longest_loop_100us,
-            }));
+            };
+            self.send(board, Payload::BoardStatus(status));
         }
     }
 
-    fn send(&mut self, payload: Payload) {
+    fn send<B: SensorBoard>(&mut self, board: &mut B, payload: Payload) {
         if let Some(packet) = self.link.encode(payload) {
-            self.outbox.push(packet);
+            self.outbox.send(board, packet);
         }
     }
 

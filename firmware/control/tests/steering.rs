@@ -423,3 +423,21 @@ fn a_fresh_boards_wheels_are_in_standby_for_the_arm() {
     assert_eq!(bench.report().finished_seq, seq);
     assert!(!flag(&bench, SteerFlags::REFUSED) && !flag(&bench, SteerFlags::ABORTED));
 }
+
+#[test]
+fn what_takes_long_waits_while_a_word_comes_in_and_commands_do_not() {
+    let mut bench = Bench::ready();
+    bench.line = None;
+    bench.pins.receiving = true;
+    bench.pi.packets.clear();
+    bench.command(FORWARD);
+    assert_eq!(
+        bench.pins.motors,
+        (Motor::forward(100), Motor::forward(100))
+    );
+    bench.run_ms(20);
+    assert_eq!(bench.reports(), []);
+    bench.pins.receiving = false;
+    bench.run_ms(20);
+    assert!(bench.reports().len() >= 4);
+}

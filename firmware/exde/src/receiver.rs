@@ -111,6 +111,12 @@ impl Receiver {
         self.alignment != Alignment::Unanswered
     }
 
+    /// Whether some bits of a word have come and others are still to come.
+    #[must_use]
+    pub fn is_midway(&self) -> bool {
+        self.register != NO_BITS
+    }
+
     /// Words lost to missing pulses, and disturbing pulses; stays at 255.
     #[must_use]
     pub fn errors(&self) -> u8 {
@@ -132,8 +138,9 @@ impl Receiver {
 
     #[inline(always)]
     fn count_error(&mut self) {
-        if self.errors < u8::MAX {
-            self.errors += 1;
+        // In the interrupt, so no value is computed that is not stored.
+        if let Some(errors) = self.errors.checked_add(1) {
+            self.errors = errors;
         }
     }
 }

@@ -227,6 +227,24 @@ fn met() -> Receiver {
 }
 
 #[test]
+fn a_word_is_midway_from_its_first_bit_to_its_last() {
+    let mut receiver = met();
+    assert!(!receiver.is_midway());
+    for _ in 0..10 {
+        assert_eq!(receiver.on_sync(true, 20), None);
+        assert!(receiver.is_midway());
+    }
+    assert_eq!(receiver.on_sync(true, 20), Some(0x7FF));
+    assert!(!receiver.is_midway());
+    // Nor is it when the rest of a word does not come.
+    assert!(!receiver.on_silence());
+    assert_eq!(receiver.on_sync(true, 100), None);
+    assert_eq!(receiver.on_sync(true, 20), None);
+    assert!(!receiver.on_silence());
+    assert!(!receiver.is_midway());
+}
+
+#[test]
 fn an_extra_pulse_costs_one_word_and_is_counted() {
     for place in 0..11 {
         let mut receiver = met();

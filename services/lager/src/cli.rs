@@ -260,7 +260,9 @@ pub enum TopicCommand {
 Times are medians over the runs: of each run's median (p50) and of what 99 % and
 99.9 % of its samples kept. Ratios compare with a baseline of the same run and
 survive another machine; times do not. Measure on an otherwise idle machine, with
-no robot up.")]
+no robot up. A hop through Zenoh is measured beside the others only by
+`cargo run --release -p lager --features zenoh -- bench hop`: Zenoh brings a
+large tree of crates with it.")]
 pub struct BenchArgs {
     /// What to measure
     pub scenario: Scenario,

@@ -4,7 +4,7 @@
 //!                start-up over              step, step, ...
 //!   in reset -------------------> running -------------------.
 //!      ^                            | hangs                  |
-//!      |  125 ms without a kick     v                        |
+//!      |  64 ms without a kick      v                        |
 //!      '---------------------------hung      reset, any time v
 //!      '----------------------------------------------------'
 //! ```
@@ -22,7 +22,7 @@ pub(crate) const START_UP_NS: u64 = 65_000_000;
 /// A board's loop takes at least this long, whatever it asks for.
 const SHORTEST_LOOP_NS: u64 = 10_000;
 /// The watchdog's time: the motors go off, then the board starts anew.
-const WATCHDOG_NS: u64 = 125_000_000;
+const WATCHDOG_NS: u64 = 64_000_000;
 
 /// A board with its program.
 #[derive(Clone, Debug)]

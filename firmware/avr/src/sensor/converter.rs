@@ -1,16 +1,18 @@
 //! The ADC: eleven line sensors one after the other through one input, and the IR ranger (S5, S8).
 //!
 //! ```text
-//!   sensor n   |-- sample --|------- convert, 13 us -------|-- sample n + 1 --| ...
+//!   sensor n   |-- sample --|------- convert, 13 us -------|-- sample n + 1 --| ... | IR ranger
 //!   multiplexer              \ n + 1 settles meanwhile ----/
 //!   program                                                 | judges n while n + 1 is converted
 //! ```
+//!
+//! The ranger is converted behind the last sensor every time, so that a pass that wants it does not wait.
 //!
 //! The clock of 1 MHz is above what the data sheet promises ten bits at; eight of the line sensors' bits
 //! hold, and the IR ranger's own noise is larger than the two that do not.
 
 use avr_device::asm::delay_cycles;
-use lager_avr::register::{adc, bit, get, put, set};
+use lager_avr::register::{adc, bit, get, put};
 
 use crate::pins;
 
@@ -18,6 +20,8 @@ const ADEN: u8 = bit(7);
 const ADSC: u8 = bit(6);
 /// clk/16 = 1 MHz.
 const PRESCALER_16: u8 = 0b100;
+const ON: u8 = ADEN | PRESCALER_16;
+const START: u8 = ON | ADSC;
 /// Reference AVCC.
 const AVCC: u8 = bit(6);
 /// The upper eight bits in one register.
@@ -35,48 +39,50 @@ pub(crate) fn start() {
     let adc = adc();
     put(adc.didr0(), bit(pins::LINE_INPUT) | bit(pins::IR_INPUT));
     put(adc.admux(), LINE);
-    put(adc.adcsra(), ADEN | PRESCALER_16);
+    put(adc.adcsra(), ON);
     pins::select_line_sensor(0);
     // The first conversion sets the converter up and takes 25 clocks.
-    convert();
+    put(adc.adcsra(), START);
+    wait();
 }
 
 /// Reads a line sensor. They are read in order: with the first one the chain of conversions begins, and each
 /// reading starts the next one, which runs while this one is judged.
 pub(crate) fn read_line_sensor(channel: u8) -> u8 {
     if channel == 0 {
+        put(adc().admux(), LINE);
         begin(0);
     }
     wait();
-    let reading = (get(adc().adc()) >> 8) as u8;
     let next = channel + 1;
     if next < CHANNELS {
+        // The reading stays until this conversion ends.
         begin(next);
+        return reading();
     }
-    reading
+    let last = reading();
+    put(adc().admux(), IR);
+    put(adc().adcsra(), START);
+    last
+}
+
+/// The eight bits of a line sensor.
+fn reading() -> u8 {
+    (get(adc().adc()) >> 8) as u8
 }
 
 /// Starts to convert the sensor that is selected, and selects the one after it as soon as it is sampled.
 fn begin(channel: u8) {
-    set(adc().adcsra(), ADSC);
+    put(adc().adcsra(), START);
     delay_cycles(SAMPLING_CYCLES);
     let next = channel + 1;
     pins::select_line_sensor(if next < CHANNELS { next } else { 0 });
 }
 
-/// Reads the IR ranger.
+/// The IR ranger as it was behind the last line sensor.
 pub(crate) fn read_ir() -> u16 {
-    let adc = adc();
-    put(adc.admux(), IR);
-    convert();
-    let reading = get(adc.adc());
-    put(adc.admux(), LINE);
-    reading
-}
-
-fn convert() {
-    set(adc().adcsra(), ADSC);
     wait();
+    get(adc().adc())
 }
 
 /// Until the conversion under way is over: the converter's own time bounds it.

@@ -5,6 +5,7 @@
 //!   INT0: return sync
 //! ```
 
+use avr_device::asm::nop;
 use lager_avr::clock;
 use lager_avr::register::{external, get, put, timer1};
 use lager_avr::shared::Shared;
@@ -16,8 +17,8 @@ use crate::pins;
 const RISING: u8 = 0b11;
 const INT0_ON: u8 = 1;
 
-/// What an interrupt takes until it sets the next one: it would lengthen every half bit.
-const INTERRUPT_TICKS: u16 = 8;
+/// From the timer's match to where the interrupt reads the timer: it would lengthen every half bit.
+const INTERRUPT_TICKS: u16 = 5;
 
 static TRANSMITTER: Shared<Transmitter> = Shared::new(Transmitter::new());
 
@@ -25,12 +26,22 @@ static TRANSMITTER: Shared<Transmitter> = Shared::new(Transmitter::new());
 pub(crate) fn start() {
     put(external().eicra(), RISING);
     put(external().eimsk(), INT0_ON);
-    TRANSMITTER.with(|transmitter| carry_out(transmitter.advance()));
+    TRANSMITTER.with(|transmitter| {
+        carry_out(transmitter.advance());
+        clock::arm_compare_b();
+    });
 }
 
 /// Begins to send a word, if the one before has left and the steering board has answered.
 pub(crate) fn send(word: u16) -> bool {
-    TRANSMITTER.with(|transmitter| transmitter.start(word).map(carry_out).is_some())
+    TRANSMITTER.with(|transmitter| {
+        let Some(step) = transmitter.start(word) else {
+            return false;
+        };
+        carry_out(step);
+        clock::arm_compare_b();
+        true
+    })
 }
 
 /// Whether bits of a word are still to be sent.
@@ -38,7 +49,7 @@ pub(crate) fn is_sending() -> bool {
     TRANSMITTER.with(|transmitter| transmitter.is_sending())
 }
 
-/// Sets the wires and the timer for the next step, counted from this one.
+/// Sets the wires, and the timer for the next step, counted from this one.
 #[inline(always)]
 fn carry_out(step: Step) {
     match step.action {
@@ -52,24 +63,29 @@ fn carry_out(step: Step) {
     }
     match step.wait_us {
         Some(wait_us) => {
-            let ticks = (wait_us * clock::TICKS_PER_US).saturating_sub(INTERRUPT_TICKS);
+            let ticks = wait_us * clock::TICKS_PER_US - INTERRUPT_TICKS;
             put(timer1().ocr1b(), get(timer1().tcnt1()).wrapping_add(ticks));
-            clock::arm_compare_b();
         }
         None => clock::disarm_compare_b(),
     }
-    // Setting the timer has taken the microsecond that a pulse is long.
     if step.action == Action::Pulse {
+        // Setting the timer has taken the better part of the microsecond that a pulse is long.
+        nop();
+        nop();
+        nop();
+        nop();
         pins::set_exde_sync(false);
     }
 }
 
 #[avr_device::interrupt(atmega1284p)]
 fn TIMER1_COMPB() {
-    TRANSMITTER.with(|transmitter| carry_out(transmitter.advance()));
+    // SAFETY: this is an interrupt.
+    unsafe { TRANSMITTER.in_interrupt(|transmitter| carry_out(transmitter.advance())) };
 }
 
 #[avr_device::interrupt(atmega1284p)]
 fn INT0() {
-    TRANSMITTER.with(Transmitter::on_return);
+    // SAFETY: this is an interrupt.
+    unsafe { TRANSMITTER.in_interrupt(Transmitter::on_return) };
 }

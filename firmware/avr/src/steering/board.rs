@@ -61,6 +61,10 @@ impl SteeringBoard for SteeringPins {
         exde::word()
     }
 
+    fn exde_is_receiving(&self) -> bool {
+        exde::is_receiving()
+    }
+
     fn exde_errors(&self) -> u8 {
         exde::errors()
     }

@@ -45,6 +45,11 @@ pub(crate) fn word() -> Option<(u16, u32)> {
     Some((word, clock::now_us().wrapping_sub(u32::from(ago))))
 }
 
+/// Whether a word is coming in.
+pub(crate) fn is_receiving() -> bool {
+    LISTENER.with(|listener| listener.receiver.is_midway())
+}
+
 /// What the receiver has counted.
 pub(crate) fn errors() -> u8 {
     LISTENER.with(|listener| listener.receiver.errors())
@@ -54,7 +59,7 @@ pub(crate) fn errors() -> u8 {
 fn INT2() {
     let data = pins::exde_data();
     let now = get(timer1().tcnt1());
-    LISTENER.with(|listener| {
+    let hear = |listener: &mut Listener| {
         let since_us = now.wrapping_sub(listener.last) / clock::TICKS_PER_US;
         listener.last = now;
         put(
@@ -66,13 +71,16 @@ fn INT2() {
             WORDS.push((word, now));
             clock::wake();
         }
-    });
+    };
+    // SAFETY: this is an interrupt.
+    unsafe { LISTENER.in_interrupt(hear) };
 }
 
 #[avr_device::interrupt(atmega1284p)]
 fn TIMER1_COMPB() {
     clock::disarm_compare_b();
-    if LISTENER.with(|listener| listener.receiver.on_silence()) {
+    // SAFETY: this is an interrupt.
+    if unsafe { LISTENER.in_interrupt(|listener| listener.receiver.on_silence()) } {
         pins::set_exde_return(true);
         delay_cycles(14);
         pins::set_exde_return(false);

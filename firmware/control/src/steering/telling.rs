@@ -46,8 +46,7 @@ impl SteeringUnit {
         if self.outbox.is_empty()
             && let Some(syn) = self.link.poll(now_us)
         {
-            self.outbox.push(syn);
-            self.outbox.flush(board);
+            self.outbox.send(board, syn);
         }
         if !self.link.is_up() {
             return;
@@ -59,8 +58,7 @@ impl SteeringUnit {
             && let Some(payload) = self.next_payload(board, now_us)
             && let Some(packet) = self.link.encode(payload)
         {
-            self.outbox.push(packet);
-            self.outbox.flush(board);
+            self.outbox.send(board, packet);
         }
     }
 

@@ -26,6 +26,8 @@ pub struct SteeringPins {
     /// Every change of the motors.
     pub motor_log: Vec<(u32, (Motor, Motor))>,
     pub words: VecDeque<(u16, u32)>,
+    /// Whether a word is coming in.
+    pub receiving: bool,
     pub exde_errors: u8,
     pub servos: Servos,
     pub kicks: usize,
@@ -71,6 +73,9 @@ impl SteeringBoard for SteeringPins {
     fn exde_word(&mut self) -> Option<(u16, u32)> {
         self.words.pop_front()
     }
+    fn exde_is_receiving(&self) -> bool {
+        self.receiving
+    }
     fn exde_errors(&self) -> u8 {
         self.exde_errors
     }
@@ -109,6 +114,7 @@ impl Bench {
             motors: (Motor::forward(77), Motor::backward(77)),
             motor_log: Vec::new(),
             words: VecDeque::new(),
+            receiving: false,
             exde_errors: 0,
             servos,
             kicks: 0,

@@ -6,6 +6,13 @@ use simavr_ffi as ffi;
 
 use super::{Chip, EEPROM, FLASH, FREQUENCY};
 
+/// Where a program hangs: at the end of the flash.
+const LOOP: usize = FLASH - 4;
+/// `cli`, in front of it.
+const CLI: [u8; 2] = [0xF8, 0x94];
+/// `rjmp .-2`
+const RJMP_TO_ITSELF: [u8; 2] = [0xFF, 0xCF];
+
 impl Chip {
     /// `count` bytes of EEPROM from its start.
     pub fn eeprom(&self, count: usize) -> Vec<u8> {
@@ -37,7 +44,15 @@ impl Chip {
     /// Interrupts are served: one that is under way, or a section without them, is finished
     /// first if that takes less than a millisecond.
     pub fn hang(&self) {
-        const LOOP: usize = FLASH - 4;
+        self.enter_loop(LOOP);
+    }
+
+    /// The same with interrupts off for good, as in a section without them that never ends.
+    pub fn hang_with_interrupts_off(&self) {
+        self.enter_loop(LOOP - CLI.len());
+    }
+
+    fn enter_loop(&self, from: usize) {
         const INTERRUPTS_ON: u8 = 7;
         let patience = self.cycle() + FREQUENCY / 1_000;
         // SAFETY: plain fields of a living chip.
@@ -48,14 +63,14 @@ impl Chip {
         while uninterruptible() && self.cycle() < patience {
             self.run_until(self.cycle() + 1);
         }
-        // SAFETY: the place is inside the flash, whose last instruction no image of ours reaches;
+        // SAFETY: the place is inside the flash, whose last instructions no image of ours reaches;
         // the chip is not running, so the program counter is between two instructions.
         unsafe {
-            let place = (*self.avr).flash.add(LOOP);
-            // rjmp .-2
-            place.write(0xFF);
-            place.add(1).write(0xCF);
-            (*self.avr).pc = LOOP as u32;
+            let place = (*self.avr).flash.add(LOOP - CLI.len());
+            for (offset, byte) in CLI.into_iter().chain(RJMP_TO_ITSELF).enumerate() {
+                place.add(offset).write(byte);
+            }
+            (*self.avr).pc = from as u32;
             if (*self.avr).state == ffi::cpu_Sleeping as c_int {
                 (*self.avr).state = ffi::cpu_Running as c_int;
             }

@@ -282,6 +282,11 @@ impl Rig {
         self.chip(board).hang();
     }
 
+    /// The same with interrupts off for good.
+    pub fn hang_with_interrupts_off(&mut self, board: Board) {
+        self.chip(board).hang_with_interrupts_off();
+    }
+
     /// The wires between the boards.
     pub fn exde(&self) -> &ExDe {
         &self.exde

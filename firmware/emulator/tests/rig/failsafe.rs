@@ -81,6 +81,21 @@ fn the_steering_boards_main_loop_hangs() {
 }
 
 #[test]
+fn the_steering_boards_main_loop_hangs_with_interrupts_off() {
+    let mut robot = Robot::driving(8);
+    robot.rig.hang_with_interrupts_off(Board::Steering);
+    let hung = robot.rig.cycle();
+    // The watchdog's interrupt cannot come; its second time-out resets the chip.
+    let off = robot.run_until_off(LIMIT);
+    let took = off.expect("the motors went off") - hung;
+    assert!(took <= milliseconds(200), "{took} cycles");
+    assert_eq!(robot.rig.chip(Board::Steering).resets(), 1);
+    robot.run(Duration::from_millis(600));
+    let (_, up) = robot.steering.ups.last().copied().expect("it was up");
+    assert_eq!((up.rebooted, up.reset), (true, ResetCause::Watchdog));
+}
+
+#[test]
 fn the_sensor_boards_main_loop_hangs() {
     let mut robot = Robot::up(6);
     robot.place(0.0);
