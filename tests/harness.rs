@@ -120,6 +120,7 @@ impl Domain {
         BusConfig {
             robot: robot.parse().expect("a robot's name"),
             speed,
+            clock: None,
             prefix: Some(self.prefix.clone()),
             root: Some(self.root.join("bus")),
         }
