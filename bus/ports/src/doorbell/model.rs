@@ -71,7 +71,9 @@ impl Word for Modelled {
     }
 
     fn set_reason(&self, reason: usize, order: Ordering) {
-        self.reasons[reason].store(true, order);
+        // A plain store in memory. Loom does not know that one which comes after a swap's read of
+        // its predecessor comes after the swap; that much every machine keeps.
+        self.reasons[reason].swap(true, order);
     }
 
     fn take_reason(&self, reason: usize, order: Ordering) -> bool {
