@@ -120,9 +120,17 @@ impl Domain {
         BusConfig {
             robot: robot.parse().expect("a robot's name"),
             speed,
+            clock: None,
             prefix: Some(self.prefix.clone()),
             root: Some(self.root.join("bus")),
         }
+    }
+
+    /// Where `robot` keeps its clock page if its body is emulated.
+    #[must_use]
+    pub fn clock_page(&self, robot: &str) -> PathBuf {
+        let bus = self.root.join("lager").join(&self.prefix);
+        bus.join(robot).join("clock")
     }
 
     /// A folder of this test's own.
@@ -326,12 +334,20 @@ fn arguments(process: u32) -> Vec<String> {
 /// Whether a process has ended; one that nobody has waited for yet counts.
 #[must_use]
 pub fn has_ended(process: u32) -> bool {
-    fs::read_to_string(format!("/proc/{process}/stat")).map_or(true, |stat| {
-        // The state follows the name, which is in parentheses and may contain anything.
-        stat.rsplit(") ")
-            .next()
-            .is_some_and(|rest| rest.starts_with('Z'))
-    })
+    state(process).is_none_or(|state| state == 'Z')
+}
+
+/// Whether a process is stopped by a signal, all of it.
+#[must_use]
+pub fn is_stopped(process: u32) -> bool {
+    state(process) == Some('T')
+}
+
+/// The state of a process as the kernel has it, if there is such a process.
+fn state(process: u32) -> Option<char> {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The state follows the name, which is in parentheses and may contain anything.
+    stat.rsplit(") ").next()?.chars().next()
 }
 
 /// Waits until `done` gives something.

@@ -11,7 +11,7 @@ use iceoryx2::prelude::{
 };
 use lager_topics::{Request, Role, Topic};
 
-use crate::clock::Clock;
+use crate::clock::{self, Clock};
 use crate::config::BusConfig;
 use crate::doorbell::{self, Board};
 use crate::error::{IntrospectError, OpenError, PortError};
@@ -38,7 +38,7 @@ struct Shared {
     config: Config,
     robot: RobotName,
     role: Role,
-    clock: Clock,
+    clock: clock::Source,
     port_name: PortName,
     board: Board,
 }
@@ -49,9 +49,10 @@ impl Bus {
     /// No signal handler is installed.
     ///
     /// # Errors
-    /// The configuration is not usable, or the bus's files are not.
+    /// The configuration is not usable, or the bus's files or the body's clock are not.
     pub fn open(config: &BusConfig, role: Role) -> Result<Self, OpenError> {
         let transport = config.transport()?;
+        let clock = clock::Source::new(config.speed, config.clock.as_deref())?;
         set_log_level(log_level());
         let node = make_node(&transport, &config.robot, role)?;
         node.blocking_cleanup_dead_nodes(OTHERS_SWEEP);
@@ -64,16 +65,16 @@ impl Bus {
                 config: transport,
                 robot: config.robot.clone(),
                 role,
-                clock: Clock::new(config.speed),
+                clock,
                 port_name,
                 board: Board::default(),
             }),
         })
     }
 
-    /// The robot's clock.
-    pub fn clock(&self) -> &Clock {
-        &self.shared.clock
+    /// A clock that shows the robot's time.
+    pub fn clock(&self) -> Clock {
+        Clock::new(self.shared.clock.clone())
     }
 
     /// The robot's name.

@@ -16,6 +16,9 @@ pub struct BusConfig {
     pub robot: RobotName,
     /// Robot time per real time: 1 for a real body, more for a hurried simulated one.
     pub speed: f64,
+    /// The page in which an emulated body publishes its time; robot time follows it, and `speed`
+    /// is the fastest it runs. `None` for any other body.
+    pub clock: Option<PathBuf>,
     /// What the names of shared-memory files begin with; processes with different prefixes never
     /// meet. `None` is the machine's common bus.
     pub prefix: Option<String>,
@@ -29,6 +32,7 @@ impl Default for BusConfig {
         Self {
             robot: RobotName::default(),
             speed: 1.0,
+            clock: None,
             prefix: None,
             root: None,
         }

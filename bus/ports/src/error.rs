@@ -26,6 +26,21 @@ pub enum OpenError {
     /// The speed is not a positive number.
     #[error("a robot cannot live {0} times as fast as real time; give a positive number")]
     Speed(f64),
+    /// The body's clock page cannot be read.
+    #[error(
+        "the clock page {path} cannot be read ({detail}); the emulated boards publish it: is the robot up, and with `--body chip`?"
+    )]
+    NoClock {
+        /// The page's file.
+        path: PathBuf,
+        /// What the system says.
+        detail: String,
+    },
+    /// The clock's file is something else.
+    #[error(
+        "{0} is no clock page, or one of another build; name the file that the emulator was given with --clock"
+    )]
+    ForeignClock(PathBuf),
     /// The user may not write where the bus lives.
     #[error(
         "no permission to use the bus's files in {root} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user"

@@ -190,13 +190,14 @@ macro_rules! topics {
 }
 
 topics! {
+    // A chip sends a line and a distance each millisecond: a quarter of a second, as with the reports.
     SensorLine = "sensor/line", LineFrame,
     "The line under the robot, as the sensor board classifies it.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
 
     SensorDistance = "sensor/distance", DistanceFrame,
     "The distance to what is in front of the robot.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
 
     SteeringCommand = "steering/command", SteeringOrder,
     "Orders to the arbiter in the bridge.",

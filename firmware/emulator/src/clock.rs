@@ -21,10 +21,12 @@
 
 use core::sync::atomic::{AtomicU64, Ordering, fence};
 use core::time::Duration;
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
+use rustix::fs::{FlockOperation, flock};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use rustix::time::{ClockId, clock_gettime};
 use thiserror::Error;
@@ -33,6 +35,8 @@ const MAGIC: u64 = u64::from_ne_bytes(*b"LAGERCLK");
 const VERSION: u64 = 1;
 const WORDS: usize = 8;
 const BYTES: usize = WORDS * 8;
+/// How long a predecessor may take to let go of the page.
+const PATIENCE: Duration = Duration::from_secs(2);
 /// The span over which the rate is measured.
 const RATE_SPAN: Duration = Duration::from_millis(100);
 
@@ -50,22 +54,30 @@ pub enum ClockError {
     /// The file is something else.
     #[error("{0} is not a clock page; choose another place for it")]
     Foreign(PathBuf),
+    /// Another emulator writes it.
+    #[error(
+        "another emulator publishes its time in {0}; end it, or choose another place for this one's"
+    )]
+    Taken(PathBuf),
 }
 
 /// The emulator's end of the page.
 #[derive(Debug)]
 pub struct ClockPage {
     words: *mut AtomicU64,
+    /// Holds the lock that keeps others from writing.
+    _file: File,
     /// Chip time before this emulator.
     base: u64,
     mark: (u64, u64),
 }
 
 impl ClockPage {
-    /// Opens the page at `path`, or makes it. A page that was there goes on from its time.
+    /// Opens the page at `path`, or makes it. A page that was there goes on from its time, once
+    /// the emulator that wrote it has ended.
     ///
     /// # Errors
-    /// The file cannot be opened or is no clock page.
+    /// The file cannot be opened, is no clock page, or is another emulator's.
     pub fn open(path: &Path) -> Result<Self, ClockError> {
         let failed = |source| ClockError::Open {
             path: path.to_owned(),
@@ -78,6 +90,13 @@ impl ClockPage {
             .truncate(false)
             .open(path)
             .map_err(failed)?;
+        let patience = Instant::now();
+        while flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+            if patience.elapsed() > PATIENCE {
+                return Err(ClockError::Taken(path.to_owned()));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
         let mut content = Vec::new();
         file.read_to_end(&mut content).map_err(failed)?;
         // Nothing is written before it is known whose file it is.
@@ -97,6 +116,7 @@ impl ClockPage {
         };
         let mut page = Self {
             words: words.map_err(|errno| failed(errno.into()))?.cast(),
+            _file: file,
             base,
             mark: (0, 0),
         };
@@ -213,6 +233,17 @@ mod tests {
         page.publish(Duration::from_millis(1));
         assert_eq!((words(&path)[3], words(&path)[7]), (6_000_000, 2));
         drop(page);
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn a_page_has_one_writer() {
+        let path = std::env::temp_dir().join(format!("lager-twoclocks-{}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        let page = ClockPage::open(&path).unwrap();
+        assert!(matches!(ClockPage::open(&path), Err(ClockError::Taken(_))));
+        drop(page);
+        drop(ClockPage::open(&path).unwrap());
         std::fs::remove_file(&path).unwrap();
     }
 

@@ -1,5 +1,6 @@
 //! The emulator's command line. No behaviour lives here.
 
+use core::num::NonZeroI32;
 use std::fs;
 use std::io::{self, BufRead};
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use lager_emulator::rig::{Images, RigOptions};
 use lager_emulator::shell::{EmulatorConfig, run};
 use lager_emulator::truth::Truth;
 use lager_plant::Warehouse;
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 /// The robot's two boards as chips: the real firmware images in simavr, wired to each other and
 /// to a warehouse, behind two serial ports.
@@ -66,6 +68,9 @@ struct Cli {
     /// Goes on with the world of a line that --truth wrote, read from standard input
     #[arg(long)]
     resume: bool,
+    /// Ends with its parent process, which must be this one
+    #[arg(long, value_name = "PID")]
+    parent: Option<i32>,
     /// Instead of serving ports: measures the images in cycles and prints the result as JSON
     #[arg(long, conflicts_with_all = ["clock", "eeprom", "truth", "resume"])]
     trace: bool,
@@ -82,6 +87,9 @@ fn main() -> ExitCode {
 }
 
 fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
+    if let Some(parent) = cli.parent {
+        end_with(parent)?;
+    }
     let images = Images {
         sensor: Image::read(&cli.sensor_elf)?,
         steering: Image::read(&cli.steering_elf)?,
@@ -117,6 +125,16 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
         signal_hook::flag::register(signal, Arc::clone(&shutdown))?;
     }
     run(&images, &config, &shutdown)?;
+    Ok(())
+}
+
+/// Binds this process's life to its parent's: the kernel sends SIGTERM when that one ends, however
+/// it ends.
+fn end_with(parent: i32) -> Result<(), Box<dyn std::error::Error>> {
+    set_parent_process_death_signal(Some(Signal::TERM))?;
+    if getppid().map(Pid::as_raw_nonzero).map(NonZeroI32::get) != Some(parent) {
+        return Err(format!("the parent (process {parent}) is gone").into());
+    }
     Ok(())
 }
 

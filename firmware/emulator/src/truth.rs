@@ -1,7 +1,8 @@
 //! How the robot really is, one line of JSON at a time, and back.
 //!
-//! The emulator knows no topic; whoever started it reads these lines and publishes them. The
-//! fields have the names of the topic `truth/pose`. A killed emulator goes on from the last line.
+//! The emulator knows no topic; whoever started it reads these lines and publishes them. A line is
+//! a sample of the topic `truth/pose` as JSON, so it is read and written there without another
+//! format. A killed emulator goes on from the last line.
 
 use core::time::Duration;
 
@@ -28,7 +29,6 @@ pub struct TruthGood {
 
 /// Where a piece of goods is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
 #[allow(missing_docs)] // As `lager_plant::GoodState`.
 pub enum TruthGoodState {
     Shelf,
@@ -52,12 +52,14 @@ pub struct Truth {
     pub left_mm_per_s: f64,
     /// Speed of the right wheels in mm/s.
     pub right_mm_per_s: f64,
-    /// Duty at the left driver, -255 to 255, negative backwards.
-    pub left_duty: i16,
+    /// Duty at the left driver, 0 to 255, whichever way it turns.
+    pub left_duty: u8,
     /// Duty at the right driver.
-    pub right_duty: i16,
-    /// The product in the claw.
-    pub carrying: Option<i32>,
+    pub right_duty: u8,
+    /// The product in the claw, -1 = none.
+    pub carrying: i32,
+    /// How many goods there are.
+    pub good_count: u16,
     /// Position of servo n at index n - 1, 0 to 1023.
     pub servo_position: [u16; SERVOS],
     /// The goods.
@@ -69,7 +71,7 @@ impl Truth {
     pub fn of(rig: &Rig) -> Self {
         let world = rig.world();
         let state = world.state();
-        let [left_duty, right_duty] = rig.duties();
+        let [left_duty, right_duty] = rig.duties().map(|duty| duty.unsigned_abs().min(255) as u8);
         Self {
             time_ns: rig.world_time().as_nanos() as u64,
             x_mm: state.pose.x,
@@ -79,7 +81,8 @@ impl Truth {
             right_mm_per_s: state.wheel_speeds[1],
             left_duty,
             right_duty,
-            carrying: world.goods().held(),
+            carrying: world.goods().held().unwrap_or(-1),
+            good_count: state.goods.len() as u16,
             servo_position: state.servo_positions,
             goods: state.goods.iter().map(TruthGood::of).collect(),
         }
@@ -165,9 +168,10 @@ mod tests {
             heading_rad: world.pose.heading,
             left_mm_per_s: world.wheel_speeds[0],
             right_mm_per_s: world.wheel_speeds[1],
-            left_duty: -100,
+            left_duty: 100,
             right_duty: 120,
-            carrying: Some(8),
+            carrying: 8,
+            good_count: 4,
             servo_position: world.servo_positions,
             goods: world.goods.iter().map(TruthGood::of).collect(),
         };

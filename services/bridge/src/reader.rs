@@ -146,7 +146,7 @@ impl<'a> Reader<'a> {
             path,
             baud,
             bus,
-            clock: *bus.clock(),
+            clock: bus.clock(),
             events,
             ringer,
             shared,

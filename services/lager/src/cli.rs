@@ -20,6 +20,7 @@ use crate::config::Body;
   lager up                                     the simulated robot and all its services
   lager up --headless --mission 1 --exit-when-done --json
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1
+  lager up --body chip                         the boards' real images in an emulator
   lager up --realtime 20 --lock-memory --core bridge=0 --core logic=1
   lager simulate --seeds 1..20 --warehouse large --mission 1,2
   lager topic hz sensor/line
@@ -130,6 +131,8 @@ pub enum Command {
     Logic(ServiceArgs),
     /// The simulated robot behind two pseudo terminals
     Simulator(ServiceArgs),
+    /// The boards' real images in their emulator, behind two pseudo terminals
+    Emulator(ServiceArgs),
 }
 
 /// `lager mode`.
@@ -147,11 +150,12 @@ pub enum ModeName {
   lager up                                                the simulated robot
   lager up --headless --mission 1,2 --speed 5 --exit-when-done --json
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards
+  lager up --body chip                                    their images in an emulator
   lager up --realtime 20 --lock-memory --core bridge=2 --core logic=3
 
 Real time is for bridge and logic, the services between sensor and steering, and
 for those that take their place after a crash. The supervisor keeps the normal
-priority, and so does the simulated robot, which stands for boards with
+priority, and so does a simulated or emulated body, which stands for boards with
 processors of their own. What is not granted is an error (5) that says how to get
 it; `lager doctor` with the same flags tries it beforehand.")]
 pub struct UpArgs {
@@ -159,18 +163,27 @@ pub struct UpArgs {
     #[arg(long)]
     pub body: Option<Body>,
     /// Serial port of the sensor board (implies --body serial)
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["images", "emulator"])]
     pub sensor: Option<PathBuf>,
     /// Serial port of the steering board (implies --body serial)
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["images", "emulator"])]
     pub steering: Option<PathBuf>,
+    /// Baud rate of both ports, which the boards' images are built for [default: 500000]
+    #[arg(long, value_name = "BAUD")]
+    pub baud: Option<u32>,
+    /// Folder of sensor.elf and steering.elf, what emulated boards run (implies --body chip)
+    #[arg(long, value_name = "FOLDER")]
+    pub images: Option<PathBuf>,
+    /// Program that emulates the boards (implies --body chip)
+    #[arg(long, value_name = "FILE")]
+    pub emulator: Option<PathBuf>,
     /// Built-in warehouse or warehouse file [default: small]
     #[arg(long, value_name = "FILE")]
     pub warehouse: Option<String>,
     /// Seed of the simulated robot's noise [default: 1]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Run the clock of a simulated robot this many times as fast [default: 1]
+    /// Run the clock of a simulated robot this many times as fast, that of an emulated one at most [default: 1]
     #[arg(long, value_name = "X")]
     pub speed: Option<f64>,
     /// Do without a person: a script orders, picks and signals

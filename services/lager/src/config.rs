@@ -4,6 +4,7 @@
 //! effective configuration beside its lock and every child process starts from that one file, so
 //! a flag reaches all of them or none. An unknown key is an error, never ignored.
 
+mod chip;
 mod documented;
 mod realtime;
 
@@ -16,6 +17,7 @@ use lager_plant::Warehouse;
 use lager_ports::{BusConfig, Policy, RobotName};
 use serde::{Deserialize, Serialize};
 
+pub use chip::ChipSection;
 pub use realtime::RealtimeSection;
 
 use crate::realtime::HIGHEST_PRIORITY;
@@ -30,8 +32,8 @@ const LONGEST_SPIN_US: u64 = 20_000;
 pub struct Config {
     /// The robot's name: the middle part of every topic's name.
     pub name: String,
-    /// How many times as fast as real time the robot's clock runs; only a simulated body may
-    /// differ from 1.
+    /// How many times as fast as real time the robot's clock runs; real boards need 1, and
+    /// emulated ones run as fast as the machine can if that is less.
     pub speed: f64,
     /// What the services drive.
     pub body: Body,
@@ -45,8 +47,10 @@ pub struct Config {
     pub serial: SerialSection,
     /// What logic knows of the robot's measures.
     pub logic: LogicSection,
-    /// The simulated robot.
+    /// The simulated robot and the emulated boards' world.
     pub simulator: SimulatorSection,
+    /// The emulated boards.
+    pub chip: ChipSection,
 }
 
 /// What stands at the other end of the two UARTs.
@@ -55,8 +59,21 @@ pub struct Config {
 pub enum Body {
     /// The simulated robot of this program.
     Sim,
+    /// The real boards' images in an emulator, see `[chip]`.
+    Chip,
     /// The real boards, at the ports of `[serial]`.
     Serial,
+}
+
+impl Body {
+    /// The service that stands for the boards where there are none, a subcommand's name.
+    pub fn service(self) -> Option<&'static str> {
+        match self {
+            Self::Sim => Some("simulator"),
+            Self::Chip => Some("emulator"),
+            Self::Serial => None,
+        }
+    }
 }
 
 /// `[bus]`: prefix and root are unset on a robot; tests give every bus its own.
@@ -126,7 +143,7 @@ pub struct LogicSection {
     pub sensor_ahead_mm: f32,
 }
 
-/// `[simulator]`: the simulated robot.
+/// `[simulator]`: the simulated robot and the emulated boards' world.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatorSection {
@@ -146,6 +163,7 @@ impl Default for Config {
             serial: SerialSection::default(),
             logic: LogicSection::default(),
             simulator: SimulatorSection::default(),
+            chip: ChipSection::default(),
         }
     }
 }
@@ -221,7 +239,7 @@ impl Config {
         }
         if self.body == Body::Serial && self.speed != 1.0 {
             bail!(
-                "speed {} needs a simulated body; real boards run at 1",
+                "speed {} needs a simulated or emulated body; real boards run at 1",
                 self.speed
             );
         }
@@ -245,6 +263,7 @@ impl Config {
         Ok(BusConfig {
             robot: self.name.parse()?,
             speed: self.speed,
+            clock: self.chip.clock.clone(),
             prefix: self.bus.prefix.clone(),
             root: self.bus.root.clone(),
         })

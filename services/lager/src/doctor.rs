@@ -41,6 +41,7 @@ pub fn run(config: &Config, fix: bool) -> Result<ExitCode> {
         ("open files", open_files()),
         ("session clean-up", remove_ipc()),
         ("serial rights", serial(config)),
+        ("emulated boards", emulated(config)),
         ("bus", bus(config, fix)),
     ];
     let findings = findings.into_iter().chain(realtime::findings(config));
@@ -128,8 +129,8 @@ fn remove_ipc() -> Finding {
 }
 
 fn serial(config: &Config) -> Finding {
-    if config.body == Body::Sim {
-        return Good("not needed by a simulated robot".into());
+    if config.body != Body::Serial {
+        return Good("not needed by a simulated or emulated robot".into());
     }
     for port in [&config.serial.sensor, &config.serial.steering] {
         let name = port.display();
@@ -154,6 +155,19 @@ fn serial(config: &Config) -> Finding {
         config.serial.sensor.display(),
         config.serial.steering.display()
     ))
+}
+
+fn emulated(config: &Config) -> Finding {
+    match config.chip.parts() {
+        Ok(parts) => Good(format!(
+            "{} runs {} and {}",
+            parts.emulator.display(),
+            parts.sensor_elf.display(),
+            parts.steering_elf.display()
+        )),
+        Err(missing) if config.body == Body::Chip => Bad(missing.to_string()),
+        Err(missing) => Hint(format!("only `lager up --body chip` needs them: {missing}")),
+    }
 }
 
 fn bus(config: &Config, fix: bool) -> Finding {

@@ -42,7 +42,7 @@ impl Keepers {
         match service {
             "bridge" => self.bridge.hand_over()?,
             "logic" => self.logic.hand_over()?,
-            "simulator" => self.simulator.hand_over()?,
+            "simulator" | "emulator" => self.simulator.hand_over()?,
             _ => {}
         }
         Ok(())

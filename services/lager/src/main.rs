@@ -10,6 +10,7 @@ mod bench;
 mod cli;
 mod config;
 mod doctor;
+mod emulator;
 mod exit;
 mod hands;
 mod keepers;
@@ -37,7 +38,7 @@ use lager_simulator::SimulatorConfig;
 use lager_topics::{Mode, Role};
 
 use crate::cli::{Cli, Command, GlobalArgs, ModeName, ServiceArgs, TopicArgs, TopicCommand};
-use crate::config::Config;
+use crate::config::{ChipSection, Config};
 use crate::steer::Operator;
 
 fn main() -> ExitCode {
@@ -107,6 +108,24 @@ fn run(cli: Cli) -> Result<ExitCode> {
                 };
                 Ok(lager_simulator::run(bus, &simulator, &shutdown)?)
             })?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Emulator(args) => {
+            // It is what the clock follows, so its own bus has another.
+            let resting = Config {
+                chip: ChipSection {
+                    clock: None,
+                    ..config.chip.clone()
+                },
+                ..config.clone()
+            };
+            service(
+                &resting,
+                Role::Simulator,
+                &args,
+                &shutdown,
+                |bus, resume| emulator::run(bus, &config, resume, &shutdown),
+            )?;
             return Ok(ExitCode::SUCCESS);
         }
         Command::Topic(args) => {

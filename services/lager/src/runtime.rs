@@ -1,5 +1,5 @@
 //! Where a running robot keeps its few files: the lock of its `up`, the effective configuration
-//! and the links to the simulated ports.
+//! the links to the simulated or emulated ports, and an emulated body's clock and EEPROMs.
 //!
 //! The folder is the user's own, one for each bus and robot. The lock is an flock, so that a
 //! killed supervisor leaves nothing to clean up.
@@ -51,6 +51,24 @@ impl RuntimeFolder {
             return Ok(None);
         }
         Config::load(Some(&file)).map(Some)
+    }
+
+    /// The page for an emulated body's time. One that a killed robot has left is gone, so that
+    /// nobody takes it for the new one.
+    pub fn fresh_clock(&self) -> Result<PathBuf> {
+        let path = self.0.join("clock");
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error)
+                .with_context(|| format!("cannot remove the old clock page {}", path.display())),
+            _ => Ok(path),
+        }
+    }
+
+    /// The folder for the EEPROMs of emulated boards.
+    pub fn eeprom(&self) -> Result<PathBuf> {
+        let path = self.0.join("eeprom");
+        fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
+        Ok(path)
     }
 
     /// Where the simulated port of the sensor board is linked.

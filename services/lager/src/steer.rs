@@ -37,11 +37,15 @@ impl Operator {
     /// # Errors
     /// When no bridge of this robot answers.
     pub fn new(config: &Config) -> Result<Self> {
-        // The robot's clock may run faster than this command's configuration says.
-        let running = RuntimeFolder::running(config)?;
-        let bus = BusConfig {
-            speed: running.map_or(config.speed, |running| running.speed),
-            ..config.bus()?
+        // The robot's clock may be another than this command's configuration says.
+        let running = RuntimeFolder::running(config)?.map(|running| running.bus());
+        let bus = match running.transpose()? {
+            Some(BusConfig { speed, clock, .. }) => BusConfig {
+                speed,
+                clock,
+                ..config.bus()?
+            },
+            None => config.bus()?,
         };
         let bus = Bus::open(&bus, Role::Operator)?;
         let operator = Self {
@@ -277,7 +281,7 @@ impl Operator {
             code: command.firmware().code(),
             arm_granted: 0,
         };
-        let clock = *self.bus.clock();
+        let clock = self.bus.clock();
         let end = match seconds {
             Some(seconds) => Some(clock.now() + Duration::try_from_secs_f64(seconds)?),
             None => None,

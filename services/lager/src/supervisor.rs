@@ -21,7 +21,7 @@ const FIRST_WAIT: Duration = Duration::from_millis(50);
 /// The longest wait between two starts.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// How long a child may take to stop before it is killed.
-const PATIENCE: Duration = Duration::from_secs(3);
+pub const PATIENCE: Duration = Duration::from_secs(3);
 
 /// All children of one robot, in the order in which they start.
 pub struct Supervisor {
@@ -194,7 +194,7 @@ impl Drop for Supervisor {
 }
 
 /// Whether `child` ends within `patience`.
-fn ends_within(child: &mut Child, patience: Duration) -> bool {
+pub fn ends_within(child: &mut Child, patience: Duration) -> bool {
     let give_up = Instant::now() + patience;
     while matches!(child.try_wait(), Ok(None)) {
         if Instant::now() >= give_up {

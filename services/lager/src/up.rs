@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use lager_plant::Warehouse;
-use lager_ports::{Bus, Shutdown};
+use lager_ports::{Bus, BusConfig, OpenError, Shutdown};
 use lager_topics::Role;
 
 use crate::cli::UpArgs;
-use crate::config::{Body, Config};
+use crate::config::{Body, ChipSection, Config};
 use crate::exit;
 use crate::hands::Hands;
 use crate::keepers::Keepers;
@@ -27,6 +27,9 @@ use crate::supervisor::Supervisor;
 const TICK: Duration = Duration::from_millis(10);
 /// How often dead nodes are swept from the bus.
 const SWEEP: Duration = Duration::from_millis(250);
+/// How long emulated boards may stand still before they are given up, in real time: longer than
+/// the supervisor waits between two starts.
+const STANDSTILL: Duration = Duration::from_secs(30);
 
 /// Runs until Ctrl-C, or until the mission has ended when that was asked for.
 pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<ExitCode> {
@@ -35,7 +38,7 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     let warehouse = config.warehouse()?;
     let mission = mission(&warehouse, &args.mission)?;
     // A real robot does not move off by itself: there somebody has to ask for the script.
-    let scripted = args.headless || config.body == Body::Sim;
+    let scripted = args.headless || config.body != Body::Serial;
     if !scripted && (args.exit_when_done || !args.mission.is_empty()) {
         bail!("on a real robot a mission needs --headless: there the script is the operator");
     }
@@ -44,27 +47,33 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
 
     let folder = RuntimeFolder::create(&config)?;
     let _lock = folder.lock(&config.name)?;
-    if config.body == Body::Sim {
+    if config.body != Body::Serial {
         config.serial.sensor = folder.sensor_port();
         config.serial.steering = folder.steering_port();
     }
+    config.chip.clock = None;
+    if config.body == Body::Chip {
+        equip(&mut config.chip, &folder)?;
+    }
     let file = folder.write_config(&config)?;
 
-    let bus = Bus::open(&config.bus()?, Role::Supervisor)?;
+    let mut supervisor = Supervisor::new(file)?;
+    if let Some(body) = config.body.service() {
+        supervisor.start(body)?;
+    }
+    let bus = join(&config.bus()?, &mut supervisor, shutdown)?;
     let mut keepers = Keepers::new(&bus)?;
     let mut narrator = Narrator::new(&bus, args.json)?;
     let hands = Hands::new(&bus)?;
     hands.publish_map(&bus_map(&warehouse))?;
 
-    let mut supervisor = Supervisor::new(file)?;
-    if config.body == Body::Sim {
-        supervisor.start("simulator")?;
-    }
     supervisor.start("bridge")?;
     supervisor.start("logic")?;
 
     let started = Instant::now();
-    let robot_start = bus.clock().now();
+    let clock = bus.clock();
+    let robot_start = clock.now();
+    let mut standing = Standing::default();
     let mut operator = scripted.then(|| ScriptedOperator::new(mission, Hands::fresh_id()));
     let mut swept = started;
     let mut complaints = Complaints::default();
@@ -78,27 +87,31 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
             bus.sweep();
             swept = Instant::now();
         }
-        complaints.hear(narrator.look(bus.clock().now() - robot_start));
+        complaints.hear(narrator.look(clock.now() - robot_start));
         hands.tick();
         if let Some(operator) = &mut operator {
-            if let Some(act) = operator.step(bus.clock().now(), narrator.seen()) {
+            if let Some(act) = operator.step(clock.now(), narrator.seen()) {
                 complaints.hear(hands.carry_out(act));
             }
-            if operator.outcome().is_some() && args.exit_when_done {
+            let over = operator.outcome().is_some() || standing.too_long(clock.now());
+            if over && args.exit_when_done {
                 break;
             }
         }
-        std::thread::sleep(bus.clock().real(2 * TICK).min(TICK));
+        std::thread::sleep(clock.real(2 * TICK).min(TICK));
     }
 
     // The robot is stopped before anything else is looked at.
     supervisor.stop();
-    complaints.hear(narrator.look(bus.clock().now() - robot_start));
+    complaints.hear(narrator.look(clock.now() - robot_start));
     let delivered = operator
         .as_ref()
         .map_or_else(Vec::new, |operator| operator.delivered().to_vec());
     let failure = match operator.as_ref().and_then(ScriptedOperator::outcome) {
         Some(Err(why)) => Some(why.to_owned()),
+        None if standing.is_too_long() => {
+            Some("the emulated boards stand still; what ended them stands above".into())
+        }
         None if args.exit_when_done => Some("interrupted before the mission was delivered".into()),
         _ => delivered
             .iter()
@@ -107,7 +120,7 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     };
     let outcome = Outcome {
         delivered,
-        sim_seconds: (bus.clock().now() - robot_start).as_secs_f64(),
+        sim_seconds: (clock.now() - robot_start).as_secs_f64(),
         wall_seconds: started.elapsed().as_secs_f64(),
         frames: narrator.frames(),
         lost: narrator.lost(),
@@ -133,6 +146,58 @@ fn rehearse(config: &Config) -> Result<()> {
         wanted.rehearse()?;
     }
     Ok(())
+}
+
+/// Chooses the places of an emulated body's files, and finds out whether it has all it needs.
+fn equip(chip: &mut ChipSection, folder: &RuntimeFolder) -> Result<()> {
+    let parts = chip.parts()?;
+    *chip = ChipSection {
+        emulator: Some(parts.emulator),
+        sensor_elf: Some(parts.sensor_elf),
+        steering_elf: Some(parts.steering_elf),
+        eeprom: Some(match chip.eeprom.take() {
+            Some(eeprom) => eeprom,
+            None => folder.eeprom()?,
+        }),
+        clock: Some(folder.fresh_clock()?),
+    };
+    Ok(())
+}
+
+/// Joins the bus, as soon as the body has a clock to follow.
+fn join(config: &BusConfig, supervisor: &mut Supervisor, shutdown: &Shutdown) -> Result<Bus> {
+    let start = Instant::now();
+    loop {
+        match Bus::open(config, Role::Supervisor) {
+            Err(OpenError::NoClock { .. } | OpenError::ForeignClock(_))
+                if start.elapsed() < STANDSTILL && !shutdown.is_requested() => {}
+            joined => return Ok(joined?),
+        }
+        if let Some(ended) = supervisor.poll(|_| {}).first() {
+            bail!("the {} does not start ({})", ended.service, ended.how);
+        }
+        std::thread::sleep(TICK);
+    }
+}
+
+/// How long the robot's clock has not moved, which only an emulated body's can do.
+#[derive(Default)]
+struct Standing(Option<(Duration, Instant)>);
+
+impl Standing {
+    /// Looks at the clock: whether it has stood still for so long that no mission will end.
+    fn too_long(&mut self, now: Duration) -> bool {
+        if self.0.is_none_or(|(then, _)| then != now) {
+            self.0 = Some((now, Instant::now()));
+        }
+        self.is_too_long()
+    }
+
+    /// As the last look found it.
+    fn is_too_long(&self) -> bool {
+        self.0
+            .is_some_and(|(_, since)| since.elapsed() >= STANDSTILL)
+    }
 }
 
 /// Errors of the bus that pass: the next attempt may succeed, and the robot must not end with
@@ -169,6 +234,15 @@ fn apply(config: &mut Config, args: &UpArgs) {
     if let Some(body) = args.body {
         config.body = body;
     }
+    if let Some(folder) = &args.images {
+        config.body = Body::Chip;
+        config.chip.sensor_elf = Some(folder.join("sensor.elf"));
+        config.chip.steering_elf = Some(folder.join("steering.elf"));
+    }
+    if let Some(emulator) = &args.emulator {
+        config.body = Body::Chip;
+        config.chip.emulator = Some(emulator.clone());
+    }
     if args.sensor.is_some() || args.steering.is_some() {
         config.body = Body::Serial;
     }
@@ -177,6 +251,9 @@ fn apply(config: &mut Config, args: &UpArgs) {
     }
     if let Some(port) = &args.steering {
         config.serial.steering.clone_from(port);
+    }
+    if let Some(baud) = args.baud {
+        config.serial.baud = baud;
     }
     if let Some(warehouse) = &args.warehouse {
         config.warehouse.clone_from(warehouse);

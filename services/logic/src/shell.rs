@@ -111,7 +111,7 @@ impl Shell {
             None => Navigator::new(*config),
         };
         Ok(Self {
-            clock: *bus.clock(),
+            clock: bus.clock(),
             // Before the subscribers: what they miss while they are made is drained anyway.
             waiter: bus.waiter(config.waiting)?,
             line: bus.subscriber()?,

@@ -98,7 +98,7 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
         ],
         robot,
     };
-    shell.run(bus.clock(), shutdown)
+    shell.run(&bus.clock(), shutdown)
 }
 
 struct Line {

@@ -83,7 +83,7 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
     let mut core = Core::new(bus, config, &shared, kept.as_ref(), [first_out, second_out])?;
     let ringer = core.waiter.ringer()?;
     shutdown.wake(ringer.clone());
-    let clock = *bus.clock();
+    let clock = bus.clock();
     std::thread::scope(|scope| {
         for (place, events) in [first_in, second_in].into_iter().enumerate() {
             let port = (config.ports[place].as_path(), config.baud);
@@ -182,7 +182,7 @@ impl<'a> Core<'a> {
             );
         }
         Ok(Self {
-            clock: *bus.clock(),
+            clock: bus.clock(),
             config,
             shared,
             waiter: bus.waiter(config.waiting)?,

@@ -1,5 +1,7 @@
 //! The configuration as a file with every key explained: what `lager config` prints.
 
+use std::path::PathBuf;
+
 use super::{Body, Config, Waiting};
 use crate::realtime::CoreSet;
 
@@ -12,14 +14,21 @@ impl Config {
             None => format!("# {name} = \"...\""),
         };
         let cores = |cores: &CoreSet| format!("{:?}", cores.iter().collect::<Vec<_>>());
-        let root = self.bus.root.as_ref().map(|root| root.to_string_lossy());
+        let unset_path = |name: &str, path: &Option<PathBuf>| {
+            unset(
+                name,
+                path.as_ref().map(|path| path.to_string_lossy()).as_deref(),
+            )
+        };
         format!(
             "\
 # The robot's name: the middle part of every topic's name.
 name = {name}
-# How many times as fast as real time the robot's clock runs; real boards need 1.
+# How many times as fast as real time the robot's clock runs; real boards need 1, emulated ones run
+# as fast as the machine can if that is less.
 speed = {speed:?}
-# What the services drive: \"sim\", the simulated robot, or \"serial\", the boards at [serial].
+# What the services drive: \"sim\", the simulated robot, \"chip\", the boards' real images in an
+# emulator, or \"serial\", the boards at [serial].
 body = {body}
 # A built-in warehouse (small, curved, large) or the path of a warehouse file.
 warehouse = {warehouse}
@@ -40,8 +49,8 @@ longest_spin_us = {longest_spin_us}
 # would go before the interrupt threads that bring the boards' bytes on a PREEMPT_RT kernel.
 # Needs LimitRTPRIO= in the systemd unit, `ulimit -r`, or CAP_SYS_NICE: `lager doctor` tries it.
 priority = {priority}
-# Keep all memory of bridge and logic from being paged out (mlockall): 29 MiB each,
-# of which 15 MiB would not be in memory otherwise.
+# Keep all memory of bridge and logic from being paged out (mlockall): 32 MiB each,
+# of which 18 MiB would not be in memory otherwise.
 # Needs LimitMEMLOCK= in the systemd unit, `ulimit -l`, or CAP_IPC_LOCK: `lager doctor` tries it.
 lock_memory = {lock_memory}
 
@@ -71,16 +80,28 @@ sensor_ahead_mm = {ahead:?}
 [simulator]
 # Seed of all noise: the same seed is the same robot.
 seed = {seed}
+
+[chip]
+# The emulator's program and the boards' images, built for [serial] baud. Unset, they are looked for
+# beside this program and in the source tree.
+{emulator}
+{sensor_elf}
+{steering_elf}
+# Folder that keeps both boards' EEPROM, and so their settings; unset, as long as the robot is up.
+{eeprom}
+# The page in which the emulator publishes the robot's time; `lager up` chooses its own.
+{clock}
 ",
             name = quoted(&self.name),
             speed = self.speed,
             body = match self.body {
                 Body::Sim => "\"sim\"",
+                Body::Chip => "\"chip\"",
                 Body::Serial => "\"serial\"",
             },
             warehouse = quoted(&self.warehouse),
             prefix = unset("prefix", self.bus.prefix.as_deref()),
-            root = unset("root", root.as_deref()),
+            root = unset_path("root", &self.bus.root),
             sensor = quoted(&self.serial.sensor.to_string_lossy()),
             steering = quoted(&self.serial.steering.to_string_lossy()),
             baud = self.serial.baud,
@@ -99,6 +120,11 @@ seed = {seed}
             cruise = self.logic.cruise_mm_per_s,
             ahead = self.logic.sensor_ahead_mm,
             seed = self.simulator.seed,
+            emulator = unset_path("emulator", &self.chip.emulator),
+            sensor_elf = unset_path("sensor_elf", &self.chip.sensor_elf),
+            steering_elf = unset_path("steering_elf", &self.chip.steering_elf),
+            eeprom = unset_path("eeprom", &self.chip.eeprom),
+            clock = unset_path("clock", &self.chip.clock),
         )
     }
 }
@@ -106,7 +132,7 @@ seed = {seed}
 #[cfg(test)]
 mod tests {
     use super::super::realtime::CoresSection;
-    use super::super::{BusSection, RealtimeSection};
+    use super::super::{BusSection, ChipSection, RealtimeSection};
     use super::*;
 
     #[test]
@@ -129,6 +155,13 @@ mod tests {
                     bridge: [0, 2].into_iter().collect(),
                     ..CoresSection::default()
                 },
+            },
+            chip: ChipSection {
+                emulator: Some("/opt/emulator".into()),
+                sensor_elf: Some("sensor.elf".into()),
+                steering_elf: Some("steering.elf".into()),
+                eeprom: Some("/var/eeprom".into()),
+                clock: Some("/run/clock".into()),
             },
             ..Config::default()
         };

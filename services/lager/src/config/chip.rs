@@ -1,0 +1,238 @@
+//! `[chip]`: the boards' real images in their emulator, and where these are found.
+//!
+//! The emulator is a program of its own, since what it is made of is GPL-3; nothing of this
+//! program is linked with it. It and the images are looked for beside this program, as an
+//! installation may have them, and in the source tree that this program or the current folder is
+//! in.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+/// `[chip]`: unset files are looked for.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ChipSection {
+    /// The emulator's program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub emulator: Option<PathBuf>,
+    /// The sensor board's image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor_elf: Option<PathBuf>,
+    /// The steering board's image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steering_elf: Option<PathBuf>,
+    /// The folder that keeps both boards' EEPROM.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub eeprom: Option<PathBuf>,
+    /// The page in which the emulator publishes the robot's time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clock: Option<PathBuf>,
+}
+
+/// The files that an emulated robot cannot do without.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parts {
+    /// The emulator's program.
+    pub emulator: PathBuf,
+    /// The sensor board's image.
+    pub sensor_elf: PathBuf,
+    /// The steering board's image.
+    pub steering_elf: PathBuf,
+}
+
+/// What is not there, one sentence for each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MissingParts(Vec<String>);
+
+impl fmt::Display for MissingParts {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            formatter,
+            "the emulated boards lack something: {}",
+            self.0.join("; ")
+        )
+    }
+}
+
+impl std::error::Error for MissingParts {}
+
+/// One of the files: its key, its place beside this program, its place in the source tree, and
+/// what builds it.
+struct Part {
+    key: &'static str,
+    installed: &'static str,
+    built: &'static str,
+    command: &'static str,
+}
+
+const EMULATOR: Part = Part {
+    key: "emulator",
+    installed: "lager-emulator",
+    built: "firmware/emulator/target/release/lager-emulator",
+    command: "build it with `cargo build --release` in firmware/emulator, whose README.md says what that needs",
+};
+const SENSOR: Part = Part {
+    key: "sensor_elf",
+    installed: "sensor.elf",
+    built: "firmware/avr/target/images/sensor.elf",
+    command: IMAGES,
+};
+const STEERING: Part = Part {
+    key: "steering_elf",
+    installed: "steering.elf",
+    built: "firmware/avr/target/images/steering.elf",
+    command: IMAGES,
+};
+const IMAGES: &str = "build both images with `firmware/avr/build`, which says what it needs";
+
+impl ChipSection {
+    /// The files this machine has, with their whole paths.
+    ///
+    /// # Errors
+    /// What is missing and how to get it.
+    pub fn parts(&self) -> Result<Parts, MissingParts> {
+        let program = std::env::current_exe().unwrap_or_default();
+        let current = std::env::current_dir().unwrap_or_default();
+        self.parts_near(program.parent().unwrap_or(Path::new("/")), &current)
+    }
+
+    fn parts_near(&self, program: &Path, current: &Path) -> Result<Parts, MissingParts> {
+        let mut missing = Vec::new();
+        let mut find = |part: &Part, named: Option<&PathBuf>| {
+            part.find(named, program, current)
+                .map_err(|sentence| missing.push(sentence))
+        };
+        let found = (
+            find(&EMULATOR, self.emulator.as_ref()),
+            find(&SENSOR, self.sensor_elf.as_ref()),
+            find(&STEERING, self.steering_elf.as_ref()),
+        );
+        match found {
+            (Ok(emulator), Ok(sensor_elf), Ok(steering_elf)) => Ok(Parts {
+                emulator,
+                sensor_elf,
+                steering_elf,
+            }),
+            _ => Err(MissingParts(missing)),
+        }
+    }
+}
+
+impl Part {
+    fn find(
+        &self,
+        named: Option<&PathBuf>,
+        program: &Path,
+        current: &Path,
+    ) -> Result<PathBuf, String> {
+        let Self { key, command, .. } = self;
+        if let Some(named) = named {
+            let whole = current.join(named);
+            return if whole.is_file() {
+                Ok(whole)
+            } else {
+                Err(format!(
+                    "{} is not there, which [chip] {key} names; {command}",
+                    named.display()
+                ))
+            };
+        }
+        let trees = program.ancestors().chain(current.ancestors());
+        core::iter::once(program.join(self.installed))
+            .chain(trees.map(|tree| tree.join(self.built)))
+            .find(|path| path.is_file())
+            .ok_or_else(|| {
+                format!(
+                    "there is no {}; {command}, or name it in the configuration's [chip] {key}",
+                    self.built
+                )
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    /// An empty folder of the test's own.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let name = format!("lager-parts-{}-{name}", std::process::id());
+            let folder = std::env::temp_dir().join(name);
+            fs::create_dir_all(&folder).expect("a temporary folder");
+            Self(folder)
+        }
+
+        fn put(&self, path: &str) -> PathBuf {
+            let path = self.0.join(path);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            fs::write(&path, b"").expect("a file");
+            path
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn what_was_built_is_found_from_the_program_and_from_any_folder_of_the_tree() {
+        let tree = Folder::new("tree");
+        let parts = Parts {
+            emulator: tree.put(EMULATOR.built),
+            sensor_elf: tree.put(SENSOR.built),
+            steering_elf: tree.put(STEERING.built),
+        };
+        let chip = ChipSection::default();
+        let (program, elsewhere) = (tree.0.join("target/release"), Path::new("/"));
+        assert_eq!(chip.parts_near(&program, elsewhere), Ok(parts.clone()));
+        assert_eq!(chip.parts_near(elsewhere, &tree.0.join("bus")), Ok(parts));
+    }
+
+    #[test]
+    fn a_file_that_is_named_goes_before_one_that_is_found() {
+        let tree = Folder::new("named");
+        for part in [&EMULATOR, &SENSOR, &STEERING] {
+            tree.put(part.built);
+        }
+        let named = tree.put("slow/sensor.elf");
+        let chip = ChipSection {
+            sensor_elf: Some("slow/sensor.elf".into()),
+            ..ChipSection::default()
+        };
+        let parts = chip.parts_near(Path::new("/"), &tree.0).expect("all there");
+        assert_eq!(parts.sensor_elf, named);
+    }
+
+    #[test]
+    fn what_is_missing_is_told_with_the_command_that_builds_it() {
+        let tree = Folder::new("bare");
+        let chip = ChipSection {
+            sensor_elf: Some("nowhere.elf".into()),
+            ..ChipSection::default()
+        };
+        let told = |chip: &ChipSection| {
+            let missing = chip.parts_near(&tree.0, &tree.0);
+            missing.expect_err("nothing is there").to_string()
+        };
+        let all = told(&chip);
+        for words in [
+            "cargo build --release` in firmware/emulator",
+            "firmware/avr/build",
+            "nowhere.elf is not there",
+            "[chip] steering_elf",
+        ] {
+            assert!(all.contains(words), "`{words}` is missing: {all}");
+        }
+        tree.put("lager-emulator");
+        assert!(!told(&chip).contains("cargo"), "{}", told(&chip));
+    }
+}

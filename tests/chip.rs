@@ -1,0 +1,257 @@
+//! The robot on its boards' real images: `lager up --body chip`, with the emulator as a process
+//! that can be slow, stopped or killed. `tests/run` builds the emulator and the images first.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use lager_ports::{Bus, BusConfig, Clock, Subscriber};
+use lager_tests::{Domain, Running, children, has_ended, is_stopped, pid, wait_for};
+use lager_topics::{GoodState, LinkHealth, NavStatus, Phase, Role, TruthPose};
+use rustix::process::{Signal, kill_process};
+
+const MISSION: [&str; 8] = [
+    "up",
+    "--body",
+    "chip",
+    "--headless",
+    "--mission",
+    "1",
+    "--exit-when-done",
+    "--json",
+];
+
+/// `lager up` on the images. Where the build has a folder of its own, they are not where it looks.
+fn up(domain: &Domain, more: &[&str]) -> Running {
+    let mut arguments: Vec<String> = MISSION
+        .iter()
+        .chain(more)
+        .map(ToString::to_string)
+        .collect();
+    if let Some(target) = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from) {
+        for (flag, path) in [
+            ("--emulator", target.join("release/lager-emulator")),
+            ("--images", target.join("images")),
+        ] {
+            arguments.extend([flag.to_owned(), path.display().to_string()]);
+        }
+    }
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    domain.start(&arguments)
+}
+
+/// What an observer sees of the robot, by the robot's own clock.
+struct Watch {
+    clock: Clock,
+    health: Subscriber<LinkHealth>,
+    status: Subscriber<NavStatus>,
+    truth: Subscriber<TruthPose>,
+}
+
+impl Watch {
+    /// Joins as soon as the robot has a clock.
+    fn new(domain: &Domain, up: &mut Running) -> Self {
+        let config = BusConfig {
+            clock: Some(domain.clock_page("r1")),
+            ..domain.bus("r1", 1.0)
+        };
+        let bus = wait_for("the clock page", || {
+            assert!(up.is_running(), "{}", up.log());
+            Bus::open(&config, Role::Observer).ok()
+        });
+        Self {
+            clock: bus.clock(),
+            health: bus.subscriber().expect("a topic"),
+            status: bus.subscriber().expect("a topic"),
+            truth: bus.subscriber().expect("a topic"),
+        }
+    }
+
+    fn wait_until(&mut self, up: &mut Running, phase: Phase) {
+        wait_for(&format!("the robot to be {phase:?}"), || {
+            assert!(up.is_running(), "{}", up.log());
+            let status = self.status.latest().expect("readable")?;
+            (status.phase.get() == Some(phase)).then_some(())
+        });
+    }
+
+    fn leases_expired(&mut self) -> u32 {
+        wait_for("link/health", || self.health.latest().expect("readable")).leases_expired
+    }
+
+    /// Waits for the end of the mission and returns its JSON, after the world has shown product 1
+    /// where it was to be brought.
+    fn delivered(&mut self, up: &mut Running) -> serde_json::Value {
+        let mut state = None;
+        while up.is_running() {
+            if let Some(truth) = self.truth.latest().expect("readable") {
+                let good = truth.goods().iter().find(|good| good.id == 1);
+                state = good.and_then(|good| good.state.get());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert_eq!(up.wait(), Some(0), "{}", up.log());
+        assert_eq!(state, Some(GoodState::Delivered), "{}", up.log());
+        let told = up.json();
+        assert_eq!(told["delivered"], serde_json::json!([1]), "{told}");
+        told
+    }
+}
+
+/// The process of the emulator.
+fn emulator(up: &Running) -> u32 {
+    wait_for("the emulator", || {
+        children(up.service("emulator")?).first().copied()
+    })
+}
+
+#[test]
+fn a_mission_on_the_real_images_is_delivered_even_if_they_are_held_up() {
+    let domain = Domain::new();
+    let mut up = up(&domain, &[]);
+    let mut watch = Watch::new(&domain, &mut up);
+    watch.wait_until(&mut up, Phase::Driving);
+    let expired = watch.leases_expired();
+
+    // A machine that has no time for the chips for far longer than a lease of 120 ms.
+    let chips = emulator(&up);
+    kill_process(pid(chips), Signal::STOP).expect("a living emulator");
+    wait_for("the emulator to stop", || is_stopped(chips).then_some(()));
+    let before = watch.clock.now();
+    std::thread::sleep(Duration::from_millis(1_500));
+    assert_eq!(watch.clock.now(), before, "the robot's time stands still");
+    kill_process(pid(chips), Signal::CONT).expect("a living emulator");
+    wait_for("time to go on", || {
+        (watch.clock.now() > before + Duration::from_millis(500)).then_some(())
+    });
+    assert_eq!(watch.leases_expired(), expired, "{}", up.log());
+
+    let told = watch.delivered(&mut up);
+    assert_eq!(told["lost"], 0, "{told}\n{}", up.log());
+    assert_eq!(told["restarts"], 0, "{told}\n{}", up.log());
+    assert!(!up.log().contains("silent"), "{}", up.log());
+    drop(watch);
+    domain.assert_clean();
+}
+
+#[test]
+fn a_killed_emulator_is_started_again_and_the_mission_ends() {
+    let domain = Domain::new();
+    // As fast as the machine can: the services follow.
+    let mut up = up(&domain, &["--speed", "20"]);
+    let mut watch = Watch::new(&domain, &mut up);
+    let restarted = |watch: &mut Watch, up: &mut Running, victim: u32, chips: u32| {
+        let before = watch.clock.now();
+        kill_process(pid(victim), Signal::KILL).expect("a living process");
+        wait_for("the emulator to end", || has_ended(chips).then_some(()));
+        let next = wait_for("another emulator", || {
+            assert!(up.is_running(), "{}", up.log());
+            let service = up.service("emulator")?;
+            children(service)
+                .first()
+                .copied()
+                .filter(|next| *next != chips)
+        });
+        wait_for("its boards", || {
+            let health = watch.health.latest().expect("readable")?;
+            let whole = health.sensor.up != 0 && health.steering.up != 0;
+            (whole && watch.clock.now() > before + Duration::from_secs(1)).then_some(())
+        });
+        next
+    };
+
+    watch.wait_until(&mut up, Phase::Driving);
+    let first = emulator(&up);
+    let second = restarted(&mut watch, &mut up, first, first);
+    // The service that owns it takes it along.
+    watch.wait_until(&mut up, Phase::Leaving);
+    let service = up.service("emulator").expect("a service");
+    restarted(&mut watch, &mut up, service, second);
+
+    let told = watch.delivered(&mut up);
+    assert_eq!(told["restarts"], 2, "{told}\n{}", up.log());
+    drop(watch);
+    domain.assert_clean();
+}
+
+#[test]
+fn a_killed_supervisor_takes_the_emulator_along_and_the_next_one_starts() {
+    let domain = Domain::new();
+    let mut first = up(&domain, &[]);
+    let mut watch = Watch::new(&domain, &mut first);
+    watch.wait_until(&mut first, Phase::Driving);
+    let (service, chips) = (
+        first.service("emulator").expect("a service"),
+        emulator(&first),
+    );
+    drop(watch);
+    first.signal(Signal::KILL);
+    first.wait();
+    for process in [service, chips] {
+        wait_for("the child to end", || has_ended(process).then_some(()));
+    }
+
+    let mut second = up(&domain, &[]);
+    // The page of the killed robot may still be there for a moment; this one's time moves.
+    wait_for("the next robot to drive", || {
+        let mut watch = Watch::new(&domain, &mut second);
+        let start = watch.clock.now();
+        let moves = (0..1_000).any(|_| {
+            std::thread::sleep(Duration::from_millis(1));
+            watch.clock.now() > start
+        });
+        moves.then(|| watch.wait_until(&mut second, Phase::Driving))
+    });
+    second.signal(Signal::TERM);
+    assert_eq!(second.wait(), Some(3), "{}", second.log());
+    domain.assert_clean();
+}
+
+#[test]
+fn what_is_missing_is_an_error_that_tells_how_to_build_it() {
+    let domain = Domain::new();
+    let nowhere = domain.folder().join("nowhere");
+    let nowhere = nowhere.to_str().expect("a path in UTF-8");
+    let refused = domain.run(&["up", "--images", nowhere, "--emulator", nowhere]);
+    assert_eq!(refused.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    for words in [
+        "firmware/avr/build",
+        "cargo build --release` in firmware/emulator",
+    ] {
+        assert!(said.contains(words), "`{words}` is missing: {said}");
+    }
+
+    let config = domain.folder().join("robot.toml");
+    let chip = format!("body = \"chip\"\n[chip]\nemulator = {nowhere:?}\n");
+    std::fs::write(&config, chip).expect("a configuration file");
+    let config = config.to_str().expect("a path in UTF-8");
+    let doctor = domain.run(&["--config", config, "doctor"]);
+    assert_eq!(doctor.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&doctor.stdout).into_owned();
+    let line = said.lines().find(|line| line.contains("emulated boards"));
+    let line = line.expect("a line on the emulated boards");
+    assert!(
+        line.starts_with("BAD") && line.contains("firmware/emulator"),
+        "{said}"
+    );
+    domain.assert_clean();
+}
+
+#[test]
+fn an_emulator_that_cannot_run_ends_up_with_a_sentence() {
+    let domain = Domain::new();
+    let images = domain.folder().join("images");
+    std::fs::create_dir(&images).expect("a folder");
+    for image in ["sensor.elf", "steering.elf"] {
+        std::fs::write(images.join(image), b":10000000").expect("a file");
+    }
+    let mut up = up(
+        &domain,
+        &["--images", images.to_str().expect("a path in UTF-8")],
+    );
+    assert_eq!(up.wait(), Some(1), "{}", up.log());
+    let log = up.log();
+    assert!(log.contains("not an ELF file for an AVR"), "{log}");
+    assert!(log.contains("the emulator does not start"), "{log}");
+    domain.assert_clean();
+}
