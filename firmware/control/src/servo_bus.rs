@@ -20,6 +20,9 @@ use crate::time::reached;
 /// How often a question is put before the servo counts as not answering.
 const ATTEMPTS: u8 = 2;
 
+/// The most bytes of an answer that one poll takes in, so that the wheels do not wait for a whole one.
+const MOST_BYTES: u8 = 4;
+
 /// Registers read at once: present position to moving.
 pub(crate) const LOOK_LENGTH: u8 = table::MOVING - table::PRESENT_POSITION_L + 1;
 
@@ -76,6 +79,8 @@ pub(crate) struct ServoBus {
     question: Option<Question>,
     reply_timeout_us: u32,
     timeouts: u8,
+    /// Whether the last poll left bytes behind.
+    more: bool,
 }
 
 impl ServoBus {
@@ -85,6 +90,7 @@ impl ServoBus {
             question: None,
             reply_timeout_us,
             timeouts: 0,
+            more: false,
         }
     }
 
@@ -97,9 +103,10 @@ impl ServoBus {
         self.timeouts
     }
 
-    /// When a waiting question times out.
-    pub(crate) fn next_due_us(&self) -> Option<u32> {
-        self.question.as_ref().map(|question| question.due_us)
+    /// When [`ServoBus::poll`] is wanted: at once, or when a waiting question times out.
+    pub(crate) fn next_due_us(&self, now_us: u32) -> Option<u32> {
+        let question = self.question.as_ref()?;
+        Some(if self.more { now_us } else { question.due_us })
     }
 
     /// Asks a servo for its present state.
@@ -133,9 +140,13 @@ impl ServoBus {
         self.write(id, table::TORQUE_ENABLE, &[1], board, now_us);
     }
 
-    /// Takes in what the servos sent; the answer, when the question is settled.
+    /// Takes in some of what the servos sent; the answer, when the question is settled.
     pub(crate) fn poll(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
-        while let Some(byte) = board.servo_read() {
+        self.more = false;
+        for _ in 0..MOST_BYTES {
+            let Some(byte) = board.servo_read() else {
+                return self.wait(board, now_us);
+            };
             let asked = self.question.as_ref().map(|question| question.id);
             let mut packet = self.decoder.push(byte);
             while let Some(status) = packet {
@@ -151,7 +162,8 @@ impl ServoBus {
                 packet = self.decoder.pending();
             }
         }
-        self.wait(board, now_us)
+        self.more = true;
+        None
     }
 
     fn wait(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
