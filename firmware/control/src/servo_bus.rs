@@ -12,6 +12,7 @@
 //! One wire carries both directions (A1), so nothing is sent while an answer may come. Bytes that arrive
 //! unasked, answers of other servos and answers with a wrong checksum are no answers.
 
+use heapless::Vec;
 use lager_ax12::{ErrorBits, Frame, StatusDecoder, table};
 
 use crate::SteeringBoard;
@@ -61,9 +62,12 @@ pub(crate) enum Answer {
     None,
 }
 
+/// The longest question: a write of six registers. A whole [`Frame`] takes the chip five times as long to move.
+const LONGEST: usize = 13;
+
 #[derive(Debug, Clone)]
 struct Question {
-    frame: Frame,
+    bytes: Vec<u8, LONGEST>,
     id: u8,
     /// Time out of this attempt.
     due_us: u32,
@@ -111,12 +115,8 @@ impl ServoBus {
 
     /// Asks a servo for its present state.
     pub(crate) fn look(&mut self, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
-        self.ask(
-            Frame::read(id, table::PRESENT_POSITION_L, LOOK_LENGTH),
-            id,
-            board,
-            now_us,
-        );
+        let frame = Frame::read(id, table::PRESENT_POSITION_L, LOOK_LENGTH);
+        self.ask(&frame, id, board, now_us);
     }
 
     /// Sets goal position, speed and torque limit in one write. The torque limit goes along because a
@@ -169,7 +169,7 @@ impl ServoBus {
     fn wait(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
         let question = self.question.as_mut()?;
         if !question.sent {
-            question.sent = board.servo_write(question.frame.as_bytes());
+            question.sent = board.servo_write(&question.bytes);
             if question.sent {
                 // The servo has its whole time, counted from when it was asked.
                 question.due_us = now_us.wrapping_add(self.reply_timeout_us);
@@ -182,7 +182,7 @@ impl ServoBus {
         question.attempt += 1;
         if question.attempt < ATTEMPTS {
             question.due_us = now_us.wrapping_add(self.reply_timeout_us);
-            question.sent = board.servo_write(question.frame.as_bytes());
+            question.sent = board.servo_write(&question.bytes);
             return None;
         }
         self.question = None;
@@ -201,16 +201,24 @@ impl ServoBus {
         let frame = Frame::write(id, address, values);
         debug_assert!(frame.is_ok(), "at most six registers are written");
         if let Ok(frame) = frame {
-            self.ask(frame, id, board, now_us);
+            self.ask(&frame, id, board, now_us);
         }
     }
 
-    fn ask(&mut self, frame: Frame, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
+    fn ask(&mut self, frame: &Frame, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
+        let bytes = Vec::from_slice(frame.as_bytes());
+        debug_assert!(
+            bytes.is_ok(),
+            "a question is no longer than a write of six registers"
+        );
+        let Ok(bytes) = bytes else {
+            return;
+        };
         self.decoder.reset();
-        let sent = board.servo_write(frame.as_bytes());
+        let sent = board.servo_write(&bytes);
         let due_us = now_us.wrapping_add(self.reply_timeout_us);
         self.question = Some(Question {
-            frame,
+            bytes,
             id,
             due_us,
             attempt: 0,
