@@ -2,10 +2,12 @@
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
+use core::num::NonZeroU64;
 use core::str::FromStr;
 use core::time::Duration;
 
 use lager_topics::{BridgeRequest, Request, Role, TOPICS, Topic};
+use rustix::thread::set_current_timer_slack;
 
 use crate::bus::Bus;
 use crate::clock::Clock;
@@ -23,7 +25,8 @@ pub enum Policy {
     Spin,
     /// Look without pause around the time when a ring is due, if rings come close enough to each
     /// other, and sleep otherwise. Of all waiters of a robot at most as many look at a time as the
-    /// machine has cores, less one; the others sleep.
+    /// machine has cores, less one; the others sleep. The thread's timers become exact (its slack
+    /// is set to 1 ns).
     Adaptive {
         /// The longest time after a ring to look for the next one. Rings that are farther apart
         /// are slept for.
@@ -114,7 +117,12 @@ impl Waiter {
             return Err(PortError::NotAnActor { role });
         }
         let longest_spin = match policy {
-            Policy::Adaptive { longest_spin } => longest_spin,
+            Policy::Adaptive { longest_spin } => {
+                // The kernel may end a thread's sleeps 50 us late; a nap that ends before the next
+                // ring is due must not. If it cannot be set, more naps end by the ring.
+                let _ = set_current_timer_slack(NonZeroU64::new(1));
+                longest_spin
+            }
             Policy::Block | Policy::Spin => Duration::ZERO,
         };
         Ok(Self {
