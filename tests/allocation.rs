@@ -103,6 +103,13 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
             ..Ask::default()
         };
         client.call(ask, Duration::from_secs(5)).expect("an answer");
+        wait_for("logic to take orders", || {
+            status
+                .latest()
+                .expect("readable")
+                .filter(|status| status.phase.get() == Some(Phase::WaitingForOrder))
+                .map(|_| ())
+        });
         orders
             .send(Cause::OWN, Order { id: 1, product: 1 })
             .expect("sent");

@@ -44,6 +44,16 @@ pub enum BenchError {
         /// Frames sent.
         frames: u64,
     },
+    /// A process of the path was ready to run and the kernel did not let it.
+    #[error(
+        "`{contender}` did not answer within {limit:?}, because one of its processes is ready to run and gets no core: end what else runs on this machine and start again"
+    )]
+    Starved {
+        /// The row being measured.
+        contender: String,
+        /// How long it was waited for.
+        limit: Duration,
+    },
     /// Nothing is left of what was asked for.
     #[error(
         "nothing to measure: {0}; choose other modes or regimes (a spinning receiver cannot share its core with the sender)"

@@ -14,23 +14,21 @@
 //! many readers but no actor, measured in pairs (`lager/ring`); it compares with iceoryx2 notifying
 //! without publishing anything (`notify`).
 
-use core::sync::atomic::{AtomicU64, Ordering};
+mod audience;
+mod ringer;
+
+use core::sync::atomic::AtomicU64;
 use core::time::Duration;
 use std::os::fd::RawFd;
 use std::path::PathBuf;
-use std::time::Instant;
 
-use iceoryx2::port::listener::Listener;
-use iceoryx2::port::notifier::Notifier;
-use iceoryx2::port::subscriber::Subscriber as BareSubscriber;
-use iceoryx2::prelude::ipc;
-use lager_ports::{Bus, BusConfig, Clock, Policy, Publisher, Subscriber, Waiter};
-use lager_topics::{OBSERVERS, Qos, Role, SensorLine, Stamp, Topic};
+use lager_ports::{Bus, BusConfig};
+use lager_topics::{OBSERVERS, Qos, Role, Topic};
 use serde::{Deserialize, Serialize};
 
-use crate::ball::{Ball, FIRST, Ping, SECOND};
-use crate::baseline::iceoryx::{self, Member, Sender};
-use crate::baseline::{Fault, LIMIT, TIME_OUT};
+use crate::ball::{Ball, Ping};
+use crate::baseline::iceoryx::Member;
+use crate::baseline::{Fault, LIMIT};
 use crate::domain::Domain;
 use crate::error::BenchError;
 use crate::hop::no_bus;
@@ -39,7 +37,8 @@ use crate::parts::{Part, Play, Stage};
 use crate::report::{Mode, Options, Regime, Row};
 use crate::run::{self, Entry};
 use crate::shared::{Barrier, Board, Shared};
-use crate::slow;
+use audience::audience;
+use ringer::ringer;
 
 const RINGER: &str = "ringer";
 const AUDIENCE: &str = "audience of the ringer";
@@ -272,303 +271,11 @@ impl Place {
     }
 }
 
-fn ringer(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(place) = Place::enter(stage)? else {
-        return Ok(());
-    };
-    while let Some(round) = stage.hear::<Round>()? {
-        let mut rope = Rope::tie(&place, round.contender)?;
-        place.meet(&round, 1)?;
-        let mut samples = Vec::with_capacity(round.balls as usize);
-        for number in round.all() {
-            place.await_readiness(&round, number)?;
-            let ball = Ball::new(number);
-            let before = Clock::monotonic_ns();
-            rope.ring(&ball)
-                .map_err(|fault| round.failed(number, fault))?;
-            let cost = Clock::monotonic_ns() - before;
-            match (&rope, samples.last_mut()) {
-                // The second of a pair: what it costs more than the first.
-                (Rope::Ring { unheard: false, .. }, Some(first)) => {
-                    *first = cost.saturating_sub(*first);
-                }
-                _ => samples.push(cost),
-            }
-            rope.follow_up(&ball)
-                .map_err(|fault| round.failed(number, fault))?;
-        }
-        place.meet(&round, 2)?;
-        drop(rope);
-        stage.tell(&samples)?;
-    }
-    Ok(())
-}
-
-impl Place {
-    /// Waits until the audience is ready, and for one that sleeps until it surely does.
-    fn await_readiness(&self, round: &Round, number: u64) -> Result<(), BenchError> {
-        const TO_SLEEP: Duration = Duration::from_micros(60);
-        let start = Instant::now();
-        while self.hall.ready.load(Ordering::Acquire) != number {
-            if start.elapsed() > LIMIT {
-                return Err(round.failed(number, Fault::Silent));
-            }
-            rustix::thread::sched_yield();
-        }
-        if round.mode == Mode::Block {
-            let ready = Instant::now();
-            while ready.elapsed() < TO_SLEEP {
-                // It may be on this core.
-                rustix::thread::sched_yield();
-            }
-        }
-        Ok(())
-    }
-}
-
-/// The writer's ports.
-// One of them lives at a time, so nothing is saved by making it smaller.
-#[allow(clippy::large_enum_variant)]
-enum Rope {
-    Lager(Publisher<Ping>),
-    Ring {
-        quiet: Publisher<Unheard>,
-        loud: Publisher<Ping>,
-        /// Whether the last ball went where nobody is rung.
-        unheard: bool,
-    },
-    Notify(Notifier<ipc::Service>),
-    Event(Notifier<ipc::Service>, Sender<Stamp>),
-}
-
 const BARE: &str = "bench/bare-ring";
 
 /// A listener for each observer and one for the actor.
 const LISTENERS: usize = OBSERVERS + 1;
 
-impl Rope {
-    fn tie(place: &Place, contender: Contender) -> Result<Self, BenchError> {
-        Ok(match contender {
-            Contender::Lager => Self::Lager(place.bus(FIRST)?.publisher().map_err(no_bus)?),
-            Contender::Ring => {
-                let bus = place.bus(FIRST)?;
-                Self::Ring {
-                    quiet: bus.publisher().map_err(no_bus)?,
-                    loud: bus.publisher().map_err(no_bus)?,
-                    unheard: false,
-                }
-            }
-            Contender::Notify => Self::Notify(place.member()?.notifier(BARE, LISTENERS)?),
-            Contender::Event => {
-                let member = place.member()?;
-                Self::Event(
-                    member.notifier(BARE, LISTENERS)?,
-                    Sender::new(member.publisher(BARE, Some(&SensorLine::QOS))?),
-                )
-            }
-        })
-    }
-
-    /// What is timed.
-    fn ring(&mut self, ball: &Ball) -> Result<(), Fault> {
-        match self {
-            Self::Lager(publisher) => send(publisher, ball),
-            Self::Ring {
-                quiet,
-                loud,
-                unheard,
-            } => {
-                *unheard = !*unheard;
-                if *unheard {
-                    send(quiet, ball)
-                } else {
-                    send(loud, ball)
-                }
-            }
-            Self::Notify(notifier) => notify(notifier),
-            Self::Event(notifier, sender) => {
-                sender.send(ball)?;
-                notify(notifier)
-            }
-        }
-    }
-
-    /// What the audience needs besides, to go on.
-    fn follow_up(&mut self, ball: &Ball) -> Result<(), Fault> {
-        match self {
-            Self::Ring {
-                loud,
-                unheard: true,
-                ..
-            } => send(loud, ball),
-            _ => Ok(()),
-        }
-    }
-}
-
-fn send<T: Topic<Payload = Ball>>(publisher: &Publisher<T>, ball: &Ball) -> Result<(), Fault> {
-    let mut loan = publisher.loan().map_err(broken)?;
-    *loan = *ball;
-    if !T::QOS.actors.is_empty() {
-        slow::publish(OBSERVERS);
-    }
-    loan.send().map_err(broken)
-}
-
-fn notify(notifier: &Notifier<ipc::Service>) -> Result<(), Fault> {
-    let notified = notifier.notify().map_err(iceoryx::broken)?;
-    if notified == LISTENERS {
-        Ok(())
-    } else {
-        Err(Fault::Broken(format!(
-            "{notified} of {LISTENERS} listeners were notified"
-        )))
-    }
-}
-
 fn broken(error: impl core::fmt::Display) -> Fault {
     Fault::Broken(error.to_string())
-}
-
-fn audience(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(place) = Place::enter(stage)? else {
-        return Ok(());
-    };
-    while let Some(round) = stage.hear::<Round>()? {
-        let mut seats = Seats::take(&place, round.contender, round.mode)?;
-        place.meet(&round, 1)?;
-        for number in round.all() {
-            seats.drain().map_err(|fault| round.failed(number, fault))?;
-            place.hall.ready.store(number, Ordering::Release);
-            seats
-                .until_rung(round.mode)
-                .map_err(|fault| round.failed(number, fault))?;
-        }
-        place.meet(&round, 2)?;
-        drop(seats);
-        stage.tell(&())?;
-    }
-    Ok(())
-}
-
-/// The readers' ports.
-// One of them lives at a time, so nothing is saved by making it smaller.
-#[allow(clippy::large_enum_variant)]
-enum Seats {
-    Lager {
-        actor: Subscriber<Ping>,
-        waiter: Waiter,
-        observers: Vec<Subscriber<Ping>>,
-        unheard: Vec<Subscriber<Unheard>>,
-    },
-    Bare {
-        listeners: Vec<Listener<ipc::Service>>,
-        subscribers: Vec<BareSubscriber<ipc::Service, Ball, Stamp>>,
-    },
-}
-
-impl Seats {
-    fn take(place: &Place, contender: Contender, mode: Mode) -> Result<Self, BenchError> {
-        let policy = match mode {
-            Mode::Spin => Policy::Spin,
-            Mode::Adaptive => Policy::ADAPTIVE,
-            Mode::Block => Policy::Block,
-        };
-        Ok(match contender {
-            Contender::Lager | Contender::Ring => {
-                let actor = place.bus(SECOND)?;
-                let mut unheard = Vec::new();
-                if contender == Contender::Ring {
-                    // As many readers as the other topic has; one of them is not an observer.
-                    unheard = observers(place, OBSERVERS)?;
-                    unheard.push(actor.subscriber().map_err(no_bus)?);
-                }
-                Self::Lager {
-                    actor: actor.subscriber().map_err(no_bus)?,
-                    waiter: actor.waiter(policy).map_err(no_bus)?,
-                    observers: observers(place, OBSERVERS)?,
-                    unheard,
-                }
-            }
-            Contender::Notify | Contender::Event => {
-                let member = place.member()?;
-                Self::Bare {
-                    listeners: (0..LISTENERS)
-                        .map(|_| member.listener(BARE, LISTENERS))
-                        .collect::<Result<_, _>>()?,
-                    subscribers: (0..LISTENERS)
-                        .map(|_| member.subscriber(BARE, Some(&SensorLine::QOS)))
-                        .collect::<Result<_, _>>()?,
-                }
-            }
-        })
-    }
-
-    /// Takes everything that has come, for everybody.
-    fn drain(&mut self) -> Result<(), Fault> {
-        match self {
-            Self::Lager {
-                actor,
-                observers,
-                unheard,
-                ..
-            } => {
-                drain(actor)?;
-                observers.iter_mut().try_for_each(drain)?;
-                unheard.iter_mut().try_for_each(drain)
-            }
-            Self::Bare {
-                listeners,
-                subscribers,
-                ..
-            } => {
-                for listener in listeners {
-                    listener.try_wait(|_| ()).map_err(iceoryx::broken)?;
-                }
-                for subscriber in subscribers {
-                    while iceoryx::receive(subscriber)?.is_some() {}
-                }
-                Ok(())
-            }
-        }
-    }
-
-    /// Waits as the actor, until it is rung.
-    fn until_rung(&mut self, mode: Mode) -> Result<(), Fault> {
-        let start = Instant::now();
-        loop {
-            let rung = match self {
-                Self::Lager { actor, waiter, .. } => {
-                    waiter.wait(TIME_OUT);
-                    actor.receive().map_err(broken)?.is_some()
-                }
-                Self::Bare { listeners, .. } => {
-                    let rings = if mode == Mode::Spin {
-                        listeners[0].try_wait(|_| ())
-                    } else {
-                        listeners[0].timed_wait(|_| (), TIME_OUT)
-                    };
-                    rings.map_err(iceoryx::broken)? > 0
-                }
-            };
-            if rung {
-                return Ok(());
-            }
-            if start.elapsed() > LIMIT {
-                return Err(Fault::Silent);
-            }
-        }
-    }
-}
-
-fn observers<T: Topic>(place: &Place, number: usize) -> Result<Vec<Subscriber<T>>, BenchError> {
-    let bus = place.bus(Role::Observer)?;
-    (0..number)
-        .map(|_| bus.subscriber().map_err(no_bus))
-        .collect()
-}
-
-fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), Fault> {
-    while subscriber.receive().map_err(broken)?.is_some() {}
-    Ok(())
 }

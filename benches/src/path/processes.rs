@@ -62,18 +62,25 @@ impl Processes {
         (real > 0).then(|| 100.0 * processor as f64 / real as f64)
     }
 
-    /// Why frame `number` has no answer: what a process says, or that it is silent.
+    /// Why frame `number` has no answer: what a process says, that the kernel does not let it run,
+    /// or that it is silent.
     pub(super) fn fault(&mut self, contender: &str, number: u64) -> BenchError {
+        let starved = self.parts[..self.counted].iter().any(wants_to_run);
         for part in &mut self.parts {
             match part.hear_within::<()>(Duration::ZERO) {
                 Ok(()) | Err(BenchError::PartSilent { .. }) => {}
                 Err(said) => return said,
             }
         }
-        BenchError::NoSample {
-            contender: contender.to_owned(),
-            expected: number,
-            limit: Duration::from_nanos(ANSWER_WITHIN),
+        let (contender, limit) = (contender.to_owned(), Duration::from_nanos(ANSWER_WITHIN));
+        if starved {
+            BenchError::Starved { contender, limit }
+        } else {
+            BenchError::NoSample {
+                contender,
+                expected: number,
+                limit,
+            }
         }
     }
 
@@ -102,4 +109,17 @@ fn processor_ns(part: &Part) -> u64 {
         .filter_map(|thread| std::fs::read_to_string(thread.path().join("schedstat")).ok())
         .filter_map(|text| text.split_whitespace().next()?.parse::<u64>().ok())
         .sum()
+}
+
+/// Whether a thread of it is ready to run. Asked of a process that should have answered long ago: one
+/// that waits for a wake-up sleeps.
+fn wants_to_run(part: &Part) -> bool {
+    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", part.pid())) else {
+        return false;
+    };
+    threads
+        .flatten()
+        .filter_map(|thread| std::fs::read_to_string(thread.path().join("stat")).ok())
+        // The state follows the name, which stands in brackets.
+        .any(|stat| matches!(stat.rsplit_once(") "), Some((_, rest)) if rest.starts_with('R')))
 }

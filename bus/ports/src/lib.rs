@@ -13,13 +13,15 @@
 //! let orders = bus.publisher::<SteeringCommand>()?;
 //! let waiter = bus.waiter(Policy::Block)?;
 //! loop {
-//!     // A wake is a hint: after every return, drain every subscriber until it is empty.
+//!     // A wake is a hint: drain what it was for until that is empty.
 //!     waiter.wait(Duration::from_millis(20));
-//!     while let Some(frame) = line.receive()? {
-//!         let mut order = orders.loan()?;
-//!         order.code = 2;
-//!         order.cause(frame.cause());
-//!         order.send()?;
+//!     if waiter.has::<SensorLine>() {
+//!         while let Some(frame) = line.receive()? {
+//!             let mut order = orders.loan()?;
+//!             order.code = 2;
+//!             order.cause(frame.cause());
+//!             order.send()?;
+//!         }
 //!     }
 //! }
 //! # }

@@ -42,7 +42,7 @@ impl<T: Topic> Publisher<T> {
         actors: impl Iterator<Item = lager_topics::Role>,
     ) -> Result<Self, PortError> {
         let ropes = actors
-            .map(|actor| Rope::to(bus, actor))
+            .map(|actor| Rope::to(bus, actor, T::ID))
             .collect::<Result<_, _>>()?;
         let standard = StandardListeners::of::<T>(bus)?;
         let service = service::topic::<T>(bus)?;
@@ -81,15 +81,7 @@ impl<T: Topic> Publisher<T> {
     /// # Errors
     /// Too many samples are on loan, or the transport failed.
     pub fn loan(&self) -> Result<Loan<'_, T>, SendError> {
-        match self.inner.loan() {
-            Ok(sample) => Ok(Loan {
-                sample,
-                publisher: self,
-                cause: Cause::OWN,
-            }),
-            Err(LoanError::ExceedsMaxLoans) => Err(SendError::TooManyLoans { limit: MAX_LOANS }),
-            Err(other) => Err(SendError::Transport(format!("{other:?}"))),
-        }
+        Ok(self.lend(self.inner.loan().map_err(refused)?))
     }
 
     /// Sends a copy of `payload`, which follows from `cause`.
@@ -97,8 +89,7 @@ impl<T: Topic> Publisher<T> {
     /// # Errors
     /// As [`Publisher::loan`] and [`Loan::send`].
     pub fn send(&self, cause: Cause, payload: T::Payload) -> Result<(), SendError> {
-        let mut loan = self.loan()?;
-        *loan = payload;
+        let mut loan = self.filled(payload)?;
         loan.cause(cause);
         loan.send()
     }
@@ -122,10 +113,23 @@ impl<T: Topic> Publisher<T> {
 
     /// Sends with the times of an earlier sample of another writer.
     pub(crate) fn resend(&self, payload: T::Payload, original: &Stamp) -> Result<(), SendError> {
-        let mut loan = self.loan()?;
-        *loan = payload;
+        let mut loan = self.filled(payload)?;
         loan.cause(Cause::of(original));
         loan.deliver(original.publish_time_ns, Ring::Actors)
+    }
+
+    /// A sample with `payload` in it; unlike [`Publisher::loan`] it is written once only.
+    fn filled(&self, payload: T::Payload) -> Result<Loan<'_, T>, SendError> {
+        let sample = self.inner.loan_uninit().map_err(refused)?;
+        Ok(self.lend(sample.write_payload(payload)))
+    }
+
+    fn lend(&self, sample: SampleMut<Ipc, T::Payload, Stamp>) -> Loan<'_, T> {
+        Loan {
+            sample,
+            publisher: self,
+            cause: Cause::OWN,
+        }
     }
 }
 
@@ -214,6 +218,13 @@ impl<T: Topic> Deref for Loan<'_, T> {
 impl<T: Topic> DerefMut for Loan<'_, T> {
     fn deref_mut(&mut self) -> &mut T::Payload {
         self.sample.payload_mut()
+    }
+}
+
+fn refused(error: LoanError) -> SendError {
+    match error {
+        LoanError::ExceedsMaxLoans => SendError::TooManyLoans { limit: MAX_LOANS },
+        other => SendError::Transport(format!("{other:?}")),
     }
 }
 

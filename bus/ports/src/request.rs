@@ -37,7 +37,7 @@ const LOOK_EVERY: Duration = Duration::from_micros(200);
 
 impl<R: Request> Client<R> {
     pub(crate) fn new(bus: &Bus) -> Result<Self, PortError> {
-        let rope = Rope::to(bus, R::ACTOR)?;
+        let rope = Rope::to(bus, R::ACTOR, R::ID)?;
         let service = service::request::<R>(bus)?;
         let inner = patiently(bus, R::NAME, || {
             service

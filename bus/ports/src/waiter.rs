@@ -2,14 +2,16 @@
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
+use core::num::NonZeroU64;
 use core::str::FromStr;
 use core::time::Duration;
 
-use lager_topics::{BridgeRequest, Request, Role, TOPICS};
+use lager_topics::{BridgeRequest, Request, Role, TOPICS, Topic};
+use rustix::thread::set_current_timer_slack;
 
 use crate::bus::Bus;
 use crate::clock::Clock;
-use crate::doorbell::{Bell, InsideRope, Pace, Plan};
+use crate::doorbell::{self, Bell, InsideRope, Pace, Plan};
 use crate::error::PortError;
 
 /// How to wait.
@@ -23,7 +25,8 @@ pub enum Policy {
     Spin,
     /// Look without pause around the time when a ring is due, if rings come close enough to each
     /// other, and sleep otherwise. Of all waiters of a robot at most as many look at a time as the
-    /// machine has cores, less one; the others sleep.
+    /// machine has cores, less one; the others sleep. The thread's timers become exact (its slack
+    /// is set to 1 ns).
     Adaptive {
         /// The longest time after a ring to look for the next one. Rings that are farther apart
         /// are slept for.
@@ -66,8 +69,8 @@ impl FromStr for Policy {
     }
 }
 
-/// Why a wait ended. Either way, drain every subscriber: a ring may stand for many samples, and a
-/// sample may have come without one.
+/// Why a wait ended. Either way, drain what [`Waiter::has`] says yes to: a ring may stand for many
+/// samples, and a sample may have come without one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wake {
     /// Somebody rang.
@@ -79,6 +82,10 @@ pub enum Wake {
 /// Looks between two of the clock: reading it costs as much as some looks.
 const LOOKS: u32 = 64;
 
+/// Of so many wakes one is taken to be for everything: samples may come without a ring, from writers
+/// that know of none.
+const WAKES: u32 = 16;
+
 /// What a service that acts on topics waits on: one for all of them. It stays in the thread that
 /// made it.
 pub struct Waiter {
@@ -87,6 +94,9 @@ pub struct Waiter {
     role: Role,
     adaptive: RefCell<Adaptive>,
     sleeps: Cell<u64>,
+    /// The last wait ended for everything there is.
+    everything: Cell<bool>,
+    wakes: Cell<u32>,
 }
 
 /// What `Policy::Adaptive` keeps.
@@ -107,7 +117,12 @@ impl Waiter {
             return Err(PortError::NotAnActor { role });
         }
         let longest_spin = match policy {
-            Policy::Adaptive { longest_spin } => longest_spin,
+            Policy::Adaptive { longest_spin } => {
+                // The kernel may end a thread's sleeps 50 us late; a nap that ends before the next
+                // ring is due must not. If it cannot be set, more naps end by the ring.
+                let _ = set_current_timer_slack(NonZeroU64::new(1));
+                longest_spin
+            }
             Policy::Block | Policy::Spin => Duration::ZERO,
         };
         Ok(Self {
@@ -121,16 +136,43 @@ impl Waiter {
                 untimed: false,
             }),
             sleeps: Cell::new(0),
+            everything: Cell::new(true),
+            wakes: Cell::new(0),
         })
     }
 
     /// Waits until rung, at most `timeout` of real time (see [`crate::Clock::real`]).
     pub fn wait(&self, timeout: Duration) -> Wake {
-        if self.wait_while_not(timeout, || self.bell.rung()) {
-            Wake::Rung
-        } else {
-            Wake::TimedOut
-        }
+        let rung = self.wait_while_not(timeout, || self.bell.rung());
+        let wakes = self.wakes.get().wrapping_add(1);
+        self.wakes.set(wakes);
+        self.everything.set(!rung || wakes.is_multiple_of(WAKES));
+        if rung { Wake::Rung } else { Wake::TimedOut }
+    }
+
+    /// Whether the topic has to be drained after a [`Waiter::wait`]: somebody has rung for it since this
+    /// was last asked, or the wait was for everything, as it is without a ring, and now and then
+    /// besides.
+    #[inline]
+    pub fn has<T: Topic>(&self) -> bool {
+        self.rung_for(doorbell::reason(T::ID))
+    }
+
+    /// The same for a request.
+    #[inline]
+    pub fn has_request<R: Request>(&self) -> bool {
+        self.rung_for(doorbell::reason(R::ID))
+    }
+
+    /// The same for the rings of this process's own threads.
+    #[inline]
+    pub fn has_inside(&self) -> bool {
+        self.rung_for(doorbell::INSIDE)
+    }
+
+    fn rung_for(&self, reason: usize) -> bool {
+        // Taken in any case: what is drained now needs no second look.
+        self.bell.rung_for(reason) || self.everything.get()
     }
 
     /// Waits until `look` finds something, at most `timeout` of real time, and returns that. A
@@ -141,9 +183,13 @@ impl Waiter {
     /// as one [`crate::Subscriber::receive`].
     pub fn wait_for<R>(&self, timeout: Duration, mut look: impl FnMut() -> Option<R>) -> Option<R> {
         let mut found = None;
+        let mut looks = 0_u32;
         self.wait_while_not(timeout, || {
             found = look();
-            found.is_some() || self.bell.rung()
+            // The bell now and then only: a ringer would have to fetch its line back each time.
+            let hears = looks.is_multiple_of(LOOKS);
+            looks = looks.wrapping_add(1);
+            found.is_some() || (hears && self.bell.rung())
         });
         // The ring that ended the wait has been noticed, so what it was for is there.
         found.or_else(look)

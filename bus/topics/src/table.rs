@@ -86,6 +86,8 @@ pub fn by_id(id: u32) -> Option<&'static TopicEntry> {
 pub trait Request: 'static {
     /// The name behind `lager/<robot>/`.
     const NAME: &'static str;
+    /// The name as a number, as topics have one.
+    const ID: u32 = id(Self::NAME);
     /// What is asked.
     type Request: Payload;
     /// What is answered.

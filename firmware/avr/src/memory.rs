@@ -4,13 +4,14 @@
 //! machines. These are loops of four instructions, 8 cycles a byte for a copy.
 
 use core::arch::asm;
+use core::ffi::c_void;
 
 /// Copies `length` bytes upwards.
 ///
 /// # Safety
 /// As C's `memcpy`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
+pub unsafe extern "C" fn memcpy(to: *mut c_void, from: *const c_void, length: usize) -> *mut c_void {
     if length > 0 {
         // SAFETY: by the caller's promise both areas hold `length` bytes.
         unsafe {
@@ -35,7 +36,7 @@ pub unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, length: usize) -> 
 /// # Safety
 /// As C's `memmove`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memmove(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
+pub unsafe extern "C" fn memmove(to: *mut c_void, from: *const c_void, length: usize) -> *mut c_void {
     if (to as usize) <= from as usize {
         // SAFETY: a copy upwards never overwrites what it still has to read.
         return unsafe { memcpy(to, from, length) };
@@ -52,8 +53,8 @@ pub unsafe extern "C" fn memmove(to: *mut u8, from: *const u8, length: usize) ->
                 "brne 2b",
                 byte = out(reg) _,
                 left = inout(reg_iw) length => _,
-                inout("Z") from.wrapping_add(length) => _,
-                inout("X") to.wrapping_add(length) => _,
+                inout("Z") from.wrapping_byte_add(length) => _,
+                inout("X") to.wrapping_byte_add(length) => _,
             );
         }
     }
@@ -65,7 +66,7 @@ pub unsafe extern "C" fn memmove(to: *mut u8, from: *const u8, length: usize) ->
 /// # Safety
 /// As C's `memset`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memset(to: *mut u8, value: i16, length: usize) -> *mut u8 {
+pub unsafe extern "C" fn memset(to: *mut c_void, value: i16, length: usize) -> *mut c_void {
     if length > 0 {
         // SAFETY: by the caller's promise the area holds `length` bytes.
         unsafe {

@@ -56,11 +56,12 @@ pub fn write(bytes: &[u8]) -> bool {
     if bytes.len() > usize::from(TO_SEND.room()) {
         return false;
     }
+    SENDING.set(1);
     for byte in bytes {
         TO_SEND.push(*byte);
+        // The first byte leaves while the others are being queued.
+        interrupt::free(|_| set(usart0().ucsr0b(), UDRIE));
     }
-    SENDING.set(1);
-    interrupt::free(|_| set(usart0().ucsr0b(), UDRIE));
     true
 }
 

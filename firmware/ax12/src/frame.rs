@@ -68,18 +68,12 @@ impl Frame {
 
     /// Writes `values` from `address` on, at once.
     pub fn write(id: u8, address: u8, values: &[u8]) -> Result<Self, EncodeError> {
-        Builder::new(id, Instruction::Write.code())
-            .byte(address)
-            .bytes(values)
-            .finish()
+        Self::with_address(id, Instruction::Write, address, values)
     }
 
     /// Writes `values` from `address` on when [`Frame::action`] comes.
     pub fn reg_write(id: u8, address: u8, values: &[u8]) -> Result<Self, EncodeError> {
-        Builder::new(id, Instruction::RegWrite.code())
-            .byte(address)
-            .bytes(values)
-            .finish()
+        Self::with_address(id, Instruction::RegWrite, address, values)
     }
 
     /// Carries out the writes held back; to all servos with [`BROADCAST_ID`].
@@ -91,14 +85,15 @@ impl Frame {
     /// Writes the same registers of several servos at once. Nobody answers.
     pub fn sync_write(address: u8, servos: &[(u8, &[u8])]) -> Result<Self, EncodeError> {
         let width = servos.first().map_or(0, |(_, values)| values.len());
-        let mut builder = Builder::new(BROADCAST_ID, Instruction::SyncWrite.code())
-            .byte(address)
-            .byte(u8::try_from(width).unwrap_or(u8::MAX));
+        let mut builder = Builder::new(BROADCAST_ID, Instruction::SyncWrite.code());
+        builder.byte(address);
+        builder.byte(u8::try_from(width).unwrap_or(u8::MAX));
         for (id, values) in servos {
             if values.len() != width {
                 return Err(EncodeError::UnevenValues { id: *id });
             }
-            builder = builder.byte(*id).bytes(values);
+            builder.byte(*id);
+            builder.bytes(values);
         }
         builder.finish()
     }
@@ -109,28 +104,44 @@ impl Frame {
         instruction: Instruction,
         parameters: &[u8],
     ) -> Result<Self, EncodeError> {
-        Builder::new(id, instruction.code())
-            .bytes(parameters)
-            .finish()
+        let mut builder = Builder::new(id, instruction.code());
+        builder.bytes(parameters);
+        builder.finish()
     }
 
     /// A servo's answer.
     pub fn status(id: u8, errors: ErrorBits, parameters: &[u8]) -> Result<Self, EncodeError> {
-        Builder::new(id, errors.bits()).bytes(parameters).finish()
+        let mut builder = Builder::new(id, errors.bits());
+        builder.bytes(parameters);
+        builder.finish()
+    }
+
+    fn with_address(
+        id: u8,
+        instruction: Instruction,
+        address: u8,
+        values: &[u8],
+    ) -> Result<Self, EncodeError> {
+        let mut builder = Builder::new(id, instruction.code());
+        builder.byte(address);
+        builder.bytes(values);
+        builder.finish()
     }
 
     /// A packet whose at most two parameters are sure to fit.
     fn fitting(id: u8, instruction: Instruction, parameters: &[u8]) -> Self {
         debug_assert!(parameters.len() <= 2);
-        Builder::new(id, instruction.code())
-            .bytes(parameters)
-            .close()
+        let mut builder = Builder::new(id, instruction.code());
+        builder.bytes(parameters);
+        builder.close()
     }
 }
 
 /// A packet under construction. It goes on counting when the buffer is full, so that the error can tell.
+///
+/// Built in place: the chip takes 500 cycles to move one, and the wheels wait meanwhile.
 struct Builder {
-    bytes: [u8; MAX_FRAME],
+    frame: Frame,
     used: usize,
 }
 
@@ -138,19 +149,23 @@ impl Builder {
     fn new(id: u8, code: u8) -> Self {
         let mut bytes = [0; MAX_FRAME];
         bytes[..5].copy_from_slice(&[HEADER[0], HEADER[1], id, 0, code]);
-        Self { bytes, used: 5 }
+        Self {
+            frame: Frame { bytes, length: 0 },
+            used: 5,
+        }
     }
 
-    fn byte(mut self, byte: u8) -> Self {
-        if let Some(place) = self.bytes.get_mut(self.used) {
+    fn byte(&mut self, byte: u8) {
+        if let Some(place) = self.frame.bytes.get_mut(self.used) {
             *place = byte;
         }
         self.used += 1;
-        self
     }
 
-    fn bytes(self, bytes: &[u8]) -> Self {
-        bytes.iter().fold(self, |builder, byte| builder.byte(*byte))
+    fn bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.byte(*byte);
+        }
     }
 
     fn finish(self) -> Result<Frame, EncodeError> {
@@ -164,11 +179,10 @@ impl Builder {
 
     fn close(mut self) -> Frame {
         let parameters = self.used + 1 - OVERHEAD;
-        self.bytes[3] = (parameters + 2) as u8;
-        self.bytes[self.used] = checksum(&self.bytes[2..self.used]);
-        Frame {
-            bytes: self.bytes,
-            length: (self.used + 1) as u8,
-        }
+        let bytes = &mut self.frame.bytes;
+        bytes[3] = (parameters + 2) as u8;
+        bytes[self.used] = checksum(&bytes[2..self.used]);
+        self.frame.length = (self.used + 1) as u8;
+        self.frame
     }
 }

@@ -1,7 +1,5 @@
 //! How busy a board is: for its status report.
 
-use crate::divide::divide;
-
 /// Measures between two reports.
 #[derive(Debug, Clone)]
 pub(crate) struct Load {
@@ -29,15 +27,26 @@ impl Load {
         self.longest_us = self.longest_us.max(pass_us);
     }
 
-    /// Load in percent and the longest pass in 0.1 ms, both since the last call.
+    /// Load in percent and the longest pass in 0.1 ms, both since the last call. Everything waits for it, so
+    /// it makes do with short numbers: the chip divides long ones in 400 cycles each.
     pub(crate) fn report(&mut self, now_us: u32) -> (u8, u8) {
-        let span = divide(now_us.wrapping_sub(self.since_us), 100).max(1);
-        let percent = divide(self.busy_us, span).min(100) as u8;
-        let longest = u8::try_from(divide(self.longest_us, 100)).unwrap_or(u8::MAX);
+        let mut span = now_us.wrapping_sub(self.since_us).max(1);
+        let mut busy = self.busy_us.min(span);
+        while span > LONGEST_SPAN {
+            span >>= 1;
+            busy >>= 1;
+        }
+        let percent = busy as u16 * 100 / span as u16;
+        let longest = self.longest_us.min(LONGEST_PASS_US) as u16 / 100;
         *self = Self::new(now_us);
-        (percent, longest)
+        (percent as u8, longest as u8)
     }
 }
+
+/// A hundred times this is still a short number.
+const LONGEST_SPAN: u32 = u16::MAX as u32 / 100;
+/// The longest pass that can be told, in microseconds.
+const LONGEST_PASS_US: u32 = 25_500;
 
 #[cfg(test)]
 mod tests {
@@ -59,5 +68,19 @@ mod tests {
         load.passed(90_000);
         load.worked(0, 90_000);
         assert_eq!(load.report(50), (100, 255));
+    }
+
+    #[test]
+    fn short_numbers_are_near_enough() {
+        for span in (1..3_000_000).step_by(7_919) {
+            for share in [0, 1, 49, 50, 99, 100] {
+                let mut load = Load::new(5);
+                let busy = span * share / 100;
+                load.worked(0, busy);
+                let exact = busy * 100 / span;
+                let told = u32::from(load.report(5 + span).0);
+                assert!(told.abs_diff(exact) <= 1, "{busy} of {span}: {told}");
+            }
+        }
     }
 }

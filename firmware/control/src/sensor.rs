@@ -6,8 +6,11 @@
 //!     read 11 line sensors --> ExDe word, every pass
 //!                          --> FlipFlop --.-- line packet (raw line packet before it, if set)
 //!                                         '-- read IR --> distance packet
-//!                          --> board status, answers to settings, when due
+//!                                             or, when due, an answer to a setting, board status
 //! ```
+//!
+//! The rarer things take the place of a distance: a pass that told more would be longer, and the wheels
+//! would wait for the next word.
 //!
 //! The two handshakes do not wait for each other: without the steering board the Pi is served, without the
 //! Pi the steering board is. Packets and words leave by interrupt beside everything else (S4).
@@ -136,7 +139,11 @@ impl SensorUnit {
         self.listen(board, now_us);
         self.ask_for_pi(board, now_us);
         self.outbox.flush(board);
-        if reached(now_us, self.pass_due_us) && self.has_sent_all(board) {
+        if reached(now_us, self.pass_due_us) {
+            if !self.has_sent_all(board) {
+                // The step that finds everything sent is to begin as soon as it is.
+                return now_us.wrapping_add(UART_POLL_US);
+            }
             self.pass(board, now_us);
         }
         self.store.poll(board);
@@ -218,12 +225,13 @@ impl SensorUnit {
                 self.flip_flop = FlipFlop::Distance;
             }
             FlipFlop::Distance => {
-                let distance = self.config.ir_model.distance(board.read_ir());
-                self.send(board, Payload::Distance(distance));
+                let payload = self.rarer_thing(now_us).unwrap_or_else(|| {
+                    Payload::Distance(self.config.ir_model.distance(board.read_ir()))
+                });
+                self.send(board, payload);
                 self.flip_flop = FlipFlop::Line;
             }
         }
-        self.send_rarer_things(board, now_us);
     }
 
     fn note_pass(&mut self, now_us: u32) {
@@ -273,28 +281,29 @@ impl SensorUnit {
         });
     }
 
-    fn send_rarer_things<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
+    /// What is due beside line and distance.
+    fn rarer_thing(&mut self, now_us: u32) -> Option<Payload> {
         if !self.link.is_up() {
-            return;
+            return None;
         }
         if let Some(reply) = self.replies.pop() {
-            self.send(board, Payload::SettingReply(reply));
+            return Some(Payload::SettingReply(reply));
         }
-        if reached(now_us, self.status_due_us) {
-            self.status_due_us = now_us.wrapping_add(self.config.status_period_us);
-            let (load_percent, longest_loop_100us) = self.load.report(now_us);
-            let status = BoardStatus {
-                reset: self.reset,
-                bad_packets: self.link.bad_packets(),
-                lost_packets: self.link.lost_packets(),
-                refused: self.refused,
-                exde_errors: 0,
-                servo_timeouts: 0,
-                load_percent,
-                longest_loop_100us,
-            };
-            self.send(board, Payload::BoardStatus(status));
+        if !reached(now_us, self.status_due_us) {
+            return None;
         }
+        self.status_due_us = now_us.wrapping_add(self.config.status_period_us);
+        let (load_percent, longest_loop_100us) = self.load.report(now_us);
+        Some(Payload::BoardStatus(BoardStatus {
+            reset: self.reset,
+            bad_packets: self.link.bad_packets(),
+            lost_packets: self.link.lost_packets(),
+            refused: self.refused,
+            exde_errors: 0,
+            servo_timeouts: 0,
+            load_percent,
+            longest_loop_100us,
+        }))
     }
 
     fn send<B: SensorBoard>(&mut self, board: &mut B, payload: Payload) {

@@ -12,6 +12,7 @@
 //! One wire carries both directions (A1), so nothing is sent while an answer may come. Bytes that arrive
 //! unasked, answers of other servos and answers with a wrong checksum are no answers.
 
+use heapless::Vec;
 use lager_ax12::{ErrorBits, Frame, StatusDecoder, table};
 
 use crate::SteeringBoard;
@@ -19,6 +20,9 @@ use crate::time::reached;
 
 /// How often a question is put before the servo counts as not answering.
 const ATTEMPTS: u8 = 2;
+
+/// The most bytes of an answer that one poll takes in, so that the wheels do not wait for a whole one.
+const MOST_BYTES: u8 = 4;
 
 /// Registers read at once: present position to moving.
 pub(crate) const LOOK_LENGTH: u8 = table::MOVING - table::PRESENT_POSITION_L + 1;
@@ -58,9 +62,12 @@ pub(crate) enum Answer {
     None,
 }
 
+/// The longest question: a write of six registers. A whole [`Frame`] takes the chip five times as long to move.
+const LONGEST: usize = 13;
+
 #[derive(Debug, Clone)]
 struct Question {
-    frame: Frame,
+    bytes: Vec<u8, LONGEST>,
     id: u8,
     /// Time out of this attempt.
     due_us: u32,
@@ -76,6 +83,8 @@ pub(crate) struct ServoBus {
     question: Option<Question>,
     reply_timeout_us: u32,
     timeouts: u8,
+    /// Whether the last poll left bytes behind.
+    more: bool,
 }
 
 impl ServoBus {
@@ -85,6 +94,7 @@ impl ServoBus {
             question: None,
             reply_timeout_us,
             timeouts: 0,
+            more: false,
         }
     }
 
@@ -97,19 +107,16 @@ impl ServoBus {
         self.timeouts
     }
 
-    /// When a waiting question times out.
-    pub(crate) fn next_due_us(&self) -> Option<u32> {
-        self.question.as_ref().map(|question| question.due_us)
+    /// When [`ServoBus::poll`] is wanted: at once, or when a waiting question times out.
+    pub(crate) fn next_due_us(&self, now_us: u32) -> Option<u32> {
+        let question = self.question.as_ref()?;
+        Some(if self.more { now_us } else { question.due_us })
     }
 
     /// Asks a servo for its present state.
     pub(crate) fn look(&mut self, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
-        self.ask(
-            Frame::read(id, table::PRESENT_POSITION_L, LOOK_LENGTH),
-            id,
-            board,
-            now_us,
-        );
+        let frame = Frame::read(id, table::PRESENT_POSITION_L, LOOK_LENGTH);
+        self.ask(&frame, id, board, now_us);
     }
 
     /// Sets goal position, speed and torque limit in one write. The torque limit goes along because a
@@ -133,9 +140,13 @@ impl ServoBus {
         self.write(id, table::TORQUE_ENABLE, &[1], board, now_us);
     }
 
-    /// Takes in what the servos sent; the answer, when the question is settled.
+    /// Takes in some of what the servos sent; the answer, when the question is settled.
     pub(crate) fn poll(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
-        while let Some(byte) = board.servo_read() {
+        self.more = false;
+        for _ in 0..MOST_BYTES {
+            let Some(byte) = board.servo_read() else {
+                return self.wait(board, now_us);
+            };
             let asked = self.question.as_ref().map(|question| question.id);
             let mut packet = self.decoder.push(byte);
             while let Some(status) = packet {
@@ -151,13 +162,14 @@ impl ServoBus {
                 packet = self.decoder.pending();
             }
         }
-        self.wait(board, now_us)
+        self.more = true;
+        None
     }
 
     fn wait(&mut self, board: &mut impl SteeringBoard, now_us: u32) -> Option<Answer> {
         let question = self.question.as_mut()?;
         if !question.sent {
-            question.sent = board.servo_write(question.frame.as_bytes());
+            question.sent = board.servo_write(&question.bytes);
             if question.sent {
                 // The servo has its whole time, counted from when it was asked.
                 question.due_us = now_us.wrapping_add(self.reply_timeout_us);
@@ -170,7 +182,7 @@ impl ServoBus {
         question.attempt += 1;
         if question.attempt < ATTEMPTS {
             question.due_us = now_us.wrapping_add(self.reply_timeout_us);
-            question.sent = board.servo_write(question.frame.as_bytes());
+            question.sent = board.servo_write(&question.bytes);
             return None;
         }
         self.question = None;
@@ -189,16 +201,24 @@ impl ServoBus {
         let frame = Frame::write(id, address, values);
         debug_assert!(frame.is_ok(), "at most six registers are written");
         if let Ok(frame) = frame {
-            self.ask(frame, id, board, now_us);
+            self.ask(&frame, id, board, now_us);
         }
     }
 
-    fn ask(&mut self, frame: Frame, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
+    fn ask(&mut self, frame: &Frame, id: u8, board: &mut impl SteeringBoard, now_us: u32) {
+        let bytes = Vec::from_slice(frame.as_bytes());
+        debug_assert!(
+            bytes.is_ok(),
+            "a question is no longer than a write of six registers"
+        );
+        let Ok(bytes) = bytes else {
+            return;
+        };
         self.decoder.reset();
-        let sent = board.servo_write(frame.as_bytes());
+        let sent = board.servo_write(&bytes);
         let due_us = now_us.wrapping_add(self.reply_timeout_us);
         self.question = Some(Question {
-            frame,
+            bytes,
             id,
             due_us,
             attempt: 0,

@@ -28,7 +28,7 @@ use lager_wire::{
 
 use crate::boards;
 use crate::frames::LineAssembler;
-use crate::serial::{OpenPortError, PortGone, SerialPort, Waited};
+use crate::serial::{OpenPortError, PortGone, SerialPort};
 
 /// What a reader tells the main loop.
 #[derive(Debug)]
@@ -94,7 +94,7 @@ pub(crate) struct Shared {
 pub(crate) const QUEUE: usize = 64;
 
 /// Longest wait for bytes in real time: the reader looks for the stop flag that often.
-const LOOK: Duration = Duration::from_millis(50);
+const LOOK: Duration = Duration::from_millis(100);
 
 /// Pauses between attempts to open a port, in real time.
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
@@ -213,14 +213,13 @@ impl<'a> Reader<'a> {
             }
             let now = self.clock.now();
             let due = self.clock.real(link.next_due().saturating_sub(now));
-            if port.wait(due.min(LOOK))? == Waited::TimedOut {
-                heard = now;
-                continue;
-            }
-            let count = port.read(&mut buffer)?;
+            let count = port.read(&mut buffer, due.min(LOOK))?;
             let at_ns = Clock::monotonic_ns();
             if count < buffer.len() {
                 heard = now;
+            }
+            if count == 0 {
+                continue;
             }
             let now = self.clock.at(at_ns);
             let mut ring = false;

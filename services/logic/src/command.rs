@@ -35,18 +35,25 @@ pub(crate) enum News {
 impl Standing {
     /// Standing still, after an order with id `last`.
     pub(crate) fn after(last: u32) -> Self {
-        Self::resumed(last, Command::Wheel(WheelCommand::Standby))
-    }
-
-    /// An order given before a restart.
-    pub(crate) fn resumed(id: u32, command: Command) -> Self {
         Self {
-            id,
-            command,
+            id: last,
+            command: Command::Wheel(WheelCommand::Standby),
             arm_granted: false,
             given_anew: false,
             given: Duration::ZERO,
             heard: Duration::ZERO,
+        }
+    }
+
+    /// An order given before a restart. One that runs once is the same order still; a setpoint may
+    /// have been followed by another that nobody was told of, so it is given anew under a number
+    /// that is nobody's.
+    pub(crate) fn resumed(id: u32, command: Command) -> Self {
+        let is_setpoint = !command.is_one_shot();
+        Self {
+            command,
+            given_anew: is_setpoint,
+            ..Self::after(if is_setpoint { next(id) } else { id })
         }
     }
 
@@ -171,6 +178,16 @@ mod tests {
         assert_eq!(standing.id(), 6);
         standing.settle(Duration::ZERO, TURN, false);
         assert_eq!(standing.id(), 7);
+    }
+
+    #[test]
+    fn after_a_restart_a_turn_is_the_same_and_a_setpoint_leaves_out_a_number() {
+        let mut standing = Standing::resumed(4, TURN);
+        standing.settle(Duration::ZERO, TURN, false);
+        assert_eq!(standing.id(), 4);
+        let mut standing = Standing::resumed(4, FORWARD);
+        standing.settle(Duration::ZERO, FORWARD, false);
+        assert_eq!(standing.id(), 6);
     }
 
     #[test]

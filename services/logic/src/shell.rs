@@ -1,9 +1,11 @@
 //! The navigator's shell on the bus: it carries samples in and out and decides nothing.
 //!
-//! One turn: wait, drain every subscriber, hand each sample to the navigator, and send what
+//! One turn: wait, drain what has been rung for, hand each sample to the navigator, and send what
 //! changed at once: events first, then the status, then the order, and what nobody acts upon
 //! last. Killed between any two of the first three, the successor knows at least as much as the
-//! bridge; an event can come twice, never not at all. An unchanged order is renewed every 40 ms of
+//! bridge; an event can come twice, never not at all. Only a setpoint in place of a setpoint goes
+//! before the status, since giving it twice is giving it once; its number, which the successor may
+//! not know, is left out when a status is taken up. An unchanged order is renewed every 40 ms of
 //! robot time.
 //!
 //! A turn takes one decision for each sample and, only if there was none, one for the time that
@@ -23,6 +25,7 @@ use lager_topics::{
     NavStatus, NavigatorStatus, OperatorInput, SensorDistance, SensorLine, SteeringCommand,
     SteeringOrder, SteeringState, Topic,
 };
+use lager_wire::Command;
 
 use crate::config::LogicConfig;
 use crate::navigator::{Input, Navigator};
@@ -157,8 +160,18 @@ impl Shell {
     }
 
     fn take_states(&mut self) {
-        let health = self.health.latest();
-        if let Some((health, cause)) = self.check_received(health)
+        if self.waiter.has::<LinkHealth>() {
+            self.take_health();
+        }
+        if self.waiter.has::<NavMap>()
+            && let Some((map, cause)) = self.next(|shell| shell.map.latest())
+        {
+            self.decide(Input::Map(&map), cause);
+        }
+    }
+
+    fn take_health(&mut self) {
+        if let Some((health, cause)) = self.next(|shell| shell.health.latest())
             && let Some(mode) = health.mode.get()
         {
             let stopped = health.stopped != 0;
@@ -168,69 +181,56 @@ impl Shell {
                 self.decide(Input::Mode { mode, stopped }, cause);
             }
         }
-        let map = self.map.latest();
-        if let Some((map, cause)) = self.check_received(map) {
-            self.decide(Input::Map(&map), cause);
-        }
     }
 
     fn take_wishes(&mut self) {
-        loop {
-            let order = self.orders.receive();
-            let Some((order, cause)) = self.check_received(order) else {
-                break;
-            };
-            self.decide(Input::Order(&order), cause);
+        if self.waiter.has::<MissionOrder>() {
+            while let Some((order, cause)) = self.next(|shell| shell.orders.receive()) {
+                self.decide(Input::Order(&order), cause);
+            }
         }
-        loop {
-            let input = self.inputs.receive();
-            let Some((input, cause)) = self.check_received(input) else {
-                break;
-            };
-            match input.kind.get() {
-                Some(InputKind::PickupDone) => {
-                    let order_id = input.order_id;
-                    self.decide(Input::PickupDone { order_id }, cause);
+        if self.waiter.has::<OperatorInput>() {
+            while let Some((input, cause)) = self.next(|shell| shell.inputs.receive()) {
+                match input.kind.get() {
+                    Some(InputKind::PickupDone) => {
+                        let order_id = input.order_id;
+                        self.decide(Input::PickupDone { order_id }, cause);
+                    }
+                    Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
+                    // The switch is the bridge's (E14): the mode comes back with its health.
+                    Some(InputKind::SwitchPressed) | None => {}
                 }
-                Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
-                // The switch is the bridge's (E14): the mode comes back with its health.
-                Some(InputKind::SwitchPressed) | None => {}
             }
         }
     }
 
     fn take_senses(&mut self) {
-        loop {
-            let report = self.steering.receive();
-            let Some((report, cause)) = self.check_received(report) else {
-                break;
-            };
-            self.decide(Input::Steering(&report), cause);
+        if self.waiter.has::<SteeringState>() {
+            while let Some((report, cause)) = self.next(|shell| shell.steering.receive()) {
+                self.decide(Input::Steering(&report), cause);
+            }
         }
-        loop {
-            let frame = self.distance.receive();
-            let Some((frame, cause)) = self.check_received(frame) else {
-                break;
-            };
-            self.decide(Input::Distance(frame.distance_cm), cause);
+        if self.waiter.has::<SensorDistance>() {
+            while let Some((frame, cause)) = self.next(|shell| shell.distance.receive()) {
+                self.decide(Input::Distance(frame.distance_cm), cause);
+            }
         }
-        loop {
-            let frame = self.line.receive();
-            let Some((frame, cause)) = self.check_received(frame) else {
-                break;
-            };
-            if let Some(state) = frame.state.get() {
-                self.decide(Input::Line(state), cause);
+        if self.waiter.has::<SensorLine>() {
+            while let Some((frame, cause)) = self.next(|shell| shell.line.receive()) {
+                if let Some(state) = frame.state.get() {
+                    self.decide(Input::Line(state), cause);
+                }
             }
         }
     }
 
-    /// A received sample, and what is to be said of everything that follows from it.
-    fn check_received<T: Topic>(
+    /// A sample that `receive` has brought, and what is to be said of everything that follows from
+    /// it.
+    fn next<T: Topic>(
         &mut self,
-        received: Result<Option<Sample<T>>, ReceiveError>,
+        receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
     ) -> Option<(Sample<T>, Cause)> {
-        match received {
+        match receive(self) {
             Ok(sample) => sample.map(|sample| {
                 let cause = sample.cause();
                 (sample, cause)
@@ -256,12 +256,17 @@ impl Shell {
             let sent = self.events.send(cause, *event);
             self.check(sent);
         }
+        let order = self.navigator.current_order();
+        let is_new = order != self.sent_order;
+        let goes_first = is_setpoint(order) && is_setpoint(self.sent_order);
+        self.sent_order = order;
+        if is_new && goes_first {
+            self.give_order(now, cause);
+        }
         if Navigator::is_news(&self.sent_status, &self.navigator.status()) {
             self.publish_status(now);
         }
-        let order = self.navigator.current_order();
-        if order != self.sent_order {
-            self.sent_order = order;
+        if is_new && !goes_first {
             self.give_order(now, cause);
         }
         if output.route_changed {
@@ -329,4 +334,11 @@ impl Shell {
             tracing::error!(times = self.complaints, "{error}");
         }
     }
+}
+
+/// Whether an order holds until another one comes, rather than running once.
+fn is_setpoint(order: Option<SteeringOrder>) -> bool {
+    order
+        .and_then(|order| Command::from_code(order.code))
+        .is_some_and(|command| !command.is_one_shot())
 }

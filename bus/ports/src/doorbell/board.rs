@@ -4,7 +4,7 @@
 //!     0   head       magic and layout version
 //!     64  callers    per role: which seats are to be rung          read by every ring
 //!     128 spinners   which seats look without pause                written now and then
-//!     256 seat 0     the word, who sits there                      written by every ring
+//!     256 seat 0     the word, its reasons, who sits there         written by every ring
 //!     384 seat 1     …                                             32 seats of 128 bytes
 //! ```
 //!
@@ -14,7 +14,7 @@
 //! **Invariant:** nothing here asks the system; who may write what is decided by the locks of
 //! `segment.rs`. A seat's callers, spinner bit and occupant are written only by who holds its lock.
 
-use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use lager_topics::Role;
 
@@ -28,16 +28,21 @@ pub(crate) const SEATS_PER_ROLE: usize = 8;
 
 /// "lagerbel" and the layout's version; changed whenever [`Board`] or the word changes.
 const MAGIC: u64 = u64::from_be_bytes(*b"lagerbel") ^ VERSION;
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 #[repr(C, align(64))]
 struct Line<T>(T);
 
+/// Where one waiter sits.
 #[repr(C, align(128))]
-struct Seat {
-    word: AtomicU32,
+pub(crate) struct Seat {
+    pub(super) word: AtomicU32,
     pid: AtomicU32,
+    pub(super) reasons: [AtomicU8; REASONS],
 }
+
+/// What a seat can be rung for: as many as fit into the word's line.
+pub(crate) const REASONS: usize = 56;
 
 /// The board. Every bit pattern of the right size is a valid one.
 #[repr(C)]
@@ -49,6 +54,7 @@ pub(crate) struct Board {
 }
 
 const _: () = assert!(size_of::<Board>() == 256 + 128 * SEATS);
+const _: () = assert!(core::mem::offset_of!(Seat, reasons) + REASONS == 64);
 const _: () = assert!(SEATS <= 32 && Role::ALL.len() <= 16);
 
 /// How a board that others have made looks.
@@ -74,19 +80,19 @@ impl Board {
         self.magic.0.store(MAGIC, Ordering::Release);
     }
 
-    /// The word of a seat.
+    /// One of the seats.
     #[inline]
-    pub(crate) fn word(&self, seat: usize) -> &AtomicU32 {
-        &self.seats[seat % SEATS].word
+    pub(crate) fn seat(&self, seat: usize) -> &Seat {
+        &self.seats[seat % SEATS]
     }
 
     /// Rings every waiter of `role`.
     #[inline]
-    pub(crate) fn ring(&self, role: Role) {
+    pub(crate) fn ring(&self, role: Role, reason: usize) {
         // Relaxed: see `take` for a waiter that is taking its seat at this moment.
         let mut seats = self.callers_of(role).load(Ordering::Relaxed);
         while seats != 0 {
-            word::ring(self.word(seats.trailing_zeros() as usize));
+            word::ring(self.seat(seats.trailing_zeros() as usize), reason);
             seats &= seats - 1;
         }
     }
@@ -164,6 +170,7 @@ mod tests {
             seats: core::array::from_fn(|_| Seat {
                 word: AtomicU32::new(0),
                 pid: AtomicU32::new(0),
+                reasons: [const { AtomicU8::new(0) }; REASONS],
             }),
         })
     }
@@ -174,15 +181,23 @@ mod tests {
         board.take(3, Role::Logic, 30);
         board.take(31, Role::Logic, 310);
         board.take(4, Role::Bridge, 40);
-        board.ring(Role::Logic);
-        let rung: Vec<_> = (0..SEATS)
-            .filter(|seat| board.word(*seat).load(Ordering::Relaxed) != 0)
-            .collect();
+        board.ring(Role::Logic, 5);
+        let count = |seat| board.seat(seat).word.load(Ordering::Relaxed);
+        let rung: Vec<_> = (0..SEATS).filter(|seat| count(*seat) != 0).collect();
         assert_eq!(rung, [3, 31]);
         board.clear(3);
-        board.ring(Role::Logic);
-        assert_eq!(board.word(3).load(Ordering::Relaxed), 2);
-        assert_eq!(board.word(31).load(Ordering::Relaxed), 4);
+        board.ring(Role::Logic, 6);
+        assert_eq!([count(3), count(31)], [2, 4]);
+        let rung_for = |seat, reason| word::rung_for(board.seat(seat), reason);
+        assert_eq!(
+            [5, 6, 7].map(|reason| rung_for(3, reason)),
+            [true, false, false]
+        );
+        assert_eq!(
+            [5, 6, 7].map(|reason| rung_for(31, reason)),
+            [true, true, false]
+        );
+        assert!(!rung_for(31, 5), "a reason is taken once");
     }
 
     #[test]
@@ -202,7 +217,7 @@ mod tests {
         assert_eq!(board.layout(), Layout::Blank);
         board.sign();
         assert_eq!(board.layout(), Layout::Ours);
-        board.magic.0.store(MAGIC ^ VERSION ^ 2, Ordering::Relaxed);
+        board.magic.0.store(MAGIC ^ VERSION ^ 1, Ordering::Relaxed);
         assert_eq!(board.layout(), Layout::Other);
     }
 }

@@ -1,36 +1,38 @@
-//! The word in shared memory: an atomic that the kernel can put a process to sleep on.
+//! A seat in shared memory: its word is an atomic that the kernel can put a process to sleep on.
 //!
 //! Apart from the protocol, which knows of no kernel. The futex is a shared one, found by its page
 //! in memory, so ringer and waiter need nothing in common but the mapping.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::Ordering;
 use core::time::Duration;
 
 use rustix::io::Errno;
 use rustix::thread::futex;
 use rustix::time::Timespec;
 
+use super::board::{REASONS, Seat};
 use super::word::{Ended, Word};
 
-impl Word for AtomicU32 {
+impl Word for Seat {
     #[inline]
     fn load(&self, order: Ordering) -> u32 {
-        Self::load(self, order)
+        self.word.load(order)
     }
 
     #[inline]
     fn fetch_add(&self, value: u32, order: Ordering) -> u32 {
-        Self::fetch_add(self, value, order)
+        self.word.fetch_add(value, order)
     }
 
     #[inline]
     fn fetch_and(&self, mask: u32, order: Ordering) -> u32 {
-        Self::fetch_and(self, mask, order)
+        self.word.fetch_and(mask, order)
     }
 
     #[inline]
     fn exchange(&self, current: u32, new: u32, success: Ordering, failure: Ordering) -> bool {
-        self.compare_exchange(current, new, success, failure)
+        self.word
+            .compare_exchange(current, new, success, failure)
             .is_ok()
     }
 
@@ -40,7 +42,7 @@ impl Word for AtomicU32 {
             tv_sec: 3600,
             tv_nsec: 0,
         });
-        match futex::wait(self, futex::Flags::empty(), value, Some(&timeout)) {
+        match futex::wait(&self.word, futex::Flags::empty(), value, Some(&timeout)) {
             Err(Errno::TIMEDOUT) => Ended::TimedOut,
             // Woken, changed before it slept, or a signal: whoever waits looks around.
             _ => Ended::Awake,
@@ -49,6 +51,18 @@ impl Word for AtomicU32 {
 
     fn wake(&self) {
         // It fails only for an address that is none.
-        let _ = futex::wake(self, futex::Flags::empty(), 1);
+        let _ = futex::wake(&self.word, futex::Flags::empty(), 1);
+    }
+
+    #[inline]
+    fn set_reason(&self, reason: usize, order: Ordering) {
+        self.reasons[reason % REASONS].store(1, order);
+    }
+
+    #[inline]
+    fn take_reason(&self, reason: usize, order: Ordering) -> bool {
+        let byte = &self.reasons[reason % REASONS];
+        // Most are not set, and a swap costs as much as some looks.
+        byte.load(Ordering::Relaxed) != 0 && byte.swap(0, order) != 0
     }
 }

@@ -15,8 +15,8 @@
 //! | `pace` | when looking without pause is worth it |
 //! | `standard` | listeners of plain iceoryx2, which know nothing of boards |
 //!
-//! **Invariant:** a ring is a hint that never says what happened; whoever waits has a time-out and
-//! looks at everything after it. Ringing and waiting do not allocate.
+//! **Invariant:** a ring is a hint, and so are its reasons, which topics it was for; whoever waits has
+//! a time-out and looks at everything now and then. Ringing and waiting do not allocate.
 
 mod board;
 mod futex;
@@ -42,6 +42,15 @@ use word::Sleeper;
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::name::RobotName;
+
+/// The reason of a ring by a thread of the waiter's own process.
+pub(crate) const INSIDE: usize = 0;
+
+/// The reason of a ring for the topic or request with the number `id`, the same in every process and
+/// build. Two may share one, and then each is looked at for the other's rings.
+pub(crate) const fn reason(id: u32) -> usize {
+    1 + id as usize % (board::REASONS - 1)
+}
 
 /// A bus's board, opened when the first of its ports needs it and left with the last.
 #[derive(Default)]
@@ -104,7 +113,7 @@ impl Bell {
         let seat = segment
             .take_seat(role)
             .map_err(|fault| error(role, fault))?;
-        let sleeper = Sleeper::new(segment.word(seat));
+        let sleeper = Sleeper::new(segment.seat(seat));
         Ok(Self {
             segment,
             seat,
@@ -115,13 +124,19 @@ impl Bell {
     /// Whether it has rung since it was last asked. No system call.
     #[inline]
     pub(crate) fn rung(&self) -> bool {
-        self.sleeper.rung(self.segment.word(self.seat))
+        self.sleeper.rung(self.segment.seat(self.seat))
+    }
+
+    /// Whether it has rung for `reason` since this was last asked; after a ring was noticed.
+    #[inline]
+    pub(crate) fn rung_for(&self, reason: usize) -> bool {
+        word::rung_for(self.segment.seat(self.seat), reason)
     }
 
     /// Sleeps until a ring, at most `timeout`; true if it was one, or a signal. If it has rung
     /// since it was last asked it does not sleep.
     pub(crate) fn sleep(&self, timeout: Duration) -> bool {
-        self.sleeper.sleep(self.segment.word(self.seat), timeout)
+        self.sleeper.sleep(self.segment.seat(self.seat), timeout)
     }
 
     /// Asks for the right to look without pause, which at most `limit` waiters have at a time.
@@ -153,21 +168,24 @@ impl Drop for Bell {
 pub(crate) struct Rope {
     segment: Arc<Segment>,
     role: Role,
+    reason: usize,
 }
 
 impl Rope {
-    /// A rope to the bells of `role`, those that hang and those that will.
-    pub(crate) fn to(bus: &Bus, role: Role) -> Result<Self, PortError> {
+    /// A rope to the bells of `role`, those that hang and those that will, for samples of the
+    /// topic or request with the number `id`.
+    pub(crate) fn to(bus: &Bus, role: Role, id: u32) -> Result<Self, PortError> {
         Ok(Self {
             segment: bus.board().open(bus, role)?,
             role,
+            reason: reason(id),
         })
     }
 
     /// Rings every waiter of the role. A system call for each that sleeps, and none otherwise.
     #[inline]
     pub(crate) fn ring(&self) {
-        self.segment.ring(self.role);
+        self.segment.ring(self.role, self.reason);
     }
 }
 
@@ -182,7 +200,7 @@ pub(crate) struct InsideRope {
 impl InsideRope {
     /// Rings.
     pub(crate) fn ring(&self) {
-        word::ring(self.segment.word(self.seat));
+        word::ring(self.segment.seat(self.seat), INSIDE);
     }
 }
 

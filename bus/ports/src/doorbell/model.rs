@@ -28,10 +28,11 @@ struct Modelled {
     word: AtomicU32,
     queue: Mutex<()>,
     sleeper: Condvar,
+    reasons: [AtomicBool; 2],
     /// The next sleep ends at once, as if its time were up.
     impatient: AtomicBool,
-    /// What the ringers have published, each one sample.
-    samples: AtomicU32,
+    /// What the ringers have published on two topics, one sample after the other.
+    samples: [AtomicU32; 2],
 }
 
 impl Word for Modelled {
@@ -68,6 +69,17 @@ impl Word for Modelled {
         let _queue = self.queue.lock().unwrap();
         self.sleeper.notify_one();
     }
+
+    fn set_reason(&self, reason: usize, order: Ordering) {
+        // A plain store in memory. Loom does not know that one which comes after a swap's read of
+        // its predecessor comes after the swap; that much every machine keeps.
+        self.reasons[reason].swap(true, order);
+    }
+
+    fn take_reason(&self, reason: usize, order: Ordering) -> bool {
+        let reason = &self.reasons[reason];
+        reason.load(Ordering::Relaxed) && reason.swap(false, order)
+    }
 }
 
 impl Modelled {
@@ -76,36 +88,44 @@ impl Modelled {
             word: AtomicU32::new(0),
             queue: Mutex::new(()),
             sleeper: Condvar::new(),
+            reasons: [AtomicBool::new(false), AtomicBool::new(false)],
             impatient: AtomicBool::new(false),
-            samples: AtomicU32::new(0),
+            samples: [AtomicU32::new(0), AtomicU32::new(0)],
         })
     }
 
-    fn publish(&self) {
+    fn publish(&self, topic: usize) {
         // Relaxed: it is the ring that must make it visible.
-        self.samples.fetch_add(1, Ordering::Relaxed);
+        self.samples[topic].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// A service's loop: wait, drain, until `wanted` samples have come.
+    fn publish_and_ring(&self, topic: usize) {
+        self.publish(topic);
+        word::ring(self, topic);
+    }
+
+    /// A service's loop: drain everything, then wait and drain what has been rung for, until
+    /// `wanted` samples have come.
     fn receive(&self, sleeper: &Sleeper, wanted: u32) {
-        let mut received = 0;
-        while received < wanted {
+        let mut received = [0, 1].map(|topic: usize| self.samples[topic].load(Ordering::Relaxed));
+        while received.iter().sum::<u32>() < wanted {
             if !sleeper.rung(self) {
                 sleeper.sleep(self, Duration::MAX);
             }
-            received = self.samples.load(Ordering::Relaxed);
+            for (topic, received) in received.iter_mut().enumerate() {
+                if word::rung_for(self, topic) {
+                    *received = self.samples[topic].load(Ordering::Relaxed);
+                }
+            }
         }
     }
 }
 
-/// Two ringers with one sample each.
+/// Two ringers with one sample each, on a topic each.
 fn two_ringers(modelled: &Arc<Modelled>) -> [thread::JoinHandle<()>; 2] {
-    [(); 2].map(|()| {
+    [0, 1].map(|topic| {
         let modelled = Arc::clone(modelled);
-        thread::spawn(move || {
-            modelled.publish();
-            word::ring(&*modelled);
-        })
+        thread::spawn(move || modelled.publish_and_ring(topic))
     })
 }
 
@@ -131,8 +151,7 @@ fn a_ringer_that_rings_again_and_again_is_heard_each_time() {
             let modelled = Arc::clone(&modelled);
             move || {
                 for _ in 0..3 {
-                    modelled.publish();
-                    word::ring(&*modelled);
+                    modelled.publish_and_ring(0);
                 }
             }
         });
@@ -163,15 +182,12 @@ fn a_ringer_killed_before_its_wake_does_not_silence_the_next() {
         let killed = thread::spawn({
             let modelled = Arc::clone(&modelled);
             move || {
-                word::count(&*modelled);
+                word::count(&*modelled, 0);
             }
         });
         let next = thread::spawn({
             let modelled = Arc::clone(&modelled);
-            move || {
-                modelled.publish();
-                word::ring(&*modelled);
-            }
+            move || modelled.publish_and_ring(0)
         });
         modelled.receive(&sleeper, 1);
         killed.join().unwrap();
@@ -186,10 +202,7 @@ fn a_waiter_killed_asleep_leaves_a_word_its_successor_can_use() {
         modelled.word.store(6 | word::SLEEPING, Ordering::Relaxed);
         let ringers = two_ringers(&modelled);
         let sleeper = Sleeper::new(&*modelled);
-        // What was published before it came it finds by itself.
-        if modelled.samples.load(Ordering::Relaxed) < 2 {
-            modelled.receive(&sleeper, 2);
-        }
+        modelled.receive(&sleeper, 2);
         for ringer in ringers {
             ringer.join().unwrap();
         }

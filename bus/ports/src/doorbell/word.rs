@@ -2,17 +2,24 @@
 //!
 //! ```text
 //!      31                                1   0
-//!     ┌──────────────────────────────────┬───┐   ring:   old = word += 2
-//!     │ rings so far, wrapping           │ S │           if old has S: wake one sleeper
-//!     └──────────────────────────────────┴───┘   sleep:  word: seen -> seen|S, or it has rung
-//!                                   sleeping             wait while word == seen|S
-//!                                                        clear S; seen = word
+//!     ┌──────────────────────────────────┬───┐   ring:   reason[why] = 1
+//!     │ rings so far, wrapping           │ S │           old = word += 2
+//!     └──────────────────────────────────┴───┘           if old has S: wake one sleeper
+//!                                   sleeping     sleep:  word: seen -> seen|S, or it has rung
+//!     ┌──────────────────────────────────────┐           wait while word == seen|S
+//!     │ reasons, a byte each                 │           clear S; seen = word
+//!     └──────────────────────────────────────┘   look:   for each why of interest:
+//!                                                          reason[why] 1 -> 0: there is something
 //! ```
 //!
 //! One waiter, any number of ringers. A ring and the decision to sleep are read-modify-writes of
 //! the same word, so one of the two comes first: either the waiter finds the ring and does not
 //! sleep, or the ringer finds `S` and wakes. Only the waiter clears `S`: a ringer that is killed
 //! between its addition and its wake leaves `S` standing, and the next one wakes.
+//!
+//! The reasons tell what is worth looking at. Whoever takes one sees what was written before it was
+//! set; it is a byte, so that setting it is a plain store into a line that the addition needs in any
+//! case. A ringer killed before its addition leaves a reason that the next wake finds.
 //!
 //! Apart and generic, so that `model.rs` can run this very source under every interleaving.
 //!
@@ -49,18 +56,30 @@ pub(crate) trait Word {
     fn sleep_while(&self, value: u32, timeout: Duration) -> Ended;
     /// Wakes the sleeper, if there is one.
     fn wake(&self);
+    fn set_reason(&self, reason: usize, order: Ordering);
+    /// Clears it; whether it was set.
+    fn take_reason(&self, reason: usize, order: Ordering) -> bool;
 }
 
-/// Rings: what was written before is seen by the waiter when it has noticed the ring.
-pub(crate) fn ring(word: &impl Word) {
-    if count(word) {
+/// Rings for `reason`: what was written before is seen by the waiter when it has noticed the ring,
+/// or has taken the reason.
+pub(crate) fn ring(word: &impl Word, reason: usize) {
+    if count(word, reason) {
         word.wake();
     }
 }
 
 /// The first half of a ring; says whether the second is needed.
-pub(crate) fn count(word: &impl Word) -> bool {
+pub(crate) fn count(word: &impl Word, reason: usize) -> bool {
+    // Released by itself as well: a waiter that another ring has woken may take the reason before
+    // this ring's addition, and looks because of it.
+    word.set_reason(reason, Ordering::Release);
     word.fetch_add(ONE, Ordering::Release) & SLEEPING != 0
+}
+
+/// Whether it has been rung for `reason` since this was last asked.
+pub(crate) fn rung_for(word: &impl Word, reason: usize) -> bool {
+    word.take_reason(reason, Ordering::Acquire)
 }
 
 /// The waiter's side of a word.

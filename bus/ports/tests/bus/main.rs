@@ -9,6 +9,7 @@ mod introspection;
 mod killed;
 mod limits;
 mod process;
+mod reasons;
 mod requests;
 mod samples;
 mod stress;

@@ -177,7 +177,7 @@ impl Arm {
     /// When [`Arm::poll`] is wanted at the latest.
     #[must_use]
     pub fn next_due_us(&self, now_us: u32) -> u32 {
-        if let Some(due_us) = self.bus.next_due_us() {
+        if let Some(due_us) = self.bus.next_due_us(now_us) {
             return due_us;
         }
         let round_due_us = if self.unfinished_setup().is_some() {

@@ -18,25 +18,23 @@
 //! - Of an arm command, the servos' states are told before its end is.
 
 mod ends;
+mod orders;
 mod telling;
 
-use ends::{End, Finish};
-use lager_wire::link::{BoardEvent, BoardLink};
-use lager_wire::{
-    ArmCommand, Callsign, Command, LineBits, Payload, ResetCause, Setting, SettingKey,
-    SettingReply, SettingStatus, SteerCommand,
-};
+use ends::End;
+use lager_wire::link::BoardLink;
+use lager_wire::{ArmCommand, Callsign, LineBits, ResetCause};
 
 use crate::arm::{Arm, ArmConfig, Outcome};
 use crate::failsafe::CommandAge;
 use crate::line::LineReader;
 use crate::load::Load;
 use crate::pd::{Gains, Pd};
-use crate::register::{CommandRegister, Receipt};
+use crate::register::CommandRegister;
 use crate::store::Store;
 use crate::time::{first, reached};
 use crate::wheels::{Motors, STILL, Wheels};
-use crate::{Board, EEPROM_POLL_US, MOST_BYTES, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
+use crate::{Board, EEPROM_POLL_US, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
 use telling::Reports;
 
 /// The steering board's numbers.
@@ -156,158 +154,55 @@ impl SteeringUnit {
     pub fn step<B: SteeringBoard>(&mut self, board: &mut B) -> u32 {
         let now_us = board.now_us();
         board.kick_watchdog();
-        self.listen(board, now_us);
         self.watch_age(now_us);
-        self.read_line(board, now_us);
+        self.follow(board, now_us);
+        self.listen(board, now_us);
+        self.watch_line(now_us);
         self.drive(board, now_us);
-        // The wheels do not wait for what takes long: it is begun between two words. A word, whole or
-        // broken off by silence, is over within a millisecond whatever is on the wire.
-        if board.exde_is_receiving() {
-            self.load.worked(now_us, board.now_us());
-            return now_us.wrapping_add(WORD_US);
-        }
-        self.move_arm(board, now_us);
-        self.follow(board, now_us);
-        self.report(board, now_us);
-        self.follow(board, now_us);
-        self.store.poll(board);
+        let finished = self.take_time(board, now_us);
         let done_us = board.now_us();
         self.load.worked(now_us, done_us);
+        if !finished {
+            return now_us.wrapping_add(WORD_US);
+        }
         self.load.passed(done_us.wrapping_sub(now_us));
         self.next_due_us(now_us)
     }
 
-    fn listen<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
-        for _ in 0..MOST_BYTES {
-            let Some(byte) = board.uart_read() else {
-                return;
-            };
-            match self.link.push(byte, now_us) {
-                None => {}
-                Some(BoardEvent::Up) => self.greet(now_us),
-                Some(BoardEvent::Packet(packet)) => match packet.payload {
-                    Payload::SteerCommand(command) => self.receive(command, now_us),
-                    Payload::Setting(setting) => {
-                        let reply = self.set(setting);
-                        self.reports.replies.push(reply);
-                    }
-                    _ => self.count_refused(),
-                },
-            }
+    /// Does what takes long; whether it could. The wheels do not wait for it: it is begun between two words.
+    /// A word, whole or broken off by silence, is over within a millisecond whatever is on the wire.
+    fn take_time<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> bool {
+        if !self.is_between_words(board, now_us) {
+            return false;
         }
-    }
-
-    /// The Pi has just come, or come again: it is told everything.
-    fn greet(&mut self, now_us: u32) {
-        self.reports.status_wanted = true;
-        self.reports.data_due_us = now_us;
-        self.arm.tell_all();
-    }
-
-    fn receive(&mut self, command: SteerCommand, now_us: u32) {
-        match self.register.receive(command) {
-            Receipt::Renewed => self.age.renew(now_us),
-            Receipt::AlreadyRefused => {}
-            Receipt::New => {
-                if let Some(command) = self.register.take() {
-                    self.dispatch(command, now_us);
-                }
-            }
+        self.move_arm(board, now_us);
+        if !self.is_between_words(board, now_us) {
+            return false;
         }
+        self.report(board, now_us);
+        self.follow(board, now_us);
+        self.store.poll(board);
+        true
     }
 
-    fn dispatch(&mut self, command: SteerCommand, now_us: u32) {
-        match command.command() {
-            Some(Command::Wheel(wheel)) => {
-                self.accept(now_us);
-                self.wheels.start(wheel, command.seq);
-            }
-            Some(Command::Arm(arm)) if self.wheels.is_standby() => {
-                self.accept(now_us);
-                self.arm_waiting = Some(ArmOrder {
-                    command: arm,
-                    seq: command.seq,
-                });
-            }
-            Some(Command::Arm(_)) | None => {
-                self.register.refuse();
-                self.count_refused();
-                self.end(command.seq, End::Refused, now_us);
-            }
-        }
-    }
-
-    fn accept(&mut self, now_us: u32) {
-        self.register.accept();
-        self.age.renew(now_us);
-        self.break_off(now_us);
-    }
-
-    /// Ends everything that runs once. The arm's end follows when its servos have been stopped.
-    fn break_off(&mut self, now_us: u32) {
-        if let Some(seq) = self.wheels.abort_turn() {
-            self.end(seq, End::Aborted, now_us);
-        }
-        if let Some(order) = self.arm_waiting.take() {
-            self.end(order.seq, End::Aborted, now_us);
-        }
-        self.arm.abort();
-    }
-
-    fn end(&mut self, seq: u8, end: End, now_us: u32) {
-        self.reports.ends.push(Finish { seq, end });
-        self.reports.data_due_us = now_us;
-    }
-
-    fn count_refused(&mut self) {
-        self.refused = self.refused.saturating_add(1);
-    }
-
-    fn set(&mut self, setting: Setting) -> SettingReply {
-        let gains = self.line.pd.gains();
-        let (in_force, changed) = match setting.key {
-            SettingKey::GainP => (
-                gains.p,
-                u8::try_from(setting.value).map(|p| (p, Gains { p, ..gains })),
-            ),
-            SettingKey::GainD => (
-                gains.d,
-                u8::try_from(setting.value).map(|d| (d, Gains { d, ..gains })),
-            ),
-            SettingKey::RawLine | SettingKey::Calibrate => {
-                return SettingReply {
-                    key: setting.key,
-                    seq: setting.seq,
-                    value: 0,
-                    status: SettingStatus::NotHere,
-                };
-            }
-        };
-        let (value, status) = match changed {
-            Ok((value, gains)) => {
-                self.line.pd.set_gains(gains);
-                self.store.save([gains.p, gains.d]);
-                (value, SettingStatus::Accepted)
-            }
-            Err(_) => (in_force, SettingStatus::OutOfRange),
-        };
-        SettingReply {
-            key: setting.key,
-            seq: setting.seq,
-            value: i16::from(value),
-            status,
-        }
-    }
-
-    /// Looks once more at the line, between things that take long, so that the wheels do not wait for them.
+    /// Looks at the line: first of all, and between things that take long, so that the wheels do not wait for
+    /// them.
     fn follow<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
         if self.read_words(board) {
             self.drive(board, now_us);
         }
     }
 
-    fn read_line<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
-        self.read_words(board);
+    /// Whether no word is under way. One that has just come in whole is followed first.
+    fn is_between_words<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> bool {
+        if board.exde_is_receiving() {
+            return false;
+        }
+        self.follow(board, now_us);
+        true
+    }
+
+    fn watch_line(&mut self, now_us: u32) {
         if let Some(due_us) = self.line_due_us()
             && reached(now_us, due_us)
         {

@@ -54,7 +54,8 @@ impl SteeringUnit {
         if reached(now_us, self.reports.status_due_us) {
             self.reports.status_wanted = true;
         }
-        while self.outbox.is_empty()
+        // One packet each time: the wheels wait while it is made.
+        if self.outbox.is_empty()
             && let Some(payload) = self.next_payload(board, now_us)
             && let Some(packet) = self.link.encode(payload)
         {

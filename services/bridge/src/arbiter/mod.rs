@@ -209,9 +209,11 @@ impl Arbiter {
             leases_expired: kept.leases_expired,
             acquainted: kept.wire_seq != 0,
             wire_seq: kept.wire_seq,
-            idle_seq: kept.wire_seq,
             ..Self::new()
         };
+        // One setpoint may have been written and not told: its sequence byte is not used again.
+        arbiter.next_seq();
+        arbiter.idle_seq = arbiter.wire_seq;
         let finish = kept.finish.get().unwrap_or(Finish::None);
         if let (Some(origin), false) = (kept.finished_origin.get(), finish == Finish::None) {
             let key = OrderKey {
@@ -298,6 +300,12 @@ impl Arbiter {
         self.running.map(|running| (running.key, running.command))
     }
 
+    /// Whether the order in force is a setpoint: written once more it is the same.
+    pub fn has_setpoint(&self) -> bool {
+        self.running
+            .is_some_and(|running| !running.command.is_one_shot())
+    }
+
     /// The order that ended last, of those whose end is news.
     pub fn last_ended(&self) -> Option<Ended> {
         self.last
@@ -306,7 +314,8 @@ impl Arbiter {
     /// Grows whenever something has changed that [`Arbiter::fill`] writes, lease excepted.
     ///
     /// Publish before writing to the wire when it has: then a bridge that is killed between the
-    /// two finds out from the board whether the order was carried out.
+    /// two finds out from the board whether the order was carried out. Only where a setpoint has
+    /// replaced a setpoint and nothing else has changed, one write may come before.
     pub fn revision(&self) -> u32 {
         self.revision
     }

@@ -1,7 +1,7 @@
 //! One serial port as the boards need it: raw, 8 data bits, no parity, 1 stop bit, exclusive.
 //!
 //! It is apart so that everything the operating system can say about a port is turned into a
-//! sentence in one place. It never blocks except in [`SerialPort::wait`], never allocates after
+//! sentence in one place. It never blocks except in [`SerialPort::read`], never allocates after
 //! opening, and knows nothing of packets.
 //!
 //! A pseudo terminal is as good as a real port: modem lines are ignored, and the driver's
@@ -10,13 +10,13 @@
 mod low_latency;
 
 use std::fmt;
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use lager_wire::PACKET_LENGTH;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{FlockOperation, Mode, OFlags, flock, fstat, major, open};
+use rustix::fs::{FlockOperation, Mode, OFlags, fcntl_setfl, flock, fstat, major, open};
 use rustix::io::Errno;
 use rustix::termios::{
     ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl,
@@ -92,15 +92,6 @@ pub struct PortGone {
     pub errno: Errno,
 }
 
-/// What a wait brought.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Waited {
-    /// There are bytes to read, or an end to find out about by reading.
-    Readable,
-    /// The time is over.
-    TimedOut,
-}
-
 /// What became of a packet that was to be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sent {
@@ -114,10 +105,18 @@ pub enum Sent {
 
 /// An open port. Reading and writing work through a shared reference, so one thread may read
 /// while another writes (through its own [`PacketWriter`]).
+///
+/// It is open twice: a read may sleep, so that waiting for bytes and reading them is one system
+/// call; a write must not.
 pub struct SerialPort {
-    fd: OwnedFd,
+    reading: OwnedFd,
+    writing: OwnedFd,
     low_latency: bool,
 }
+
+/// How long the driver lets a read sleep, in tenths of a second.
+const READ_TENTHS: u8 = 1;
+const READ: Duration = Duration::from_millis(100 * READ_TENTHS as u64);
 
 impl fmt::Debug for SerialPort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -136,9 +135,9 @@ impl SerialPort {
         let fail = |errno| OpenPortError::from_errno(path, errno);
         // Non-blocking also keeps `open` from waiting for a carrier.
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
-        let fd = open(path, flags, Mode::empty()).map_err(fail)?;
-        let mut termios = tcgetattr(&fd).map_err(fail)?;
-        claim(&fd).map_err(fail)?;
+        let writing = open(path, flags, Mode::empty()).map_err(fail)?;
+        let mut termios = tcgetattr(&writing).map_err(fail)?;
+        lock(&writing).map_err(fail)?;
 
         termios.make_raw();
         termios.input_modes &= !(InputModes::IXOFF | InputModes::IXANY | InputModes::INPCK);
@@ -148,8 +147,8 @@ impl SerialPort {
             | ControlModes::CRTSCTS
             | ControlModes::HUPCL);
         termios.control_modes |= ControlModes::CS8 | ControlModes::CREAD | ControlModes::CLOCAL;
-        termios.special_codes[SpecialCodeIndex::VMIN] = 1;
-        termios.special_codes[SpecialCodeIndex::VTIME] = 0;
+        termios.special_codes[SpecialCodeIndex::VMIN] = 0;
+        termios.special_codes[SpecialCodeIndex::VTIME] = READ_TENTHS;
         let no_such_speed = |_| OpenPortError::Baud {
             path: path.to_owned(),
             baud,
@@ -159,15 +158,24 @@ impl SerialPort {
             return Err(no_such_speed(Errno::INVAL));
         }
         termios.set_speed(baud).map_err(no_such_speed)?;
-        tcsetattr(&fd, OptionalActions::Now, &termios).map_err(fail)?;
+        tcsetattr(&writing, OptionalActions::Now, &termios).map_err(fail)?;
         // The driver reports the speed it has really set.
-        let set = tcgetattr(&fd).map_err(fail)?.output_speed();
+        let set = tcgetattr(&writing).map_err(fail)?.output_speed();
         if set.abs_diff(baud) > baud / 50 {
             return Err(no_such_speed(Errno::INVAL));
         }
-        let low_latency = low_latency::request(&fd);
-        tcflush(&fd, QueueSelector::IOFlush).map_err(fail)?;
-        Ok(Self { fd, low_latency })
+        let low_latency = low_latency::request(&writing);
+        // The same device whatever `path` leads to by now.
+        let again = format!("/proc/self/fd/{}", writing.as_raw_fd());
+        let reading = open(again, flags, Mode::empty()).map_err(fail)?;
+        fcntl_setfl(&reading, OFlags::empty()).map_err(fail)?;
+        shut_out_others(&writing).map_err(fail)?;
+        tcflush(&writing, QueueSelector::IOFlush).map_err(fail)?;
+        Ok(Self {
+            reading,
+            writing,
+            low_latency,
+        })
     }
 
     /// Whether the driver hands bytes over at once instead of collecting them (some USB adapters
@@ -176,29 +184,36 @@ impl SerialPort {
         self.low_latency
     }
 
-    /// Waits until there is something to read, at most `timeout` of real time.
-    pub fn wait(&self, timeout: Duration) -> Result<Waited, PortGone> {
-        let timeout = Timespec {
-            tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
-            tv_nsec: timeout.subsec_nanos().into(),
-        };
-        let mut fds = [PollFd::new(&self.fd, PollFlags::IN)];
-        match poll(&mut fds, Some(&timeout)) {
-            Ok(0) | Err(Errno::INTR) => Ok(Waited::TimedOut),
-            Ok(_) => Ok(Waited::Readable),
+    /// Reads what comes, up to the buffer's length, and waits for it at most for about `timeout` of
+    /// real time; 0 = nothing has come.
+    ///
+    /// A time-out that the driver can keep costs no system call beside the read; it is then kept to
+    /// a tenth of a second.
+    pub fn read(&self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortGone> {
+        if timeout < READ && self.poll(timeout)?.is_empty() {
+            return Ok(0);
+        }
+        match rustix::io::read(&self.reading, buffer) {
+            // Nothing in time, or the end of the stream.
+            Ok(0) if self.poll(Duration::ZERO)?.contains(PollFlags::HUP) => {
+                Err(PortGone { errno: Errno::PIPE })
+            }
+            Ok(count) => Ok(count),
+            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
             Err(errno) => Err(PortGone { errno }),
         }
     }
 
-    /// Reads what is there, up to the buffer's length; 0 = nothing at the moment.
-    ///
-    /// Call it after [`SerialPort::wait`] said `Readable`: an end of the stream is then told from
-    /// an empty buffer.
-    pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PortGone> {
-        match rustix::io::read(&self.fd, buffer) {
-            Ok(0) => Err(PortGone { errno: Errno::PIPE }),
-            Ok(count) => Ok(count),
-            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+    /// What there is to find out by reading within `timeout`: bytes, or an end.
+    fn poll(&self, timeout: Duration) -> Result<PollFlags, PortGone> {
+        let timeout = Timespec {
+            tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: timeout.subsec_nanos().into(),
+        };
+        let mut fds = [PollFd::new(&self.reading, PollFlags::IN)];
+        match poll(&mut fds, Some(&timeout)) {
+            Ok(_) => Ok(fds[0].revents()),
+            Err(Errno::INTR) => Ok(PollFlags::empty()),
             Err(errno) => Err(PortGone { errno }),
         }
     }
@@ -206,23 +221,25 @@ impl SerialPort {
     /// Throws away what was written and has not left the machine yet.
     pub fn discard_output(&self) {
         // A port that cannot do it any more is found out by its reader.
-        let _ = tcflush(&self.fd, QueueSelector::OFlush);
+        let _ = tcflush(&self.writing, QueueSelector::OFlush);
     }
 }
 
 impl AsFd for SerialPort {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.fd.as_fd()
+        self.writing.as_fd()
     }
 }
 
-/// Takes the port for this process alone.
-///
-/// The lock is on the open file and dies with the process. `TIOCEXCL` besides keeps programs away
-/// that ask for no lock, but on a pseudo terminal it outlives a killed process for as long as the
-/// other end is open, which would shut the restarted bridge out.
-fn claim(fd: &OwnedFd) -> Result<(), Errno> {
-    flock(fd, FlockOperation::NonBlockingLockExclusive)?;
+/// Takes the port for this process alone, among those that ask: the lock is on the open file and
+/// dies with the process.
+fn lock(fd: &OwnedFd) -> Result<(), Errno> {
+    flock(fd, FlockOperation::NonBlockingLockExclusive)
+}
+
+/// Keeps programs away that ask for no lock. On a pseudo terminal that would outlive a killed
+/// process for as long as the other end is open, and shut the restarted bridge out.
+fn shut_out_others(fd: &OwnedFd) -> Result<(), Errno> {
     let is_pty = PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev));
     if !is_pty {
         ioctl_tiocexcl(fd)?;

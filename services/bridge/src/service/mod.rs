@@ -24,10 +24,13 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use heapless::spsc::{Consumer, Queue};
-use lager_ports::{Bus, Cause, Clock, PortError, Publisher, Server, Shutdown, Subscriber, Waiter};
+use lager_ports::{
+    Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, Server, Shutdown, Subscriber,
+    Waiter,
+};
 use lager_topics::{
     BridgeRequest, Health, InputKind, LatencyPath, LinkHealth, Mode, OperatorInput,
-    SteeringCommand, SteeringState,
+    SteeringCommand, SteeringState, Topic,
 };
 use lager_wire::link::HostTransmitter;
 use lager_wire::{Callsign, PACKET_LENGTH, Payload, SettingKey, SteerCommand, SteerData};
@@ -142,6 +145,8 @@ struct Core<'a> {
     told_end: Option<Ended>,
     /// Who may drive and whether a stop is latched, as `link/health` last told it.
     told_mode: Option<(Mode, bool)>,
+    /// The order in force that `link/health` last told was a setpoint.
+    told_setpoint: bool,
     path: PathMeter,
     health_due: Duration,
     lost_before: u64,
@@ -192,6 +197,7 @@ impl<'a> Core<'a> {
             state_revision: arbiter.revision(),
             told_end: arbiter.last_ended(),
             told_mode: None,
+            told_setpoint: false,
             path: PathMeter::new(Clock::monotonic_ns()),
             arbiter,
             settings,
@@ -208,7 +214,9 @@ impl<'a> Core<'a> {
     fn turn(&mut self, server: &Server<BridgeRequest>) {
         self.wait();
         self.take_events();
-        if let Err(error) = server.serve(|ask| self.answer(ask)) {
+        if self.waiter.has_request::<BridgeRequest>()
+            && let Err(error) = server.serve(|ask| self.answer(ask))
+        {
             self.complain(&error);
         }
         self.take_orders();
@@ -236,49 +244,50 @@ impl<'a> Core<'a> {
 
     /// Drains orders and buttons completely.
     fn take_orders(&mut self) {
-        loop {
-            match self.orders.receive() {
-                Ok(Some(order)) => {
-                    let received_ns = Clock::monotonic_ns();
-                    // A lease counts from its origin's word, not from when it is read here.
-                    let given_ns = order.stamp().publish_time_ns.min(received_ns);
-                    let was_stopped = self.arbiter.is_stopped();
-                    let verdict = self.arbiter.order(self.clock.at(given_ns), &order);
-                    if verdict == Verdict::Executes
-                        && let Some((key, _)) = self.arbiter.current()
-                    {
-                        self.path.begin(key, order.stamp(), received_ns);
-                    }
-                    if self.arbiter.is_stopped() && !was_stopped {
-                        tracing::warn!("stopped; a resume releases it");
-                    }
-                }
-                Ok(None) => break,
-                Err(error) => {
-                    self.complain(&error);
-                    break;
+        if self.waiter.has::<SteeringCommand>() {
+            while let Some(order) = self.next(|core| core.orders.receive()) {
+                self.take_order(&order);
+            }
+        }
+        if self.waiter.has::<OperatorInput>() {
+            while let Some(input) = self.next(|core| core.inputs.receive()) {
+                // The other inputs are logic's.
+                if input.kind.get() == Some(InputKind::SwitchPressed) {
+                    let mode = match self.arbiter.mode() {
+                        Mode::Manual => Mode::Autonomous,
+                        Mode::Autonomous => Mode::Manual,
+                    };
+                    tracing::info!(?mode, "the switch was pressed");
+                    self.arbiter.set_mode(mode);
                 }
             }
         }
-        loop {
-            match self.inputs.receive() {
-                Ok(Some(input)) => {
-                    // The other inputs are logic's.
-                    if input.kind.get() == Some(InputKind::SwitchPressed) {
-                        let mode = match self.arbiter.mode() {
-                            Mode::Manual => Mode::Autonomous,
-                            Mode::Autonomous => Mode::Manual,
-                        };
-                        tracing::info!(?mode, "the switch was pressed");
-                        self.arbiter.set_mode(mode);
-                    }
-                }
-                Ok(None) => break,
-                Err(error) => {
-                    self.complain(&error);
-                    break;
-                }
-            }
+    }
+
+    /// The sample that `receive` has brought.
+    fn next<T: Topic>(
+        &mut self,
+        receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
+    ) -> Option<Sample<T>> {
+        receive(self).unwrap_or_else(|error| {
+            self.complain(&error);
+            None
+        })
+    }
+
+    fn take_order(&mut self, order: &Sample<SteeringCommand>) {
+        let received_ns = Clock::monotonic_ns();
+        // A lease counts from its origin's word, not from when it is read here.
+        let given_ns = order.stamp().publish_time_ns.min(received_ns);
+        let was_stopped = self.arbiter.is_stopped();
+        let verdict = self.arbiter.order(self.clock.at(given_ns), order);
+        if verdict == Verdict::Executes
+            && let Some((key, _)) = self.arbiter.current()
+        {
+            self.path.begin(key, order.stamp(), received_ns);
+        }
+        if self.arbiter.is_stopped() && !was_stopped {
+            tracing::warn!("stopped; a resume releases it");
         }
     }
 
@@ -287,13 +296,20 @@ impl<'a> Core<'a> {
         let now_ns = Clock::monotonic_ns();
         let now = self.clock.at(now_ns);
         self.arbiter.advance(now);
-        if self.arbiter.revision() != self.health_revision || self.health_due <= now {
+        let tells = self.arbiter.revision() != self.health_revision || self.health_due <= now;
+        let writes_first = self.told_setpoint
+            && self.arbiter.has_setpoint()
+            && self.told_mode == Some((self.arbiter.mode(), self.arbiter.is_stopped()));
+        if tells && !writes_first {
             self.publish_health(now);
         }
         if let Some(place) = self.boards.place(Callsign::Steering) {
             while let Some(command) = self.arbiter.poll(now) {
                 self.write_command(now, place, command);
             }
+        }
+        if tells && writes_first {
+            self.publish_health(now);
         }
         self.path.give_up();
         self.write_settings(now);

@@ -33,6 +33,7 @@ impl Core<'_> {
             Ok(()) => {
                 self.health_revision = self.arbiter.revision();
                 self.told_mode = Some(mode);
+                self.told_setpoint = self.arbiter.has_setpoint();
             }
             Err(error) => self.complain(&error),
         }

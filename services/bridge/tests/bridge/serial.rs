@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::os::fd::AsFd;
 use std::time::Duration;
 
-use lager_bridge::serial::{OpenPortError, PacketWriter, Sent, SerialPort, Waited};
+use lager_bridge::serial::{OpenPortError, PacketWriter, Sent, SerialPort};
 use rustix::termios::tcgetattr;
 
 use crate::harness::{Isolation, Pty, wait_until};
@@ -22,10 +22,8 @@ fn read_exactly(port: &SerialPort, count: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut buffer = [0; 64];
     wait_until("the bytes come", || {
-        if port.wait(Duration::from_millis(1)).unwrap() == Waited::Readable {
-            let count = port.read(&mut buffer).unwrap();
-            bytes.extend(&buffer[..count]);
-        }
+        let got = port.read(&mut buffer, Duration::from_millis(1)).unwrap();
+        bytes.extend(&buffer[..got]);
         bytes.len() >= count
     });
     bytes
@@ -133,10 +131,14 @@ fn a_port_has_one_owner_and_is_free_when_that_one_is_gone() {
 fn a_port_whose_device_goes_is_found_gone() {
     let isolation = Isolation::new();
     let (pty, port) = pair(&isolation);
-    assert_eq!(port.wait(Duration::ZERO), Ok(Waited::TimedOut));
+    // Both ways to wait: before the read, and in it.
+    for timeout in [Duration::ZERO, Duration::from_millis(5), WAIT] {
+        assert_eq!(port.read(&mut [0; 8], timeout), Ok(0), "nothing has come");
+    }
     drop(pty);
-    assert_eq!(port.wait(WAIT), Ok(Waited::Readable));
-    assert!(port.read(&mut [0; 8]).is_err());
+    for timeout in [WAIT, Duration::ZERO] {
+        assert!(port.read(&mut [0; 8], timeout).is_err(), "{timeout:?}");
+    }
     assert!(PacketWriter::default().write(&port, &[0; 11]).is_err());
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use lager_logic::{Input, LogicConfig, Navigator};
 use lager_topics::{EventKind, NavigatorStatus, Phase, Side};
+use lager_wire::Command;
 use proptest::prelude::*;
 
 use crate::double::{STEP, Trouble};
@@ -79,9 +80,13 @@ fn a_status_goes_through_a_navigator_unchanged() {
             ..trial.navigator.status()
         };
         let again = Navigator::resume(LogicConfig::default(), &status).status();
+        // Of a setpoint the number is not sure.
+        let order = Command::from_code(status.code).unwrap();
+        let left_out = u32::from(!order.is_one_shot());
         assert_eq!(
             NavigatorStatus {
                 stopped: 1,
+                command_id: again.command_id - left_out,
                 ..again
             },
             status

@@ -71,6 +71,22 @@ fn a_restarted_bridge_keeps_mode_latch_and_counters() {
 }
 
 #[test]
+fn a_setpoint_that_was_written_and_not_told_keeps_no_later_one_from_the_board() {
+    let mut bench = Bench::autonomous();
+    bench.run_renewed(50, drive(Origin::Logic, 1, FOLLOW));
+    let told = bench.health();
+    bench.give(drive(Origin::Logic, 2, FORWARD));
+    bench.run(1);
+    assert_eq!(bench.board.code, FORWARD.code());
+    bench.arbiter = Arbiter::resume(&told);
+    bench.arbiter.board_up(bench.now, Version::One, false);
+    bench.run_renewed(50, drive(Origin::Logic, 4, STANDBY));
+    assert_eq!(bench.board.code, STANDBY.code());
+    bench.run_renewed(50, drive(Origin::Logic, 5, FOLLOW));
+    assert_eq!(bench.board.code, FOLLOW.code());
+}
+
+#[test]
 fn a_restarted_bridge_writes_nothing_until_the_origin_renews() {
     let mut bench = Bench::autonomous();
     let order = drive(Origin::Logic, 1, FOLLOW);
