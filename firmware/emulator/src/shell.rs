@@ -75,6 +75,19 @@ pub enum RunError {
     /// An EEPROM cannot be kept.
     #[error(transparent)]
     Eeprom(#[from] EepromError),
+    /// The images are built for another baud rate.
+    #[error(
+        "the image of the {} board sends at {found} Bd and the port is at {wanted}; give the rate that the images are built for (`--baud` here and of `lager up`), or build them for this one (`firmware/avr/build --baud {wanted}`)",
+        board.name()
+    )]
+    Baud {
+        /// Whose image.
+        board: Board,
+        /// How fast it sends.
+        found: u32,
+        /// How fast it should.
+        wanted: u32,
+    },
     /// Nobody takes the truth.
     #[error("the truth cannot be written to standard output: {0}; leave --truth away")]
     Truth(#[source] io::Error),
@@ -94,13 +107,10 @@ pub fn run(
         rig.resume(&truth.world_state());
     }
     let mut eeproms = Vec::new();
-    for (board, name) in [
-        (Board::Sensor, "sensor.eeprom"),
-        (Board::Steering, "steering.eeprom"),
-    ] {
+    for board in Board::BOTH {
         if let Some(folder) = &config.eeprom {
-            let file = EepromFile::load(&folder.join(name), rig.chip(board))?;
-            eeproms.push((board, file));
+            let path = folder.join(board.name()).with_extension("eeprom");
+            eeproms.push((board, EepromFile::load(&path, rig.chip(board))?));
         }
     }
     let ports = [
@@ -111,6 +121,7 @@ pub fn run(
     let mut shell = Shell {
         pace: Pace::new(config.speed),
         rig,
+        baud: config.rig.baud,
         ports,
         clock,
         eeproms,
@@ -165,6 +176,7 @@ impl Pace {
 struct Shell {
     pace: Pace,
     rig: Rig,
+    baud: u32,
     ports: [Port; 2],
     clock: Option<ClockPage>,
     eeproms: Vec<(Board, EepromFile)>,
@@ -187,7 +199,7 @@ impl Shell {
         }
         self.listen();
         self.rig.run_for(due);
-        self.speak();
+        self.speak()?;
         if let Some(clock) = &mut self.clock {
             clock.publish(self.rig.now());
         }
@@ -218,8 +230,16 @@ impl Shell {
     }
 
     /// What has arrived at the Pi's end is handed over.
-    fn speak(&mut self) {
+    fn speak(&mut self) -> Result<(), RunError> {
         for board in Board::BOTH {
+            if let Some(found) = self.rig.foreign_baud(board) {
+                let wanted = self.baud;
+                return Err(RunError::Baud {
+                    board,
+                    found,
+                    wanted,
+                });
+            }
             self.bytes.clear();
             let arrived = self.rig.read(board);
             self.bytes.extend(arrived.iter().map(|(_, byte)| byte));
@@ -227,6 +247,7 @@ impl Shell {
         }
         // Nobody here asks for them.
         self.rig.take_motor_changes();
+        Ok(())
     }
 
     fn tell_truth(&mut self) -> Result<(), RunError> {

@@ -20,6 +20,10 @@ const HEALTHY: Duration = Duration::from_secs(1);
 const FIRST_WAIT: Duration = Duration::from_millis(50);
 /// The longest wait between two starts.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
+/// A child that lived this long has found all it needs.
+const SETTLED: Duration = Duration::from_secs(30);
+/// How often in a row a child may end by itself before it has settled.
+const MOST_FAILURES: u32 = 5;
 /// How long a child may take to stop before it is killed.
 pub const PATIENCE: Duration = Duration::from_secs(3);
 
@@ -46,6 +50,8 @@ struct Service {
     start_at: Instant,
     wait: Duration,
     restarted: bool,
+    /// How often in a row it has ended by itself before it had settled.
+    failures: u32,
 }
 
 /// A child ended without being asked to.
@@ -78,6 +84,7 @@ impl Supervisor {
             start_at: now,
             wait: Duration::ZERO,
             restarted: false,
+            failures: 0,
         };
         service.spawn(&self.program, &self.config)?;
         self.services.push(service);
@@ -93,13 +100,14 @@ impl Supervisor {
         let mut ended = Vec::new();
         for service in &mut self.services {
             let how = match service.child.as_mut().map(Child::try_wait) {
-                Some(Ok(Some(status))) => Some(status.to_string()),
-                Some(Err(error)) => Some(error.to_string()),
+                // One that was killed may do better next time.
+                Some(Ok(Some(status))) => Some((status.to_string(), status.code().is_some())),
+                Some(Err(error)) => Some((error.to_string(), false)),
                 Some(Ok(None)) | None => None,
             };
-            if let Some(how) = how {
+            if let Some((how, by_itself)) = how {
                 service.child = None;
-                service.back_off(now);
+                service.back_off(now, by_itself);
                 ended.push(Ended {
                     service: service.name,
                     how,
@@ -110,7 +118,7 @@ impl Supervisor {
                 service.restarted = true;
                 self.restarts += 1;
                 if let Err(error) = service.spawn(&self.program, &self.config) {
-                    service.back_off(now);
+                    service.back_off(now, true);
                     ended.push(Ended {
                         service: service.name,
                         how: format!("{error:#}"),
@@ -119,6 +127,13 @@ impl Supervisor {
             }
         }
         ended
+    }
+
+    /// A service that ends by itself at every start, if there is one: more starts will not help.
+    pub fn hopeless(&self) -> Option<&'static str> {
+        let mut services = self.services.iter();
+        let service = services.find(|service| service.failures >= MOST_FAILURES)?;
+        Some(service.name)
     }
 
     /// How many restarts there were in all.
@@ -151,11 +166,16 @@ impl Supervisor {
 
 impl Service {
     /// Sets the next start after an end found at `now`.
-    fn back_off(&mut self, now: Instant) {
-        self.wait = if now - self.started >= HEALTHY {
+    fn back_off(&mut self, now: Instant, by_itself: bool) {
+        let lived = now - self.started;
+        self.wait = if lived >= HEALTHY {
             Duration::ZERO
         } else {
             (self.wait * 2).clamp(FIRST_WAIT, LONGEST_WAIT)
+        };
+        self.failures = match by_itself && lived < SETTLED {
+            true => self.failures + 1,
+            false => 0,
         };
         self.start_at = now + self.wait;
     }

@@ -27,9 +27,8 @@ use crate::supervisor::Supervisor;
 const TICK: Duration = Duration::from_millis(10);
 /// How often dead nodes are swept from the bus.
 const SWEEP: Duration = Duration::from_millis(250);
-/// How long emulated boards may stand still before they are given up, in real time: longer than
-/// the supervisor waits between two starts.
-const STANDSTILL: Duration = Duration::from_secs(30);
+/// How long an emulated body may take until it has a clock, in real time.
+const BODY_START: Duration = Duration::from_secs(30);
 
 /// Runs until Ctrl-C, or until the mission has ended when that was asked for.
 pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<ExitCode> {
@@ -73,7 +72,6 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     let started = Instant::now();
     let clock = bus.clock();
     let robot_start = clock.now();
-    let mut standing = Standing::default();
     let mut operator = scripted.then(|| ScriptedOperator::new(mission, Hands::fresh_id()));
     let mut swept = started;
     let mut complaints = Complaints::default();
@@ -93,7 +91,7 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
             if let Some(act) = operator.step(clock.now(), narrator.seen()) {
                 complaints.hear(hands.carry_out(act));
             }
-            let over = operator.outcome().is_some() || standing.too_long(clock.now());
+            let over = operator.outcome().is_some() || supervisor.hopeless().is_some();
             if over && args.exit_when_done {
                 break;
             }
@@ -101,6 +99,7 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
         std::thread::sleep(clock.real(2 * TICK).min(TICK));
     }
 
+    let hopeless = supervisor.hopeless();
     // The robot is stopped before anything else is looked at.
     supervisor.stop();
     complaints.hear(narrator.look(clock.now() - robot_start));
@@ -109,10 +108,10 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
         .map_or_else(Vec::new, |operator| operator.delivered().to_vec());
     let failure = match operator.as_ref().and_then(ScriptedOperator::outcome) {
         Some(Err(why)) => Some(why.to_owned()),
-        None if standing.is_too_long() => {
-            Some("the emulated boards stand still; what ended them stands above".into())
-        }
-        None if args.exit_when_done => Some("interrupted before the mission was delivered".into()),
+        None if args.exit_when_done => Some(match hopeless {
+            Some(service) => format!("the {service} ends at every start"),
+            None => "interrupted before the mission was delivered".into(),
+        }),
         _ => delivered
             .iter()
             .find(|product| narrator.truly_delivered(**product) == Some(false))
@@ -170,33 +169,13 @@ fn join(config: &BusConfig, supervisor: &mut Supervisor, shutdown: &Shutdown) ->
     loop {
         match Bus::open(config, Role::Supervisor) {
             Err(OpenError::NoClock { .. } | OpenError::ForeignClock(_))
-                if start.elapsed() < STANDSTILL && !shutdown.is_requested() => {}
+                if start.elapsed() < BODY_START && !shutdown.is_requested() => {}
             joined => return Ok(joined?),
         }
         if let Some(ended) = supervisor.poll(|_| {}).first() {
             bail!("the {} does not start ({})", ended.service, ended.how);
         }
         std::thread::sleep(TICK);
-    }
-}
-
-/// How long the robot's clock has not moved, which only an emulated body's can do.
-#[derive(Default)]
-struct Standing(Option<(Duration, Instant)>);
-
-impl Standing {
-    /// Looks at the clock: whether it has stood still for so long that no mission will end.
-    fn too_long(&mut self, now: Duration) -> bool {
-        if self.0.is_none_or(|(then, _)| then != now) {
-            self.0 = Some((now, Instant::now()));
-        }
-        self.is_too_long()
-    }
-
-    /// As the last look found it.
-    fn is_too_long(&self) -> bool {
-        self.0
-            .is_some_and(|(_, since)| since.elapsed() >= STANDSTILL)
     }
 }
 

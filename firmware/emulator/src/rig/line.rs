@@ -17,12 +17,17 @@ const PI_BUFFER: usize = 4_096;
 /// Bits of a frame: 8N1.
 const FRAME: f64 = 10.0;
 
+/// How far two baud rates may lie apart: what 8N1 bears with an exact sampler.
+const TOLERANCE: f64 = 0.04;
+
 /// One cable.
 pub(super) struct PiLine {
     /// Cycles of one of the Pi's bits.
     bit: f64,
     free: Cell<f64>,
     cut: Cell<bool>,
+    /// Cycles of the board's last bit if the Pi cannot read bits like that.
+    foreign_bit: Cell<Option<u64>>,
     arrived: RefCell<VecDeque<(u64, u8)>>,
     written: RefCell<Option<Vec<(u64, u8)>>>,
 }
@@ -33,11 +38,14 @@ impl PiLine {
             bit: FREQUENCY as f64 / f64::from(baud),
             free: Cell::new(0.0),
             cut: Cell::new(false),
+            foreign_bit: Cell::new(None),
             arrived: RefCell::default(),
             written: RefCell::new(None),
         });
         let end = Rc::clone(&line);
         chip.on_sent(UsartId::Zero, move |sent| {
+            let is_foreign = (sent.bit as f64 / end.bit - 1.0).abs() > TOLERANCE;
+            end.foreign_bit.set(is_foreign.then_some(sent.bit));
             let mut arrived = end.arrived.borrow_mut();
             if !end.cut.get() && arrived.len() < PI_BUFFER {
                 let (byte, _) = sampled(sent.byte, sent.bit as f64, end.bit);
@@ -78,6 +86,10 @@ impl PiLine {
     /// Cycles of one byte.
     pub(super) fn byte_cycles(&self) -> u64 {
         (FRAME * self.bit).round() as u64
+    }
+
+    pub(super) fn foreign_baud(&self) -> Option<u32> {
+        Some((FREQUENCY / self.foreign_bit.get()?.max(1)) as u32)
     }
 
     pub(super) fn cut(&self, cut: bool) {

@@ -59,6 +59,14 @@ pub enum Board {
 impl Board {
     /// Both, in the order of their names.
     pub const BOTH: [Self; 2] = [Self::Sensor, Self::Steering];
+
+    /// Its name in sentences and file names.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Steering => "steering",
+        }
+    }
 }
 
 /// The images of both boards.
@@ -257,6 +265,11 @@ impl Rig {
     /// stop bit's end.
     pub fn take_written(&mut self, board: Board) -> Vec<(u64, u8)> {
         self.lines[board as usize].take_written()
+    }
+
+    /// The baud rate at which a board has sent last, if it is not that of the Pi's end.
+    pub fn foreign_baud(&self, board: Board) -> Option<u32> {
+        self.lines[board as usize].foreign_baud()
     }
 
     /// Cuts a board's cable to the Pi, or mends it.
