@@ -15,13 +15,15 @@
 //! writes the later of both orders alone: such a frame is put aside, and counted. The steering board reports that its
 //! wheels stand, so the robot drives towards its goods for as long as it is measured.
 
+mod chain;
+
 use core::time::Duration;
 use std::time::Instant;
 
 use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
 use lager_topics::{
     Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MissionOrder, Mode as Driver, NavMap,
-    NavStatus, Order, PathLatency, Phase, Role,
+    NavStatus, Order, Phase, Role,
 };
 use lager_wire::link::BoardEvent;
 use lager_wire::{
@@ -29,7 +31,7 @@ use lager_wire::{
 };
 
 use super::board::{Board, map, now_us};
-use super::pace::{ANSWER_WITHIN, Chain, now_ns, sleep_until_due};
+use super::pace::{now_ns, sleep_until_due};
 use super::players::{BRIDGE, LOGIC, OBSERVER, Place, RealTime, Script, bus_error};
 use super::processes::Processes;
 use crate::domain::Domain;
@@ -324,76 +326,6 @@ impl Robot {
                 });
             }
         }
-    }
-}
-
-impl Chain for Robot {
-    fn begin(&mut self) -> Result<(), BenchError> {
-        self.processes.wake()?;
-        let start = Instant::now();
-        let mut in_a_row = 0;
-        // It may have stood still for longer than leases and links hold, and finds its way back by
-        // itself; or for nearly as long, and then the next report must not be late.
-        self.reported_ns = 0;
-        while in_a_row < IN_A_ROW {
-            if interrupted() {
-                return Err(BenchError::Interrupted);
-            }
-            if start.elapsed() > UP_WITHIN {
-                return Err(self.processes.fault(&self.name, self.frames));
-            }
-            self.play_boards()?;
-            in_a_row = match self.exchange(20_000_000)? {
-                Answer::After(_) => in_a_row + 1,
-                Answer::Overtaken | Answer::None => 0,
-            };
-        }
-        Ok(())
-    }
-
-    fn frame(&mut self) -> Result<u64, BenchError> {
-        let time = loop {
-            match self.exchange(ANSWER_WITHIN)? {
-                Answer::After(time) => break time,
-                Answer::Overtaken => self.overtaken += 1,
-                Answer::None => return Err(self.processes.fault(&self.name, self.frames)),
-            }
-            if self.overtaken > TOO_FEW_TO_JUDGE + self.frames / 10 {
-                return Err(BenchError::Overloaded {
-                    overtaken: self.overtaken,
-                    frames: self.frames,
-                });
-            }
-        };
-        // While the robot stands: a report is news to logic too, which then looks for the line.
-        if self.last.0 != FOLLOW {
-            self.report()?;
-        }
-        Ok(time)
-    }
-
-    fn count(&mut self) -> Result<(), BenchError> {
-        self.urgent = self.boards_priority.map(RealTime::begin).transpose()?;
-        self.processes.start_counting()
-    }
-
-    fn end(&mut self) -> Result<(), BenchError> {
-        self.urgent = None;
-        self.processes.rest()
-    }
-
-    fn cpu_percent(&self) -> Option<f64> {
-        self.processes.cpu_percent()
-    }
-
-    fn latency(&mut self) -> Result<Option<PathLatency>, BenchError> {
-        let latest = self
-            .latency
-            .latest()
-            .map_err(bus_error("reading the path's latency"))?;
-        Ok(latest
-            .map(|sample| *sample)
-            .filter(|seen| seen.total.count > 0))
     }
 }
 

@@ -82,7 +82,9 @@ impl BusConfig {
         // service would only make opening slow.
         config.global.service.cleanup_dead_nodes_on_open = false;
         let defaults = &mut config.defaults;
-        defaults.publish_subscribe.subscriber_expired_connection_buffer = GONE;
+        defaults
+            .publish_subscribe
+            .subscriber_expired_connection_buffer = GONE;
         defaults.request_response.client_expired_connection_buffer = GONE;
         defaults.request_response.server_expired_connection_buffer = GONE;
         Ok(config)

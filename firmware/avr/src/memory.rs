@@ -11,7 +11,11 @@ use core::ffi::c_void;
 /// # Safety
 /// As C's `memcpy`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memcpy(to: *mut c_void, from: *const c_void, length: usize) -> *mut c_void {
+pub unsafe extern "C" fn memcpy(
+    to: *mut c_void,
+    from: *const c_void,
+    length: usize,
+) -> *mut c_void {
     if length > 0 {
         // SAFETY: by the caller's promise both areas hold `length` bytes.
         unsafe {
@@ -36,7 +40,11 @@ pub unsafe extern "C" fn memcpy(to: *mut c_void, from: *const c_void, length: us
 /// # Safety
 /// As C's `memmove`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn memmove(to: *mut c_void, from: *const c_void, length: usize) -> *mut c_void {
+pub unsafe extern "C" fn memmove(
+    to: *mut c_void,
+    from: *const c_void,
+    length: usize,
+) -> *mut c_void {
     if (to as usize) <= from as usize {
         // SAFETY: a copy upwards never overwrites what it still has to read.
         return unsafe { memcpy(to, from, length) };

@@ -35,7 +35,7 @@ impl Place {
 
     fn start(&self, resume: Option<&str>) -> Emulator {
         let images = std::env::var_os("LAGER_IMAGES").map_or_else(
-            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../avr/target/avr-none/release"),
+            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../avr/target/images"),
             PathBuf::from,
         );
         let mut command = Command::new(env!("CARGO_BIN_EXE_lager-emulator"));

@@ -10,34 +10,43 @@ use lager_emulator::rig::{Board, Images, Rig, RigOptions};
 use lager_plant::{Pose, Warehouse};
 use lager_wire::{BoardStatus, Command, Payload, SteerData, WheelCommand};
 
+/// The default baud rate of the Pi's lines, and the original's.
+pub(crate) const FAST: u32 = 500_000;
+pub(crate) const SLOW: u32 = 9_600;
+
 /// Where `firmware/avr` puts its images, unless the environment says otherwise.
 fn folder() -> PathBuf {
     std::env::var_os("LAGER_IMAGES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../avr/target/avr-none/release"),
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../avr/target/images"),
         PathBuf::from,
     )
 }
 
-/// The images, read once.
-pub(crate) fn images() -> &'static Images {
-    static IMAGES: OnceLock<Images> = OnceLock::new();
-    IMAGES.get_or_init(|| {
-        let read = |name: &str| {
-            Image::read(&folder().join(name)).unwrap_or_else(|error| panic!("{error}"))
-        };
-        Images {
-            sensor: read("sensor.elf"),
-            steering: read("steering.elf"),
-        }
-    })
+fn read(folder: &Path) -> Images {
+    let read =
+        |name: &str| Image::read(&folder.join(name)).unwrap_or_else(|error| panic!("{error}"));
+    Images {
+        sensor: read("sensor.elf"),
+        steering: read("steering.elf"),
+    }
+}
+
+/// The images for a baud rate, read once.
+fn images(baud: u32) -> &'static Images {
+    static FAST_ONES: OnceLock<Images> = OnceLock::new();
+    static SLOW_ONES: OnceLock<Images> = OnceLock::new();
+    match baud {
+        FAST => FAST_ONES.get_or_init(|| read(&folder())),
+        _ => SLOW_ONES.get_or_init(|| read(&folder().join("9600"))),
+    }
 }
 
 /// How the tests build their robot.
-pub(crate) fn options(seed: u64) -> RigOptions {
+fn options(seed: u64, baud: u32) -> RigOptions {
     RigOptions {
         warehouse: Warehouse::builtin("small").expect("it is built in"),
         seed,
-        baud: 500_000,
+        baud,
     }
 }
 
@@ -51,8 +60,13 @@ pub(crate) struct Robot {
 impl Robot {
     /// Power comes on.
     pub(crate) fn new(seed: u64) -> Self {
+        Self::at(FAST, seed)
+    }
+
+    /// The same with the lines to the Pi at another baud rate.
+    pub(crate) fn at(baud: u32, seed: u64) -> Self {
         Self {
-            rig: Rig::new(images(), &options(seed)).expect("the rig is sound"),
+            rig: Rig::new(images(baud), &options(seed, baud)).expect("the rig is sound"),
             sensor: Pi::new(Board::Sensor),
             steering: Pi::new(Board::Steering),
         }

@@ -1,0 +1,82 @@
+//! The robot as one of the chains that take turns: it finds its way back after it stood still, and
+//! answers frames.
+
+use std::time::Instant;
+
+use lager_topics::PathLatency;
+
+use super::{Answer, FOLLOW, IN_A_ROW, Robot, TOO_FEW_TO_JUDGE, UP_WITHIN};
+use crate::error::BenchError;
+use crate::parts::interrupted;
+use crate::path::pace::{ANSWER_WITHIN, Chain};
+use crate::path::players::{RealTime, bus_error};
+
+impl Chain for Robot {
+    fn begin(&mut self) -> Result<(), BenchError> {
+        self.processes.wake()?;
+        let start = Instant::now();
+        let mut in_a_row = 0;
+        // It may have stood still for longer than leases and links hold, and finds its way back by
+        // itself; or for nearly as long, and then the next report must not be late.
+        self.reported_ns = 0;
+        while in_a_row < IN_A_ROW {
+            if interrupted() {
+                return Err(BenchError::Interrupted);
+            }
+            if start.elapsed() > UP_WITHIN {
+                return Err(self.processes.fault(&self.name, self.frames));
+            }
+            self.play_boards()?;
+            in_a_row = match self.exchange(20_000_000)? {
+                Answer::After(_) => in_a_row + 1,
+                Answer::Overtaken | Answer::None => 0,
+            };
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self) -> Result<u64, BenchError> {
+        let time = loop {
+            match self.exchange(ANSWER_WITHIN)? {
+                Answer::After(time) => break time,
+                Answer::Overtaken => self.overtaken += 1,
+                Answer::None => return Err(self.processes.fault(&self.name, self.frames)),
+            }
+            if self.overtaken > TOO_FEW_TO_JUDGE + self.frames / 10 {
+                return Err(BenchError::Overloaded {
+                    overtaken: self.overtaken,
+                    frames: self.frames,
+                });
+            }
+        };
+        // While the robot stands: a report is news to logic too, which then looks for the line.
+        if self.last.0 != FOLLOW {
+            self.report()?;
+        }
+        Ok(time)
+    }
+
+    fn count(&mut self) -> Result<(), BenchError> {
+        self.urgent = self.boards_priority.map(RealTime::begin).transpose()?;
+        self.processes.start_counting()
+    }
+
+    fn end(&mut self) -> Result<(), BenchError> {
+        self.urgent = None;
+        self.processes.rest()
+    }
+
+    fn cpu_percent(&self) -> Option<f64> {
+        self.processes.cpu_percent()
+    }
+
+    fn latency(&mut self) -> Result<Option<PathLatency>, BenchError> {
+        let latest = self
+            .latency
+            .latest()
+            .map_err(bus_error("reading the path's latency"))?;
+        Ok(latest
+            .map(|sample| *sample)
+            .filter(|seen| seen.total.count > 0))
+    }
+}
