@@ -165,6 +165,19 @@ pub enum BenchError {
         /// How long it was waited for.
         limit: Duration,
     },
+    /// A program of the chips is not there.
+    #[error("there is no {0}; build the boards' images and the emulator with `.ci/firmware`")]
+    NotBuilt(PathBuf),
+    /// The emulator has no figures.
+    #[error(
+        "{emulator} measured nothing ({detail}); build it and the images anew with `.ci/firmware`"
+    )]
+    Emulator {
+        /// The executable.
+        emulator: PathBuf,
+        /// What it says.
+        detail: String,
+    },
     /// Somebody wants to stop.
     #[error("interrupted; nothing was left behind")]
     Interrupted,

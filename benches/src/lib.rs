@@ -1,6 +1,6 @@
 //! What is measured, each beside its baseline in the same run.
 //!
-//! A scenario (`hop`, `path`, `fanout`) starts the processes it needs, measures every candidate and
+//! `chip` counts cycles of the boards' images instead, which are exact. Every other scenario (`hop`, `path`, `fanout`) starts the processes it needs, measures every candidate and
 //! every baseline in turn, and returns a [`Report`] that prints as a table and serialises as JSON.
 //! The criterion targets beside this library and `lager bench` are two ways to run the same code.
 //!
@@ -11,6 +11,7 @@
 
 mod ball;
 mod baseline;
+pub mod chip;
 mod domain;
 pub mod error;
 pub mod fanout;

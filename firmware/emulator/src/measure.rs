@@ -64,6 +64,9 @@ pub enum MeasureError {
     /// A jump of the tape was not answered.
     #[error("{0} did not come within 60 ms of their time; are these images that follow a line?")]
     NoAnswer(&'static str),
+    /// No robot's duties stood still before a jump.
+    #[error("the duties never stood still on a straight line; look at the regulator's gains")]
+    NeverSettled,
 }
 
 /// Times in cycles of 62.5 ns over all phases.
@@ -80,16 +83,16 @@ pub struct Span {
 }
 
 impl Span {
-    /// Of at least one time.
-    fn of(mut cycles: Vec<u64>) -> Self {
+    /// `None` of no times.
+    fn of(mut cycles: Vec<u64>) -> Option<Self> {
         cycles.sort_unstable();
-        let last = cycles.len() - 1;
-        Self {
+        let last = cycles.len().checked_sub(1)?;
+        Some(Self {
             best: cycles[0],
             median: cycles[cycles.len() / 2],
             p99: cycles[(cycles.len() * 99 / 100).min(last)],
             worst: cycles[last],
-        }
+        })
     }
 }
 
@@ -115,6 +118,8 @@ pub struct Figures {
     pub frequency_hz: u64,
     /// The lines' baud rate.
     pub baud: u32,
+    /// The version of rustc that built the sensor board's image.
+    pub rustc: String,
     /// Phases of the sensor board's loop tried.
     pub phases: u64,
     /// From the tape's jump to the write of another duty. The pin follows at the end of the PWM
@@ -179,10 +184,11 @@ pub fn measure(images: &Images, options: &RigOptions) -> Result<Figures, Measure
     Ok(Figures {
         frequency_hz: FREQUENCY,
         baud: options.baud,
+        rustc: images.sensor.rustc().to_owned(),
         phases: to_duty.len() as u64,
-        tape_to_duty: Span::of(to_duty),
+        tape_to_duty: Span::of(to_duty).ok_or(MeasureError::NeverSettled)?,
         pwm_period: 256 * prescaler,
-        tape_to_uart: Span::of(to_uart),
+        tape_to_uart: Span::of(to_uart).ok_or(MeasureError::NeverSettled)?,
         sensor: figures(Board::Sensor, &images.sensor),
         steering: figures(Board::Steering, &images.steering),
         real_time_factor: factor,

@@ -3,6 +3,7 @@
 //! Nothing is measured here; the same code runs under criterion and in the guard.
 
 use anyhow::{Context, Result};
+use lager_benches::chip::{self, ChipReport, Programs};
 use lager_benches::{Mode, Options, Regime, fanout, hop, path};
 
 use crate::cli::{BenchArgs, Scenario};
@@ -14,9 +15,21 @@ pub fn run(args: &BenchArgs) -> Result<String> {
         Scenario::Hop => ("hop", hop::measure(&options)),
         Scenario::Path => ("path", path::measure(&options)),
         Scenario::Fanout => ("fanout", fanout::measure(&options)),
+        Scenario::Chip => return run_chip(args.json),
     };
     let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
     Ok(if args.json {
+        report.to_json()
+    } else {
+        report.to_string().trim_end().to_owned()
+    })
+}
+
+/// The boards' images in the emulator: nothing to choose, as every run counts the same.
+fn run_chip(json: bool) -> Result<String> {
+    let traces = chip::measure(&Programs::here()).context("`lager bench chip` has no result")?;
+    let report = ChipReport::of(&traces);
+    Ok(if json {
         report.to_json()
     } else {
         report.to_string().trim_end().to_owned()
@@ -80,7 +93,7 @@ mod tests {
     #[test]
     fn wrong_choices_say_what_there_is() {
         for (flags, words) in [
-            (&["leap"][..], "hop, path, fanout"),
+            (&["leap"][..], "hop, path, fanout, chip"),
             (&["hop", "--mode", "busy"], "spin, adaptive or block"),
             (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
             (&["hop", "--runs", "0"], "the least"),

@@ -269,6 +269,7 @@ pub enum TopicCommand {
   lager bench hop --mode block --regime same-core  the software's share of a wake
   lager bench path --runs 9 --json > path.json     what a plot is drawn from
   lager bench fanout                               what observers cost the writer
+  lager bench chip                                 the boards' images, in cycles: exact
 
 Times are medians over the runs: of each run's median (p50) and of what 99 % and
 99.9 % of its samples kept. Ratios compare with a baseline of the same run and
@@ -305,6 +306,8 @@ pub enum Scenario {
     Path,
     /// What publishing costs with 1 to 64 subscribers and observers
     Fanout,
+    /// Cycles of the boards' real images, from tape to duty and to UART; `.ci/firmware` builds what it runs
+    Chip,
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {

@@ -54,6 +54,7 @@ pub enum ImageError {
 pub struct Image {
     pub(crate) flash: Vec<(usize, Vec<u8>)>,
     pub(crate) eeprom: Vec<(usize, Vec<u8>)>,
+    rustc: String,
 }
 
 impl Image {
@@ -74,6 +75,11 @@ impl Image {
         self.flash.iter().map(|(_, bytes)| bytes.len()).sum()
     }
 
+    /// The version of rustc that built the image, `1.96.0`; empty if the file does not tell.
+    pub fn rustc(&self) -> &str {
+        &self.rustc
+    }
+
     fn parse(bytes: &[u8], path: &Path) -> Result<Self, ImageError> {
         let is_avr =
             bytes.starts_with(b"\x7FELF\x01\x01") && half(bytes, 0x12) == Some(MACHINE_AVR);
@@ -83,6 +89,7 @@ impl Image {
         let mut image = Self {
             flash: Vec::new(),
             eeprom: Vec::new(),
+            rustc: compiler(bytes),
         };
         let cut_off = || ImageError::CutOff(path.to_owned());
         let table = word(bytes, 0x1C).ok_or_else(cut_off)?;
@@ -127,6 +134,19 @@ impl Image {
     }
 }
 
+/// What the compiler has written into the file's comments: `rustc version 1.96.0 (...)`.
+fn compiler(bytes: &[u8]) -> String {
+    const MARK: &[u8] = b"rustc version ";
+    let Some(at) = bytes.windows(MARK.len()).position(|window| window == MARK) else {
+        return String::new();
+    };
+    let version = bytes[at + MARK.len()..].iter();
+    version
+        .take_while(|byte| byte.is_ascii_graphic())
+        .map(|byte| char::from(*byte))
+        .collect()
+}
+
 fn half(bytes: &[u8], at: usize) -> Option<u16> {
     let field = bytes.get(at..at + 2)?;
     Some(u16::from_le_bytes([field[0], field[1]]))
@@ -168,6 +188,14 @@ mod tests {
         let image = parse(&elf(MACHINE_AVR, 0x100)).unwrap();
         assert_eq!(image.flash, [(0x100, vec![0xFF, 0xCF])]);
         assert_eq!(image.flash_bytes(), 2);
+        assert_eq!(image.rustc(), "");
+    }
+
+    #[test]
+    fn an_image_tells_its_compiler() {
+        let mut bytes = elf(MACHINE_AVR, 0);
+        bytes.extend(b"\0rustc version 1.96.0-nightly (ac68faa20 2026-05-25)\0");
+        assert_eq!(parse(&bytes).unwrap().rustc(), "1.96.0-nightly");
     }
 
     #[test]

@@ -1,0 +1,361 @@
+//! What the boards' images do, in cycles: the emulator's `--trace`, run as a process and read.
+//!
+//! Apart from the other scenarios, because nothing is timed here: chips' cycles are exact and the same on
+//! every machine, but for the real-time factor. The emulator is an executable of its own, as simavr's
+//! licence wants it.
+
+use core::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::BenchError;
+use crate::machine;
+use crate::report::{Mode, Regime, Report, Row};
+
+/// The baud rates of the lines to the Pi that there are images for: the default and the original's.
+const BAUDS: [(u32, &str); 2] = [(500_000, "500kBd"), (9_600, "9600Bd")];
+
+/// What runs the chips, and on what.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Programs {
+    /// The executable `lager-emulator`.
+    pub emulator: PathBuf,
+    /// The folder of `sensor.elf` and `steering.elf`, with those for 9600 Bd in `9600` below it.
+    pub images: PathBuf,
+}
+
+impl Programs {
+    /// Where `.ci/firmware` leaves them in a source tree.
+    #[must_use]
+    pub fn in_tree(root: &Path) -> Self {
+        Self {
+            emulator: root.join("firmware/emulator/target/release/lager-emulator"),
+            images: root.join("firmware/avr/target/images"),
+        }
+    }
+
+    /// Those of the source tree that the current folder is in, or of the current folder.
+    #[must_use]
+    pub fn here() -> Self {
+        let here = std::env::current_dir().unwrap_or_default();
+        let mut trees = here.ancestors().map(Self::in_tree);
+        trees
+            .find(|programs| programs.emulator.exists())
+            .unwrap_or_else(|| Self::in_tree(&here))
+    }
+
+    fn images_at(&self, baud: u32) -> PathBuf {
+        match baud {
+            9_600 => self.images.join("9600"),
+            _ => self.images.clone(),
+        }
+    }
+}
+
+/// Times in cycles over all phases tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Span {
+    /// The shortest.
+    pub best: u64,
+    /// The middle one.
+    pub median: u64,
+    /// What 99 of 100 keep.
+    pub p99: u64,
+    /// The longest.
+    pub worst: u64,
+}
+
+/// A board's interrupts while the robot drives, in cycles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Interrupts {
+    /// How long they were watched.
+    pub cycles: u64,
+    /// Of these, in interrupts.
+    pub in_interrupts: u64,
+    /// The longest time from an interrupt's flag to its first instruction.
+    pub worst_latency: u64,
+}
+
+/// One board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Board {
+    /// Bytes of flash the image fills.
+    pub flash_bytes: u64,
+    /// Share of time the core is awake, 0 to 1.
+    pub awake_share: f64,
+    /// Its interrupts.
+    pub interrupts: Interrupts,
+}
+
+/// What the emulator says of the images for one baud rate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Trace {
+    /// The chips' clock.
+    pub frequency_hz: u64,
+    /// The lines' baud rate.
+    pub baud: u32,
+    /// The version of rustc that built the images.
+    pub rustc: String,
+    /// Phases of the boards' loops tried.
+    pub phases: u64,
+    /// From the tape's jump to another duty.
+    pub tape_to_duty: Span,
+    /// From the tape's jump to the first start bit of the packet that tells.
+    pub tape_to_uart: Span,
+    /// The sensor board.
+    pub sensor: Board,
+    /// The steering board.
+    pub steering: Board,
+    /// Chip time in processor time while the robot drives.
+    pub real_time_factor: f64,
+}
+
+/// One exact figure.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figure {
+    /// `tape-to-duty@500kBd/worst`, ...
+    pub name: String,
+    /// How much.
+    pub value: f64,
+    /// Of what: `cycles`, `cycles/s`, `bytes`, `%`, `x`.
+    pub unit: String,
+}
+
+impl Trace {
+    /// Everything but the rows, the counted ones exactly.
+    #[must_use]
+    pub fn figures(&self) -> Vec<Figure> {
+        let at = baud_name(self.baud);
+        let figure = |name: String, value: f64, unit: &str| Figure {
+            name,
+            value,
+            unit: unit.to_owned(),
+        };
+        let mut figures = Vec::new();
+        for (what, span) in [
+            ("tape-to-duty", &self.tape_to_duty),
+            ("tape-to-uart", &self.tape_to_uart),
+        ] {
+            for (which, cycles) in [
+                ("best", span.best),
+                ("median", span.median),
+                ("worst", span.worst),
+            ] {
+                figures.push(figure(
+                    format!("{what}@{at}/{which}"),
+                    cycles as f64,
+                    "cycles",
+                ));
+            }
+        }
+        for (name, board) in [("sensor", &self.sensor), ("steering", &self.steering)] {
+            let interrupts = &board.interrupts;
+            let seconds = interrupts.cycles as f64 / self.frequency_hz as f64;
+            let in_a_second = (interrupts.in_interrupts as f64 / seconds).round();
+            let share = interrupts.in_interrupts as f64 / interrupts.cycles as f64;
+            figures.extend([
+                figure(
+                    format!("interrupt-latency@{at}/{name}"),
+                    interrupts.worst_latency as f64,
+                    "cycles",
+                ),
+                figure(format!("interrupts@{at}/{name}"), in_a_second, "cycles/s"),
+                figure(format!("interrupt-share@{at}/{name}"), 100.0 * share, "%"),
+                figure(format!("awake@{at}/{name}"), 100.0 * board.awake_share, "%"),
+                figure(
+                    format!("flash@{at}/{name}"),
+                    board.flash_bytes as f64,
+                    "bytes",
+                ),
+            ]);
+        }
+        figures.push(figure(
+            format!("real-time@{at}"),
+            self.real_time_factor,
+            "x",
+        ));
+        figures
+    }
+
+    fn rows(&self) -> [Row; 2] {
+        let row = |what: &str, span: &Span| Row {
+            name: "chip".to_owned(),
+            variant: String::new(),
+            what: format!("{what}@{}", baud_name(self.baud)),
+            // The boards sleep until an interrupt wakes them; nobody's core matters.
+            mode: Mode::Block,
+            regime: Regime::Plain,
+            n: self.phases,
+            p50_ns: self.nanoseconds(span.median),
+            p99_ns: self.nanoseconds(span.p99),
+            p999_ns: self.nanoseconds(span.worst),
+            ratio_to: String::new(),
+            ratio_p50: 1.0,
+            ratio_p99: 1.0,
+            ratios: Vec::new(),
+            cpu_percent: None,
+        };
+        [
+            row("tape-to-duty", &self.tape_to_duty),
+            row("tape-to-uart", &self.tape_to_uart),
+        ]
+    }
+
+    fn nanoseconds(&self, cycles: u64) -> u64 {
+        cycles * 1_000_000_000 / self.frequency_hz
+    }
+}
+
+fn baud_name(baud: u32) -> String {
+    BAUDS
+        .iter()
+        .find(|(known, _)| *known == baud)
+        .map_or_else(|| format!("{baud}Bd"), |(_, name)| (*name).to_owned())
+}
+
+/// The rows of the other scenarios' reports, in ns, and the exact figures. p99.9 of a row is its longest
+/// time: there are fewer than a thousand phases.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChipReport {
+    /// As the other scenarios have it.
+    #[serde(flatten)]
+    pub report: Report,
+    /// What was counted, and the real-time factor.
+    pub figures: Vec<Figure>,
+}
+
+impl ChipReport {
+    /// The report on traces.
+    #[must_use]
+    pub fn of(traces: &[Trace]) -> Self {
+        Self {
+            report: Report {
+                machine: machine::describe(),
+                rows: traces.iter().flat_map(Trace::rows).collect(),
+            },
+            figures: traces.iter().flat_map(Trace::figures).collect(),
+        }
+    }
+
+    /// The report as one line of JSON.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("names and numbers are always JSON")
+    }
+}
+
+impl fmt::Display for ChipReport {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(formatter, "{}", self.report)?;
+        for figure in &self.figures {
+            let digits = if figure.value.fract() == 0.0 { 0 } else { 2 };
+            writeln!(
+                formatter,
+                "  {:<36} {:>9.digits$} {}",
+                figure.name, figure.value, figure.unit
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Measures the images for both baud rates, beside each other: chip time does not mind.
+///
+/// # Errors
+/// A program is missing, or the emulator says why there are no figures.
+pub fn measure(programs: &Programs) -> Result<Vec<Trace>, BenchError> {
+    let traces = BAUDS.map(|(baud, _)| {
+        let programs = programs.clone();
+        std::thread::spawn(move || trace(&programs, baud))
+    });
+    traces
+        .into_iter()
+        .map(|trace| trace.join().expect("nothing here panics"))
+        .collect()
+}
+
+fn trace(programs: &Programs, baud: u32) -> Result<Trace, BenchError> {
+    let images = programs.images_at(baud);
+    let elf = |board: &str| images.join(board).with_extension("elf");
+    let (sensor, steering) = (elf("sensor"), elf("steering"));
+    for file in [&programs.emulator, &sensor, &steering] {
+        if !file.exists() {
+            return Err(BenchError::NotBuilt(file.clone()));
+        }
+    }
+    let failed = |detail: String| BenchError::Emulator {
+        emulator: programs.emulator.clone(),
+        detail,
+    };
+    let output = Command::new(&programs.emulator)
+        .arg("--trace")
+        .arg("--sensor-elf")
+        .arg(sensor)
+        .arg("--steering-elf")
+        .arg(steering)
+        .args(["--baud", &baud.to_string()])
+        .output()
+        .map_err(|error| failed(error.to_string()))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        return Err(failed(said.trim().to_owned()));
+    }
+    serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn traced() -> Trace {
+        let board = r#"{"flash_bytes":11294,"awake_share":0.9,"ignored":1,
+            "interrupts":{"cycles":32000000,"in_interrupts":10000000,"worst_latency":112}}"#;
+        let span = r#"{"best":6000,"median":10000,"p99":14000,"worst":16000}"#;
+        let text = format!(
+            r#"{{"frequency_hz":16000000,"baud":500000,"rustc":"1.96.0","phases":300,
+            "tape_to_duty":{span},"tape_to_uart":{span},"sensor":{board},"steering":{board},
+            "real_time_factor":2.125}}"#
+        );
+        serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn cycles_become_nanoseconds_and_stay_figures() {
+        let report = ChipReport::of(&[traced()]);
+        let row = &report.report.rows[0];
+        assert_eq!(row.what, "tape-to-duty@500kBd");
+        assert_eq!(
+            (row.n, row.p50_ns, row.p99_ns, row.p999_ns),
+            (300, 625_000, 875_000, 1_000_000)
+        );
+        let value = |name: &str| {
+            let found = report.figures.iter().find(|figure| figure.name == name);
+            found.map(|figure| figure.value)
+        };
+        assert_eq!(value("tape-to-uart@500kBd/worst"), Some(16_000.0));
+        assert_eq!(value("interrupts@500kBd/sensor"), Some(5_000_000.0));
+        assert_eq!(value("interrupt-share@500kBd/steering"), Some(31.25));
+        assert_eq!(value("real-time@500kBd"), Some(2.125));
+    }
+
+    #[test]
+    fn table_and_json_have_rows_and_figures() {
+        let report = ChipReport::of(&[traced()]);
+        let table = report.to_string();
+        for part in ["1000.0 us", "16000 cycles", "31.25 %", "2.12 x"] {
+            assert!(table.contains(part), "{table}");
+        }
+        let read: ChipReport = serde_json::from_str(&report.to_json()).unwrap();
+        assert_eq!(read, report);
+    }
+
+    #[test]
+    fn what_is_not_built_is_said_with_the_way_to_build_it() {
+        let programs = Programs::in_tree(Path::new("/nowhere"));
+        let said = measure(&programs).unwrap_err().to_string();
+        assert!(said.contains("/nowhere/firmware/emulator"), "{said}");
+        assert!(said.contains(".ci/firmware"), "{said}");
+    }
+}
