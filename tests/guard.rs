@@ -5,6 +5,7 @@
 //! so a test that wants the guard to fail cannot be disturbed by whatever else the machine does;
 //! that unchanged code keeps its ratios is for `.ci/run` to show, which runs the guard itself.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
@@ -112,6 +113,65 @@ fn a_system_call_for_each_observer_is_noticed() {
             "publish-64 spin plain: lager / iceoryx2/header p50",
         ],
     );
+}
+
+/// What the guard says of counts that are handed over.
+fn judged(counts: &Value) -> Said {
+    let file = std::env::temp_dir().join(format!("lager-guard-{}.json", std::process::id()));
+    std::fs::write(&file, counts.to_string()).unwrap();
+    let said = guard(&["--only", "cycles", "--counts", file.to_str().unwrap()]);
+    std::fs::remove_file(file).unwrap();
+    said
+}
+
+/// The limits in what the guard said.
+fn limits(said: &Said) -> Vec<Value> {
+    let line = said.everything.lines().next().unwrap_or_default();
+    let findings: Value =
+        serde_json::from_str(line).unwrap_or_else(|_| panic!("{}", said.everything));
+    findings["limits"].as_array().unwrap().clone()
+}
+
+/// The images are measured once; then each of their figures gets worse, alone, by 6 % of what its
+/// limit was made of.
+#[test]
+fn six_percent_more_cycles_are_noticed() {
+    let measured = guard(&["--only", "cycles"]);
+    assert_eq!(measured.code, Some(0), "{}", measured.everything);
+    let counts = |figures: &BTreeMap<String, f64>| {
+        // The compiler of the limits, whatever built the images here.
+        let built = serde_json::json!({"rustc": "1.96.0", "target": "avr-none"});
+        serde_json::json!({"source": "cycles", "built": built, "figures": figures})
+    };
+    let name = |limit: &Value| limit["figure"].as_str().unwrap().to_owned();
+    let seen = limits(&measured)
+        .iter()
+        .map(|limit| (name(limit), limit["measured"].as_f64().unwrap()))
+        .collect();
+    let limits = limits(&judged(&counts(&seen)));
+    assert!(limits.len() >= 11, "{limits:?}");
+    // The least that can be wrong: everything as it was when its limit was written.
+    let base = |limit: &Value| match limit["at_least"] == true {
+        true => limit["limit"].as_f64().unwrap(),
+        false => (limit["limit"].as_f64().unwrap() / 1.05).round(),
+    };
+    let figures = limits
+        .iter()
+        .map(|limit| (name(limit), base(limit)))
+        .collect();
+    let unchanged = judged(&counts(&figures));
+    assert_eq!(unchanged.code, Some(0), "{}", unchanged.everything);
+    for limit in &limits {
+        let worse = match limit["at_least"] == true {
+            true => base(limit) * 0.94,
+            false => (base(limit) * 1.06).ceil(),
+        };
+        let mut changed = figures.clone();
+        changed.insert(name(limit), worse);
+        let said = judged(&counts(&changed));
+        assert_eq!(said.code, Some(1), "{}", said.everything);
+        assert_eq!(said.failing, [name(limit)]);
+    }
 }
 
 #[test]

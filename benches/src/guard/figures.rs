@@ -5,6 +5,7 @@ use core::fmt;
 use core::str::FromStr;
 use std::collections::BTreeMap;
 
+use lager_benches::chip::Trace;
 use lager_benches::{Mode, Regime, Report};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -187,6 +188,30 @@ impl Figures {
             });
         }
         figures.not_empty(file)
+    }
+
+    /// The cycles of the boards' images, of those figures that have a limit: the others are for the
+    /// report of `lager bench chip`.
+    pub(crate) fn of_traces(
+        source: &str,
+        traces: &[Trace],
+        limited: impl Fn(&str) -> bool,
+    ) -> Result<Self, FiguresError> {
+        let mut figures = BTreeMap::new();
+        for figure in traces.iter().flat_map(Trace::figures) {
+            if limited(&figure.name) {
+                insert(source, &mut figures, figure.name, figure.value)?;
+            }
+        }
+        let built = traces.first().map(|trace| Built {
+            rustc: trace.rustc.clone(),
+            target: "avr-none".to_owned(),
+        });
+        Ok(Self {
+            source: source.to_owned(),
+            built,
+            figures,
+        })
     }
 
     /// Keeps the lower one of each figure of two measurements of the same source.

@@ -47,6 +47,8 @@ pub(crate) struct Judgement {
     pub(crate) figure: String,
     pub(crate) measured: Option<f64>,
     pub(crate) limit: f64,
+    /// Whether the limit is one from below.
+    pub(crate) at_least: bool,
     pub(crate) goal: Option<f64>,
     pub(crate) verdict: Verdict,
     pub(crate) reason: String,
@@ -78,10 +80,11 @@ enum Margin {
 }
 
 fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
-    let bound = limit.at_most.unwrap_or_else(|| {
+    let at_least = limit.at_least.is_some();
+    let bound = limit.at_most.or(limit.at_least).unwrap_or_else(|| {
         let count = limit
             .measured
-            .expect("a limit has either, checked when read");
+            .expect("a limit has one of them, checked when read");
         let margin_percent = match margin {
             Margin::OrElse(percent) => limit.margin_percent.unwrap_or(percent),
             Margin::All(percent) => percent,
@@ -95,7 +98,8 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
         None => Verdict::Missing,
         Some(_) if margin == Margin::NotJudged => Verdict::NotJudged,
         // Written so that a figure that is no number breaks the limit.
-        Some(value) if value <= bound => Verdict::Kept,
+        Some(value) if at_least && value >= bound => Verdict::Kept,
+        Some(value) if !at_least && value <= bound => Verdict::Kept,
         Some(_) => Verdict::Broken,
     };
     Judgement {
@@ -103,6 +107,7 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
         figure: limit.figure.clone(),
         measured,
         limit: bound,
+        at_least,
         goal: limit.goal,
         verdict,
         reason: limit.reason.clone(),
@@ -164,6 +169,7 @@ mod tests {
             source: source.to_owned(),
             figure: figure.to_owned(),
             at_most,
+            at_least: None,
             measured,
             margin_percent: None,
             goal: None,
@@ -240,6 +246,29 @@ mod tests {
                 figures: [("send".to_owned(), 1000.0)].into(),
             };
             assert_eq!(judge(&limits, &figures).0[0].limit, bound);
+        }
+    }
+
+    #[test]
+    fn what_is_to_be_reached_is_judged_from_below_whatever_the_compiler() {
+        let mut limits = limits();
+        limits.limits[1].measured = None;
+        limits.limits[1].at_least = Some(0.5);
+        for (value, verdict) in [
+            (0.5, Verdict::Kept),
+            (2.0, Verdict::Kept),
+            (0.49, Verdict::Broken),
+            (f64::NAN, Verdict::Broken),
+        ] {
+            let figures = Figures {
+                source: "counts".to_owned(),
+                built: Some(Built {
+                    rustc: "2".to_owned(),
+                    target: "here".to_owned(),
+                }),
+                figures: [("send".to_owned(), value)].into(),
+            };
+            assert_eq!(judge(&limits, &figures).0[0].verdict, verdict, "{value}");
         }
     }
 

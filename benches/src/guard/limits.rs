@@ -35,7 +35,8 @@ pub(crate) struct Counted {
     pub(crate) margin_percent_other_rustc: f64,
 }
 
-/// One limit: on a ratio (`at_most`) or on a count (`measured`, and the margin of its source).
+/// One limit: on a ratio (`at_most`), on a count (`measured`, and the margin of its source), or on
+/// what a counted source yields beside its counts and the machine has a part in (`at_least`).
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Limit {
@@ -45,6 +46,8 @@ pub(crate) struct Limit {
     pub(crate) figure: String,
     /// What the figure must not exceed.
     pub(crate) at_most: Option<f64>,
+    /// What the figure must reach.
+    pub(crate) at_least: Option<f64>,
     /// What the count was when this line was written.
     pub(crate) measured: Option<f64>,
     /// By how much the count may exceed it, where the margin of its source would hide too much.
@@ -77,11 +80,11 @@ pub(crate) enum LimitsError {
         value: f64,
     },
     #[error(
-        "`{figure}` is a count; give what was measured (`measured = …`), the margin comes from [counted.{source_name}]"
+        "`{figure}` is a count; give what was measured (`measured = …`), the margin comes from [counted.{source_name}], or what is to be reached (`at_least = …`)"
     )]
     NotACount { source_name: String, figure: String },
     #[error(
-        "`{figure}` is a ratio; give the limit itself (`at_most = …`), no `measured` and no margin"
+        "`{figure}` is a ratio; give the limit itself (`at_most = …`), nothing that is measured, no margin and nothing to be reached"
     )]
     NotARatio { figure: String },
     #[error(
@@ -170,6 +173,7 @@ impl Limit {
         }
         for (what, value) in [
             ("at_most", self.at_most),
+            ("at_least", self.at_least),
             ("measured", self.measured),
             ("margin_percent", self.margin_percent),
             ("goal", self.goal),
@@ -185,8 +189,8 @@ impl Limit {
             }
         }
         let timed = SCENARIOS.contains(&self.source.as_str());
-        match (timed, self.at_most, self.measured) {
-            (true, Some(_), None) if self.margin_percent.is_none() => self
+        match (timed, self.at_most, self.at_least, self.measured) {
+            (true, Some(_), None, None) if self.margin_percent.is_none() => self
                 .figure
                 .parse::<RatioName>()
                 .map(|_| ())
@@ -196,7 +200,8 @@ impl Limit {
                 source_name,
                 figure,
             }),
-            (false, None, Some(_)) => Ok(()),
+            (false, None, None, Some(_)) => Ok(()),
+            (false, None, Some(_), None) if self.margin_percent.is_none() => Ok(()),
             (false, ..) => Err(LimitsError::NotACount {
                 source_name,
                 figure,
@@ -229,7 +234,7 @@ mod tests {
     fn the_checked_in_limits_are_sound() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("limits.toml");
         let limits = Limits::load(&file).unwrap_or_else(|error| panic!("{error}"));
-        for source in ["hop", "path", "fanout", "instructions"] {
+        for source in ["hop", "path", "fanout", "instructions", "cycles"] {
             assert!(limits.of(source).count() > 0, "nothing guards {source}");
         }
     }
@@ -270,6 +275,8 @@ mod tests {
             (COUNT.to_owned(), "[counted.instructions]"),
             (format!("{COUNTED}{COUNT}at_most = 500\n"), "is a count"),
             (format!("{COUNTED}{COUNT}").replace("15", "3"), "margins"),
+            (format!("{COUNTED}{COUNT}at_least = 2\n"), "is a count"),
+            (format!("{RATIO}at_least = 2\n"), "is a ratio"),
         ];
         for (text, expected) in cases {
             let refusal = refusal(&text);

@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use lager_benches::machine;
+use lager_benches::chip::{self, Programs};
+use lager_benches::{BenchError, machine};
 use serde::Serialize;
 
 use crate::figures::{Built, Figures, FiguresError};
@@ -24,7 +25,8 @@ use crate::judge::{Judgement, Verdict, judge};
 use crate::limits::{Limits, LimitsError, SCENARIOS};
 use crate::measure::{MeasureError, Thoroughness, measure};
 
-/// Holds the bus and the path to their limits: ratios measured in one run, and instruction counts.
+/// Holds the bus, the path and the boards' images to their limits: ratios measured in one run, and
+/// counts of instructions and cycles.
 ///
 /// Exit codes: 0 all limits are kept; 1 a limit is broken or its figure is missing; 2 the guard
 /// could not do its work.
@@ -32,13 +34,13 @@ use crate::measure::{MeasureError, Thoroughness, measure};
 #[command(
     name = "benches/guard",
     bin_name = "benches/guard",
-    after_help = "Examples:\n  benches/guard                        everything, about three minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json"
+    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json"
 )]
 struct Arguments {
     /// The limits
     #[arg(long, value_name = "FILE", default_value = "benches/limits.toml")]
     limits: PathBuf,
-    /// Judge these sources only: hop, path, fanout, instructions
+    /// Judge these sources only: hop, path, fanout, instructions, cycles
     #[arg(long, value_name = "SOURCE", value_delimiter = ',')]
     only: Vec<String>,
     /// Runs of each measurement; a ratio is the median over them
@@ -74,6 +76,8 @@ enum GuardError {
     Figures(#[from] FiguresError),
     #[error(transparent)]
     Measure(#[from] MeasureError),
+    #[error("cycles: {0}")]
+    Chip(#[from] BenchError),
     #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
     NoSuchSource(String, String),
     #[error(
@@ -81,6 +85,9 @@ enum GuardError {
     )]
     NoCounts(String),
 }
+
+/// The source that is counted by the emulator, in chips.
+const CYCLES: &str = "cycles";
 
 /// What the guard has found.
 #[derive(Debug, Serialize)]
@@ -139,6 +146,11 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
                     ));
                 }
                 measured.figures
+            }
+            None if source == CYCLES => {
+                let traces = chip::measure(&Programs::here())?;
+                let limited = |name: &str| limits.of(CYCLES).any(|limit| limit.figure == name);
+                Figures::of_traces(CYCLES, &traces, limited)?
             }
             None => return Err(GuardError::NoCounts(source)),
         };
@@ -206,7 +218,7 @@ fn print(findings: &Findings) {
             "  {:<68} {:>9} {:>9} {:>7}  {}",
             one.figure,
             one.measured.map_or_else(|| "-".to_owned(), number),
-            number(one.limit),
+            bound(one),
             one.goal.map(number).unwrap_or_default(),
             one.verdict,
         );
@@ -228,6 +240,12 @@ fn print(findings: &Findings) {
         .filter(|one| one.verdict != Verdict::NotJudged)
         .count();
     println!("\n{} of {judged} limits kept", judged - failing);
+}
+
+/// The limit, marked where it is one from below.
+fn bound(one: &Judgement) -> String {
+    let mark = if one.at_least { ">= " } else { "" };
+    format!("{mark}{}", number(one.limit))
 }
 
 /// Ratios with two digits, counts as what they are.
