@@ -1,7 +1,7 @@
 //! The robot on its boards' real images: `lager up --body chip`, with the emulator as a process
 //! that can be slow, stopped or killed. `tests/run` builds the emulator and the images first.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig, Clock, Subscriber};
@@ -23,19 +23,28 @@ const MISSION: [&str; 8] = [
     "--json",
 ];
 
-/// `lager up` on the images. Where the build has a folder of its own, they are not where it looks.
+/// A file of the source tree.
+fn built(path: &str) -> String {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+    file.to_str().expect("a path in UTF-8").to_owned()
+}
+
+/// `lager up` on the images. They are not found from a program that is built elsewhere.
 fn up(domain: &Domain, more: &[&str]) -> Running {
     let mut arguments: Vec<String> = MISSION
         .iter()
         .chain(more)
         .map(ToString::to_string)
         .collect();
-    if let Some(target) = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from) {
-        for (flag, path) in [
-            ("--emulator", target.join("release/lager-emulator")),
-            ("--images", target.join("images")),
-        ] {
-            arguments.extend([flag.to_owned(), path.display().to_string()]);
+    for (flag, path) in [
+        (
+            "--emulator",
+            "firmware/emulator/target/release/lager-emulator",
+        ),
+        ("--images", "firmware/avr/target/images"),
+    ] {
+        if std::env::var_os("CARGO_TARGET_DIR").is_some() && !more.contains(&flag) {
+            arguments.extend([flag.to_owned(), built(path)]);
         }
     }
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
@@ -255,7 +264,8 @@ fn what_is_missing_is_an_error_that_tells_how_to_build_it() {
 #[test]
 fn images_for_another_baud_rate_are_told_and_given_up() {
     let domain = Domain::new();
-    let mut up = up(&domain, &["--baud", "9600"]);
+    let images = built("firmware/avr/target/images");
+    let mut up = up(&domain, &["--baud", "9600", "--images", &images]);
     assert_eq!(up.wait(), Some(3), "{}", up.log());
     let told = up.json();
     let failure = told["failure"].as_str().expect("a failure");

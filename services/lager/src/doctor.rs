@@ -158,7 +158,7 @@ fn serial(config: &Config) -> Finding {
 }
 
 fn emulated(config: &Config) -> Finding {
-    match config.chip.parts() {
+    match config.chip.parts(config.serial.baud) {
         Ok(parts) => Good(format!(
             "{} runs {} and {}",
             parts.emulator.display(),

@@ -60,7 +60,7 @@ struct Emulator {
 
 impl Emulator {
     fn start(config: &Config, kept: Option<&Truth>) -> Result<Self> {
-        let parts = config.chip.parts()?;
+        let parts = config.chip.parts(config.serial.baud)?;
         let mut command = Command::new(&parts.emulator);
         command
             .arg("--sensor-elf")

@@ -52,7 +52,7 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     }
     config.chip.clock = None;
     if config.body == Body::Chip {
-        equip(&mut config.chip, &folder)?;
+        equip(&mut config, &folder)?;
     }
     let file = folder.write_config(&config)?;
 
@@ -148,8 +148,9 @@ fn rehearse(config: &Config) -> Result<()> {
 }
 
 /// Chooses the places of an emulated body's files, and finds out whether it has all it needs.
-fn equip(chip: &mut ChipSection, folder: &RuntimeFolder) -> Result<()> {
-    let parts = chip.parts()?;
+fn equip(config: &mut Config, folder: &RuntimeFolder) -> Result<()> {
+    let chip = &mut config.chip;
+    let parts = chip.parts(config.serial.baud)?;
     *chip = ChipSection {
         emulator: Some(parts.emulator),
         sensor_elf: Some(parts.sensor_elf),

@@ -58,47 +58,69 @@ impl fmt::Display for MissingParts {
 
 impl std::error::Error for MissingParts {}
 
-/// One of the files: its key, its place beside this program, its place in the source tree, and
-/// what builds it.
+/// One of the files: its key, its name, the folder of the source tree that it is built in, and the
+/// command for that.
 struct Part {
     key: &'static str,
-    installed: &'static str,
+    name: &'static str,
     built: &'static str,
     command: &'static str,
 }
 
 const EMULATOR: Part = Part {
     key: "emulator",
-    installed: "lager-emulator",
-    built: "firmware/emulator/target/release/lager-emulator",
+    name: "lager-emulator",
+    built: "firmware/emulator/target/release",
     command: "build it with `cargo build --release` in firmware/emulator, whose README.md says what that needs",
 };
 const SENSOR: Part = Part {
     key: "sensor_elf",
-    installed: "sensor.elf",
-    built: "firmware/avr/target/images/sensor.elf",
-    command: IMAGES,
+    name: "sensor.elf",
+    built: IMAGES,
+    command: BUILD_IMAGES,
 };
 const STEERING: Part = Part {
     key: "steering_elf",
-    installed: "steering.elf",
-    built: "firmware/avr/target/images/steering.elf",
-    command: IMAGES,
+    name: "steering.elf",
+    built: IMAGES,
+    command: BUILD_IMAGES,
 };
-const IMAGES: &str = "build both images with `firmware/avr/build`, which says what it needs";
+const IMAGES: &str = "firmware/avr/target/images";
+const BUILD_IMAGES: &str = "build both images with `firmware/avr/build`, which says what it needs";
+
+/// The images for the original's baud rate, for which they are built in a folder of their own.
+const SLOW: u32 = 9_600;
+const SLOW_SENSOR: Part = Part {
+    built: SLOW_IMAGES,
+    command: BUILD_SLOW_IMAGES,
+    ..SENSOR
+};
+const SLOW_STEERING: Part = Part {
+    built: SLOW_IMAGES,
+    command: BUILD_SLOW_IMAGES,
+    ..STEERING
+};
+const SLOW_IMAGES: &str = "firmware/avr/target/images/9600";
+const BUILD_SLOW_IMAGES: &str =
+    "build both images with `firmware/avr/build --baud 9600`, which says what it needs";
 
 impl ChipSection {
-    /// The files this machine has, with their whole paths.
+    /// The files this machine has, with their whole paths; the images are those for `baud`.
     ///
     /// # Errors
     /// What is missing and how to get it.
-    pub fn parts(&self) -> Result<Parts, MissingParts> {
+    pub fn parts(&self, baud: u32) -> Result<Parts, MissingParts> {
         let program = std::env::current_exe().unwrap_or_default();
         let current = std::env::current_dir().unwrap_or_default();
-        self.parts_near(program.parent().unwrap_or(Path::new("/")), &current)
+        let program = program.parent().unwrap_or(Path::new("/"));
+        self.parts_near(program, &current, baud)
     }
 
-    fn parts_near(&self, program: &Path, current: &Path) -> Result<Parts, MissingParts> {
+    fn parts_near(&self, program: &Path, current: &Path, baud: u32) -> Result<Parts, MissingParts> {
+        let (sensor, steering) = match baud {
+            SLOW => (&SLOW_SENSOR, &SLOW_STEERING),
+            _ => (&SENSOR, &STEERING),
+        };
         let mut missing = Vec::new();
         let mut find = |part: &Part, named: Option<&PathBuf>| {
             part.find(named, program, current)
@@ -106,8 +128,8 @@ impl ChipSection {
         };
         let found = (
             find(&EMULATOR, self.emulator.as_ref()),
-            find(&SENSOR, self.sensor_elf.as_ref()),
-            find(&STEERING, self.steering_elf.as_ref()),
+            find(sensor, self.sensor_elf.as_ref()),
+            find(steering, self.steering_elf.as_ref()),
         );
         match found {
             (Ok(emulator), Ok(sensor_elf), Ok(steering_elf)) => Ok(Parts {
@@ -140,13 +162,13 @@ impl Part {
             };
         }
         let trees = program.ancestors().chain(current.ancestors());
-        core::iter::once(program.join(self.installed))
-            .chain(trees.map(|tree| tree.join(self.built)))
+        core::iter::once(program.join(self.name))
+            .chain(trees.map(|tree| tree.join(self.built).join(self.name)))
             .find(|path| path.is_file())
             .ok_or_else(|| {
                 format!(
-                    "there is no {}; {command}, or name it in the configuration's [chip] {key}",
-                    self.built
+                    "there is no {}/{}; {command}, or name it in the configuration's [chip] {key}",
+                    self.built, self.name
                 )
             })
     }
@@ -169,6 +191,10 @@ mod tests {
             Self(folder)
         }
 
+        fn build(&self, part: &Part) -> PathBuf {
+            self.put(&format!("{}/{}", part.built, part.name))
+        }
+
         fn put(&self, path: &str) -> PathBuf {
             let path = self.0.join(path);
             fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
@@ -187,28 +213,47 @@ mod tests {
     fn what_was_built_is_found_from_the_program_and_from_any_folder_of_the_tree() {
         let tree = Folder::new("tree");
         let parts = Parts {
-            emulator: tree.put(EMULATOR.built),
-            sensor_elf: tree.put(SENSOR.built),
-            steering_elf: tree.put(STEERING.built),
+            emulator: tree.build(&EMULATOR),
+            sensor_elf: tree.build(&SENSOR),
+            steering_elf: tree.build(&STEERING),
         };
         let chip = ChipSection::default();
         let (program, elsewhere) = (tree.0.join("target/release"), Path::new("/"));
-        assert_eq!(chip.parts_near(&program, elsewhere), Ok(parts.clone()));
-        assert_eq!(chip.parts_near(elsewhere, &tree.0.join("bus")), Ok(parts));
+        assert_eq!(
+            chip.parts_near(&program, elsewhere, 500_000),
+            Ok(parts.clone())
+        );
+        let inside = tree.0.join("bus");
+        assert_eq!(
+            chip.parts_near(elsewhere, &inside, 500_000),
+            Ok(parts.clone())
+        );
+
+        let missing = chip.parts_near(elsewhere, &inside, SLOW);
+        let missing = missing.expect_err("no images for this rate").to_string();
+        assert!(missing.contains("build --baud 9600"), "{missing}");
+        let slow = Parts {
+            sensor_elf: tree.build(&SLOW_SENSOR),
+            steering_elf: tree.build(&SLOW_STEERING),
+            ..parts
+        };
+        assert_eq!(chip.parts_near(elsewhere, &inside, SLOW), Ok(slow));
     }
 
     #[test]
     fn a_file_that_is_named_goes_before_one_that_is_found() {
         let tree = Folder::new("named");
         for part in [&EMULATOR, &SENSOR, &STEERING] {
-            tree.put(part.built);
+            tree.build(part);
         }
         let named = tree.put("slow/sensor.elf");
         let chip = ChipSection {
             sensor_elf: Some("slow/sensor.elf".into()),
             ..ChipSection::default()
         };
-        let parts = chip.parts_near(Path::new("/"), &tree.0).expect("all there");
+        let parts = chip
+            .parts_near(Path::new("/"), &tree.0, 500_000)
+            .expect("all there");
         assert_eq!(parts.sensor_elf, named);
     }
 
@@ -220,7 +265,7 @@ mod tests {
             ..ChipSection::default()
         };
         let told = |chip: &ChipSection| {
-            let missing = chip.parts_near(&tree.0, &tree.0);
+            let missing = chip.parts_near(&tree.0, &tree.0, 500_000);
             missing.expect_err("nothing is there").to_string()
         };
         let all = told(&chip);
