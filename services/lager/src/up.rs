@@ -50,9 +50,11 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
         config.serial.sensor = folder.sensor_port();
         config.serial.steering = folder.steering_port();
     }
-    config.chip.clock = None;
-    if config.body == Body::Chip {
-        equip(&mut config, &folder)?;
+    match config.body {
+        Body::Sim => config.chip.clock = None,
+        Body::Chip => equip(&mut config, &folder)?,
+        // The ports may be those of an emulator that somebody else runs.
+        Body::Serial => {}
     }
     let file = folder.write_config(&config)?;
 

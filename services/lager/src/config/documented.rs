@@ -89,7 +89,8 @@ seed = {seed}
 {steering_elf}
 # Folder that keeps both boards' EEPROM, and so their settings; unset, as long as the robot is up.
 {eeprom}
-# The page in which the emulator publishes the robot's time; `lager up` chooses its own.
+# The page in which an emulator at the ports of [serial] publishes the robot's time; body = \"chip\"
+# has its own.
 {clock}
 ",
             name = quoted(&self.name),
