@@ -153,12 +153,12 @@ fn it_says_who_it_is_and_why_it_started() {
     }
     bench.pi.answers = true;
     bench.run_ms(200);
-    let told = bench.pi.packets.iter().take(2);
-    let status = told.filter_map(|(_, packet)| match packet.payload {
+    let mut told = bench.pi.packets.iter().take(2);
+    let status = told.find_map(|(_, packet)| match packet.payload {
         Payload::BoardStatus(status) => Some(status),
         _ => None,
     });
-    let status = status.last().expect("among the first two packets");
+    let status = status.expect("among the first two packets");
     assert_eq!(status.reset, ResetCause::Watchdog);
     for (index, (_, packet)) in bench.pi.packets.iter().enumerate() {
         assert_eq!(
