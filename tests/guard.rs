@@ -19,6 +19,7 @@ struct Said {
 }
 
 fn guard(arguments: &[&str]) -> Said {
+    let _alone = lager_tests::alone();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let output = Command::new(root.join("benches/guard"))
         .args(arguments)

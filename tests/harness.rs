@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_ports::{Bus, BusConfig};
@@ -39,12 +40,22 @@ pub fn lager() -> PathBuf {
     binary
 }
 
-/// A bus of a test's own: prefix, root and runtime folder. Call [`Domain::assert_clean`] at the
-/// end of a test; a test that failed earlier leaves what its processes left.
+/// Waits until no other test of this file holds what it returns. One robot is what a small machine
+/// drives in time, and figures want the machine to themselves.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    // A test that failed has let go of the machine too.
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A bus of a test's own: prefix, root and runtime folder; and the machine, as [`alone`] has it, so
+/// a test has one at a time. Call [`Domain::assert_clean`] at the end of a test; a test that failed
+/// earlier leaves what its processes left.
 #[derive(Debug)]
 pub struct Domain {
     prefix: String,
     root: PathBuf,
+    _alone: MutexGuard<'static, ()>,
 }
 
 impl Domain {
@@ -55,11 +66,16 @@ impl Domain {
     #[must_use]
     pub fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
+        let alone = alone();
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
         let prefix = format!("lt{}_{number}_", std::process::id());
         let root = std::env::temp_dir().join(format!("lager-test-{prefix}"));
         fs::create_dir_all(&root).expect("a temporary folder");
-        Self { prefix, root }
+        Self {
+            prefix,
+            root,
+            _alone: alone,
+        }
     }
 
     /// `lager` with `args` on this bus.
