@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode};
-use lager_benches::hop::{Contender, Session};
+use lager_benches::hop::{Contender, Session, Timing};
 use lager_benches::{Mode, Regime, parts};
 
 fn hop(criterion: &mut Criterion) {
@@ -14,6 +14,10 @@ fn hop(criterion: &mut Criterion) {
         Err(error) => panic!("{error}"),
     };
     for mode in Mode::ALL {
+        let timing = match mode {
+            Mode::Adaptive => Timing::OneWay { gap_ns: 0 },
+            Mode::Spin | Mode::Block => Timing::ThereAndBack,
+        };
         let mut group = criterion.benchmark_group(format!("latency/hop/{mode}"));
         group
             .sampling_mode(SamplingMode::Flat)
@@ -27,7 +31,7 @@ fn hop(criterion: &mut Criterion) {
             group.bench_function(BenchmarkId::from_parameter(contender.label()), |bencher| {
                 bencher.iter_custom(|balls| {
                     let balls = u32::try_from(balls).unwrap_or(u32::MAX);
-                    match session.round(contender, balls, 0) {
+                    match session.round(contender, balls, timing) {
                         Ok(samples) => Duration::from_nanos(samples.iter().sum()),
                         Err(error) => panic!("{error}"),
                     }

@@ -1,4 +1,4 @@
-//! `hop`: one way between two processes, as half of the way there and back.
+//! `hop`: one way between two processes.
 //!
 //! ```text
 //!            first process, core 0             second process, core 1
@@ -8,8 +8,9 @@
 //! ```
 //!
 //! Both ends are the same contender and wait the same way, but for `adaptive`: of two cores only one
-//! is ever given to adaptive spinning, so there the second process adapts, the first one spins, and
-//! the way to the second is timed alone (both read the same clock, CLOCK_MONOTONIC).
+//! is ever given to adaptive spinning, so there the second process adapts and the first one spins.
+//! Then the way to the second is timed alone, its own and that of what it is compared with (both ends
+//! read the same clock, CLOCK_MONOTONIC); a half of both ways would hide half of what holds up one.
 //!
 //! Every contender plays short rounds in turn with all the others, with ports of its own for each
 //! round.
@@ -26,7 +27,7 @@ use rustix::event::{EventfdFlags, eventfd};
 
 pub use contender::Contender;
 pub(crate) use ours::no_bus;
-pub use players::Round;
+pub use players::{Round, Timing};
 
 use crate::baseline::stream;
 use crate::domain::Domain;
@@ -48,9 +49,9 @@ pub(crate) const PARTS: &[(&str, Play)] = &[(FIRST, players::first), (SECOND, pl
 const PACE_NS: u64 = 100_000;
 
 /// Measures the hop: every contender in every mode and regime that `options` names, and the
-/// baselines they are compared with. Rows called `hop` are as fast as balls come back, those
-/// called `hop@10kHz` throw one every 100 µs, those called `ring-64` time the writer that wakes one
-/// actor beside 64 observers.
+/// baselines they are compared with. Rows called `hop` are half of the way there and back, as fast
+/// as balls come back; `hop@full-rate` is one way at the same rate, `hop@10kHz` with a ball every
+/// 100 µs; those called `ring-64` time the writer that wakes one actor beside 64 observers.
 ///
 /// # Errors
 /// See [`BenchError`].
@@ -74,24 +75,33 @@ pub fn measure(options: &Options) -> Result<Report, BenchError> {
 }
 
 fn in_regime(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchError> {
-    let fast: Vec<Contender> = chosen(&Contender::ALL, regime, options);
-    // Paced, a core that spins is the sender's alone.
-    const PACED: [Contender; 3] = [
+    let alike: Vec<Contender> = Contender::ALL
+        .into_iter()
+        .filter(|contender| contender.mode() != Mode::Adaptive)
+        .collect();
+    const BESIDE_ADAPTIVE: [Contender; 3] = [
         Contender::Lager(Mode::Spin),
         Contender::IceoryxHeader,
         Contender::Lager(Mode::Adaptive),
     ];
-    let paced: Vec<Contender> = if options.modes.contains(&Mode::Adaptive) {
-        chosen(&PACED, regime, options)
+    let alike = chosen(&alike, regime, options);
+    let adaptive: Vec<Contender> = if options.modes.contains(&Mode::Adaptive) {
+        chosen(&BESIDE_ADAPTIVE, regime, options)
     } else {
         Vec::new()
     };
-    if fast.is_empty() {
+    if alike.is_empty() && adaptive.is_empty() {
         return Ok(Vec::new());
     }
     let mut session = Session::open(regime)?;
-    let mut rows = group("hop", &fast, 0, &mut session, options)?;
-    rows.extend(group("hop@10kHz", &paced, PACE_NS, &mut session, options)?);
+    let mut rows = Vec::new();
+    for (what, contenders, timing) in [
+        ("hop", &alike, Timing::ThereAndBack),
+        ("hop@full-rate", &adaptive, Timing::OneWay { gap_ns: 0 }),
+        ("hop@10kHz", &adaptive, Timing::OneWay { gap_ns: PACE_NS }),
+    ] {
+        rows.extend(group(what, contenders, timing, &mut session, options)?);
+    }
     Ok(rows)
 }
 
@@ -111,7 +121,7 @@ fn chosen(all: &[Contender], regime: Regime, options: &Options) -> Vec<Contender
 fn group(
     what: &str,
     contenders: &[Contender],
-    gap_ns: u64,
+    timing: Timing,
     session: &mut Session,
     options: &Options,
 ) -> Result<Vec<Row>, BenchError> {
@@ -123,13 +133,13 @@ fn group(
     let regime = session.regime;
     run::measure(what, regime, &entries, options, rounds, |index| {
         let contender = contenders[index];
-        session.round(contender, balls(contender, gap_ns, options.quick), gap_ns)
+        session.round(contender, balls(contender, timing, options.quick), timing)
     })
 }
 
 /// Balls of a round: as many as take a fraction of a second.
-fn balls(contender: Contender, gap_ns: u64, quick: bool) -> u32 {
-    match (contender.mode(), gap_ns > 0, quick) {
+fn balls(contender: Contender, timing: Timing, quick: bool) -> u32 {
+    match (contender.mode(), timing.gap_ns() > 0, quick) {
         (Mode::Block, _, false) => 2_500,
         (Mode::Block, _, true) | (_, true, true) => 500,
         (_, true, false) => 2_000,
@@ -185,8 +195,8 @@ impl Session {
         })
     }
 
-    /// Throws some balls to warm up and then `balls` that are timed, one every `gap_ns` or, if
-    /// that is 0, as fast as they come back. Returns the time of one way of each, in ns.
+    /// Throws some balls to warm up and then `balls` that are timed. Returns the time of one way of
+    /// each, in ns.
     ///
     /// # Errors
     /// A player failed; the session is of no more use.
@@ -194,25 +204,26 @@ impl Session {
         &mut self,
         contender: Contender,
         balls: u32,
-        gap_ns: u64,
+        timing: Timing,
     ) -> Result<Vec<u64>, BenchError> {
         self.rounds += 1;
         let round = Round {
             contender,
             warm_up: balls / 10 + 10,
             balls,
-            gap_ns,
+            timing,
             number: self.rounds,
         };
         // Players give up by themselves when nothing comes; this is for those that cannot, because
         // a bare `read` has no time-out: ten times what the slowest machine should need.
         let limit = Duration::from_secs(60)
-            + (Duration::from_nanos(gap_ns) + Duration::from_micros(500)) * (balls + balls / 10);
+            + (Duration::from_nanos(timing.gap_ns()) + Duration::from_micros(500))
+                * (balls + balls / 10);
         self.first.tell(&round)?;
         self.second.tell(&round)?;
         let (first, second): (Vec<u64>, Vec<u64>) =
             Part::both(&mut self.first, &mut self.second, limit)?;
-        if !contender.is_one_way() {
+        if timing == Timing::ThereAndBack {
             return Ok(first);
         }
         Ok(first

@@ -92,12 +92,6 @@ impl Contender {
         regime != Regime::SameCore || self.mode() == Mode::Block
     }
 
-    /// Whether its one way is timed by itself, from the first process's clock to the second's, and
-    /// not as half of the way there and back: when the two ends do not wait the same way.
-    pub(crate) fn is_one_way(self) -> bool {
-        self == Self::Lager(Mode::Adaptive)
-    }
-
     pub(crate) fn entry(self) -> Entry {
         let (name, variant) = match self {
             Self::Lager(_) => ("lager", ""),

@@ -76,6 +76,28 @@ impl<Fd> Lines<Fd> {
     }
 }
 
+/// How one way is timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Timing {
+    /// As half of the way there and back, as fast as balls come back. One clock, at one end; a
+    /// tail shows by half.
+    ThereAndBack,
+    /// By itself, from the first process's clock to the second's.
+    OneWay {
+        /// From one throw to the next, at least; 0 is as fast as they come back. In ns.
+        gap_ns: u64,
+    },
+}
+
+impl Timing {
+    pub(crate) const fn gap_ns(self) -> u64 {
+        match self {
+            Self::ThereAndBack => 0,
+            Self::OneWay { gap_ns } => gap_ns,
+        }
+    }
+}
+
 /// What a player is told for each round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Round {
@@ -85,8 +107,8 @@ pub struct Round {
     pub warm_up: u32,
     /// Balls that are timed.
     pub balls: u32,
-    /// From one throw to the next, at least; 0 is as fast as they come back. In ns.
-    pub gap_ns: u64,
+    /// How one way is timed.
+    pub timing: Timing,
     /// Which round it is, from 1.
     pub number: u32,
 }
@@ -144,10 +166,11 @@ impl Player for First {
 
     fn play(&self, end: &mut impl End, round: &Round) -> Result<Vec<u64>, BenchError> {
         let mut samples = Vec::with_capacity(round.balls as usize);
+        let gap_ns = round.timing.gap_ns();
         let mut due = Clock::monotonic_ns();
         for (index, number) in round.all().enumerate() {
-            if round.gap_ns > 0 {
-                due = (due + round.gap_ns).max(Clock::monotonic_ns());
+            if gap_ns > 0 {
+                due = (due + gap_ns).max(Clock::monotonic_ns());
                 while Clock::monotonic_ns() < due {}
             }
             let thrown = Clock::monotonic_ns();
@@ -158,10 +181,9 @@ impl Player for First {
             let caught = Clock::monotonic_ns();
             round.check(number, &ball)?;
             if index >= round.warm_up as usize {
-                samples.push(if round.contender.is_one_way() {
-                    thrown
-                } else {
-                    (caught - thrown) / 2
+                samples.push(match round.timing {
+                    Timing::ThereAndBack => (caught - thrown) / 2,
+                    Timing::OneWay { .. } => thrown,
                 });
             }
         }
@@ -183,7 +205,7 @@ impl Player for Second {
     }
 
     fn play(&self, end: &mut impl End, round: &Round) -> Result<Vec<u64>, BenchError> {
-        let one_way = round.contender.is_one_way();
+        let one_way = round.timing != Timing::ThereAndBack;
         let mut samples = Vec::with_capacity(if one_way { round.balls as usize } else { 0 });
         for (index, number) in round.all().enumerate() {
             let ball = end.receive().map_err(|fault| round.failed(number, fault))?;
