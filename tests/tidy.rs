@@ -18,6 +18,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("lager-ax12", &[]),
     ("lager-exde", &[]),
     ("lager-plant", &["lager-ax12"]),
+    ("lager-pty", &[]),
     // floor 1
     ("lager-control", &["lager-wire", "lager-ax12", "lager-exde"]),
     ("lager-topics", &["lager-wire"]),
@@ -44,6 +45,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "lager-ax12",
             "lager-exde",
             "lager-plant",
+            "lager-pty",
         ],
     ),
     // floor 4

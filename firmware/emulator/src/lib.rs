@@ -16,10 +16,8 @@ pub mod clock;
 mod eeprom;
 pub mod measure;
 pub mod pi;
-mod pty;
 pub mod rig;
 pub mod shell;
 pub mod truth;
 
 pub use eeprom::EepromError;
-pub use pty::PtyError;

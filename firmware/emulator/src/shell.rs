@@ -18,12 +18,12 @@ use core::time::Duration;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use lager_pty::{Port, PtyError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
 use crate::clock::{ClockError, ClockPage, monotonic_ns};
 use crate::eeprom::{EepromError, EepromFile};
-use crate::pty::{Port, PtyError};
 use crate::rig::{Board, Images, Rig, RigError, RigOptions};
 use crate::truth::Truth;
 

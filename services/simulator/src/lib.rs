@@ -13,7 +13,6 @@
 
 mod boards;
 mod exde;
-mod pty;
 mod robot;
 mod shell;
 mod station;

@@ -14,11 +14,11 @@ use std::path::PathBuf;
 
 use lager_plant::{Warehouse, WarehouseError};
 use lager_ports::{Bus, Cause, Clock, PortError, Publisher, SendError, Shutdown};
+use lager_pty::{Port, PtyError};
 use lager_topics::TruthPose;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
-use crate::pty::{Port, PtyError};
 use crate::robot::{Robot, RobotOptions, Wire};
 use crate::truth::{message, world_state};
 

@@ -28,10 +28,10 @@ pub enum PtyError {
     #[error("there is no pty to be had ({0}); is /dev/pts mounted, and is its limit reached?")]
     Open(#[source] io::Error),
     /// The link's place is taken.
-    #[error("{0} exists and is not a link; choose another place for the simulated port")]
+    #[error("{0} exists and is not a link; choose another place for the port")]
     Taken(PathBuf),
     /// The link cannot be made.
-    #[error("cannot link the simulated port at {path}: {source}; does its folder exist?")]
+    #[error("cannot link the port at {path}: {source}; does its folder exist?")]
     Link {
         /// Where the link should be.
         path: PathBuf,
@@ -42,7 +42,7 @@ pub enum PtyError {
 
 /// The board's end of a port.
 #[derive(Debug)]
-pub(crate) struct Port {
+pub struct Port {
     master: OwnedFd,
     device: PathBuf,
     link: PathBuf,
@@ -50,8 +50,11 @@ pub(crate) struct Port {
 }
 
 impl Port {
-    /// A new port, linked at `link`.
-    pub(crate) fn create(link: &Path) -> Result<Self, PtyError> {
+    /// A new port, linked at `link`. A link that is there already is replaced.
+    ///
+    /// # Errors
+    /// There is no pty to be had, or `link` cannot be a link.
+    pub fn create(link: &Path) -> Result<Self, PtyError> {
         let (master, device) = open_master().map_err(|errno| PtyError::Open(errno.into()))?;
         let port = Self {
             master,
@@ -64,17 +67,17 @@ impl Port {
     }
 
     /// Whether somebody has the port open, as far as the last look told.
-    pub(crate) fn is_open(&self) -> bool {
+    pub fn is_open(&self) -> bool {
         self.open
     }
 
     /// What to wait on while the port is open.
-    pub(crate) fn fd(&self) -> BorrowedFd<'_> {
+    pub fn fd(&self) -> BorrowedFd<'_> {
         self.master.as_fd()
     }
 
     /// Looks whether somebody has the port open.
-    pub(crate) fn look(&mut self) {
+    pub fn look(&mut self) {
         let mut fds = [PollFd::new(&self.master, PollFlags::IN)];
         let no_time = Timespec {
             tv_sec: 0,
@@ -94,7 +97,7 @@ impl Port {
     }
 
     /// Appends what was written to the port.
-    pub(crate) fn read(&self, into: &mut Vec<u8>) {
+    pub fn read(&self, into: &mut Vec<u8>) {
         let mut chunk = [0; 256];
         // A closed port reads as an error once it is empty.
         while let Ok(count @ 1..) = rustix::io::read(&self.master, &mut chunk) {
@@ -103,7 +106,7 @@ impl Port {
     }
 
     /// Sends bytes to whoever reads; returns how many were lost.
-    pub(crate) fn write(&self, bytes: &[u8]) -> usize {
+    pub fn write(&self, bytes: &[u8]) -> usize {
         if !self.open {
             return bytes.len();
         }
