@@ -94,6 +94,19 @@ fn a_report_becomes_a_well_formed_drawing() {
 }
 
 #[test]
+fn less_than_the_clocks_tick_is_drawn_too() {
+    let report = Report {
+        machine: "a machine".to_owned(),
+        rows: vec![row("lager", Mode::Spin, 0), row("iceoryx2", Mode::Spin, 50)],
+    };
+    let drawn = plot(&report.to_json());
+    let svg = String::from_utf8(drawn.stdout).expect("UTF-8");
+    assert!(drawn.status.success(), "{:?}", drawn.stderr);
+    assert!(is_well_formed(&svg), "{svg}");
+    assert_eq!(svg.matches("<rect class=\"ours\"").count(), 1);
+}
+
+#[test]
 fn what_is_no_report_is_refused_with_a_sentence() {
     let falling = r#"{"machine":"m","rows":[{"name":"lager","mode":"spin","regime":"plain",
         "p50_ns":5,"p99_ns":4,"p999_ns":6}]}"#;
