@@ -1,8 +1,8 @@
 //! What the boards' images do, in cycles: the emulator's `--trace`, run as a process and read.
 //!
-//! Apart from the other scenarios, because nothing is timed here: chips' cycles are exact and the same on
-//! every machine, but for the real-time factor. The emulator is an executable of its own, as simavr's
-//! licence wants it.
+//! Apart from the other scenarios, because nothing is timed here: chips' cycles are exact and the
+//! same on every machine, but for the real-time factor. The emulator is an executable of its own,
+//! as simavr's licence wants it.
 
 use core::fmt;
 use std::path::{Path, PathBuf};
@@ -15,41 +15,33 @@ use crate::machine;
 use crate::report::{Mode, Regime, Report, Row};
 
 /// The baud rates of the lines to the Pi that there are images for: the default and the original's.
-const BAUDS: [(u32, &str); 2] = [(500_000, "500kBd"), (9_600, "9600Bd")];
+pub const BAUDS: [u32; 2] = [500_000, 9_600];
 
-/// What runs the chips, and on what.
+/// What runs the chips, and the images in them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Programs {
     /// The executable `lager-emulator`.
     pub emulator: PathBuf,
-    /// The folder of `sensor.elf` and `steering.elf`, with those for 9600 Bd in `9600` below it.
-    pub images: PathBuf,
+    /// The sensor board's image.
+    pub sensor_elf: PathBuf,
+    /// The steering board's image.
+    pub steering_elf: PathBuf,
 }
 
 impl Programs {
-    /// Where `.ci/firmware` leaves them in a source tree.
+    /// Those that `.ci/firmware` leaves in a source tree for a baud rate.
     #[must_use]
-    pub fn in_tree(root: &Path) -> Self {
+    pub fn in_tree(root: &Path, baud: u32) -> Self {
+        let images = root.join("firmware/avr/target/images");
+        let images = if baud == 9_600 {
+            images.join("9600")
+        } else {
+            images
+        };
         Self {
             emulator: root.join("firmware/emulator/target/release/lager-emulator"),
-            images: root.join("firmware/avr/target/images"),
-        }
-    }
-
-    /// Those of the source tree that the current folder is in, or of the current folder.
-    #[must_use]
-    pub fn here() -> Self {
-        let here = std::env::current_dir().unwrap_or_default();
-        let mut trees = here.ancestors().map(Self::in_tree);
-        trees
-            .find(|programs| programs.emulator.exists())
-            .unwrap_or_else(|| Self::in_tree(&here))
-    }
-
-    fn images_at(&self, baud: u32) -> PathBuf {
-        match baud {
-            9_600 => self.images.join("9600"),
-            _ => self.images.clone(),
+            sensor_elf: images.join("sensor.elf"),
+            steering_elf: images.join("steering.elf"),
         }
     }
 }
@@ -209,14 +201,15 @@ impl Trace {
 }
 
 fn baud_name(baud: u32) -> String {
-    BAUDS
-        .iter()
-        .find(|(known, _)| *known == baud)
-        .map_or_else(|| format!("{baud}Bd"), |(_, name)| (*name).to_owned())
+    if baud.is_multiple_of(1_000) {
+        format!("{}kBd", baud / 1_000)
+    } else {
+        format!("{baud}Bd")
+    }
 }
 
-/// The rows of the other scenarios' reports, in ns, and the exact figures. p99.9 of a row is its longest
-/// time: there are fewer than a thousand phases.
+/// The rows of the other scenarios' reports, in ns, and the exact figures. p99.9 of a row is its
+/// longest time: there are fewer than a thousand phases.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChipReport {
     /// As the other scenarios have it.
@@ -261,26 +254,24 @@ impl fmt::Display for ChipReport {
     }
 }
 
-/// Measures the images for both baud rates, beside each other: chip time does not mind.
+/// Measures each baud rate's images, beside each other: chip time does not mind.
 ///
 /// # Errors
 /// A program is missing, or the emulator says why there are no figures.
-pub fn measure(programs: &Programs) -> Result<Vec<Trace>, BenchError> {
-    let traces = BAUDS.map(|(baud, _)| {
-        let programs = programs.clone();
-        std::thread::spawn(move || trace(&programs, baud))
-    });
-    traces
+pub fn measure(programs: [(u32, Programs); BAUDS.len()]) -> Result<Vec<Trace>, BenchError> {
+    programs
+        .map(|(baud, programs)| std::thread::spawn(move || trace(&programs, baud)))
         .into_iter()
         .map(|trace| trace.join().expect("nothing here panics"))
         .collect()
 }
 
 fn trace(programs: &Programs, baud: u32) -> Result<Trace, BenchError> {
-    let images = programs.images_at(baud);
-    let elf = |board: &str| images.join(board).with_extension("elf");
-    let (sensor, steering) = (elf("sensor"), elf("steering"));
-    for file in [&programs.emulator, &sensor, &steering] {
+    for file in [
+        &programs.emulator,
+        &programs.sensor_elf,
+        &programs.steering_elf,
+    ] {
         if !file.exists() {
             return Err(BenchError::NotBuilt(file.clone()));
         }
@@ -292,9 +283,9 @@ fn trace(programs: &Programs, baud: u32) -> Result<Trace, BenchError> {
     let output = Command::new(&programs.emulator)
         .arg("--trace")
         .arg("--sensor-elf")
-        .arg(sensor)
+        .arg(&programs.sensor_elf)
         .arg("--steering-elf")
-        .arg(steering)
+        .arg(&programs.steering_elf)
         .args(["--baud", &baud.to_string()])
         .output()
         .map_err(|error| failed(error.to_string()))?;
@@ -353,8 +344,8 @@ mod tests {
 
     #[test]
     fn what_is_not_built_is_said_with_the_way_to_build_it() {
-        let programs = Programs::in_tree(Path::new("/nowhere"));
-        let said = measure(&programs).unwrap_err().to_string();
+        let programs = BAUDS.map(|baud| (baud, Programs::in_tree(Path::new("/nowhere"), baud)));
+        let said = measure(programs).unwrap_err().to_string();
         assert!(said.contains("/nowhere/firmware/emulator"), "{said}");
         assert!(said.contains(".ci/firmware"), "{said}");
     }

@@ -1,7 +1,8 @@
 //! What is measured, each beside its baseline in the same run.
 //!
-//! `chip` counts cycles of the boards' images instead, which are exact. Every other scenario (`hop`, `path`, `fanout`) starts the processes it needs, measures every candidate and
-//! every baseline in turn, and returns a [`Report`] that prints as a table and serialises as JSON.
+//! A scenario (`hop`, `path`, `fanout`) starts the processes it needs, measures every candidate and
+//! every baseline in turn, and returns a [`Report`] that prints as a table and serialises as JSON;
+//! [`chip`] counts cycles of the boards' images instead, which are exact and have no baseline.
 //! The criterion targets beside this library and `lager bench` are two ways to run the same code.
 //!
 //! Absolute times mean little on a shared machine, so candidates and baselines take turns within

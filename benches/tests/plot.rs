@@ -104,6 +104,7 @@ fn less_than_the_clocks_tick_is_drawn_too() {
     assert!(drawn.status.success(), "{:?}", drawn.stderr);
     assert!(is_well_formed(&svg), "{svg}");
     assert_eq!(svg.matches("<rect class=\"ours\"").count(), 1);
+    assert!(svg.contains("p50 0 ns"), "{svg}");
 }
 
 #[test]

@@ -2,11 +2,12 @@
 //!
 //! Nothing is measured here; the same code runs under criterion and in the guard.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use lager_benches::chip::{self, ChipReport, Programs};
 use lager_benches::{Mode, Options, Regime, fanout, hop, path};
 
 use crate::cli::{BenchArgs, Scenario};
+use crate::config::ChipSection;
 
 /// Measures and returns what is to be printed.
 pub fn run(args: &BenchArgs) -> Result<String> {
@@ -15,7 +16,7 @@ pub fn run(args: &BenchArgs) -> Result<String> {
         Scenario::Hop => ("hop", hop::measure(&options)),
         Scenario::Path => ("path", path::measure(&options)),
         Scenario::Fanout => ("fanout", fanout::measure(&options)),
-        Scenario::Chip => return run_chip(args.json),
+        Scenario::Chip => return run_chip(args),
     };
     let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
     Ok(if args.json {
@@ -25,11 +26,28 @@ pub fn run(args: &BenchArgs) -> Result<String> {
     })
 }
 
-/// The boards' images in the emulator: nothing to choose, as every run counts the same.
-fn run_chip(json: bool) -> Result<String> {
-    let traces = chip::measure(&Programs::here()).context("`lager bench chip` has no result")?;
+/// The boards' images in the emulator, where they are built or installed: images that the
+/// configuration names are for one baud rate.
+fn run_chip(args: &BenchArgs) -> Result<String> {
+    let chosen = args.quick || args.runs.is_some();
+    ensure!(
+        !chosen && args.mode.is_empty() && args.regime.is_empty(),
+        "`lager bench chip` counts cycles, and every run counts the same: it takes --json and nothing else"
+    );
+    let [fast, slow] = chip::BAUDS.map(|baud| {
+        ChipSection::default().parts(baud).map(|parts| {
+            let programs = Programs {
+                emulator: parts.emulator,
+                sensor_elf: parts.sensor_elf,
+                steering_elf: parts.steering_elf,
+            };
+            (baud, programs)
+        })
+    });
+    let failed = "`lager bench chip` has no result";
+    let traces = chip::measure([fast.context(failed)?, slow.context(failed)?]).context(failed)?;
     let report = ChipReport::of(&traces);
-    Ok(if json {
+    Ok(if args.json {
         report.to_json()
     } else {
         report.to_string().trim_end().to_owned()
@@ -43,8 +61,9 @@ fn options(args: &BenchArgs) -> Options {
         all.filter(|mode| chosen.is_empty() || chosen.contains(mode))
             .collect()
     };
+    let default = Options::default();
     Options {
-        runs: args.runs,
+        runs: args.runs.unwrap_or(default.runs),
         quick: args.quick,
         modes: or_all(&args.mode),
         regimes: Regime::ALL
@@ -88,6 +107,20 @@ mod tests {
         assert_eq!(some.runs, 9);
         assert_eq!(some.modes, [Mode::Spin, Mode::Block]);
         assert_eq!(some.regimes, [Regime::NoHalt]);
+    }
+
+    #[test]
+    fn what_does_not_vary_is_not_chosen() {
+        for choice in [
+            &["--quick"][..],
+            &["--runs", "5"],
+            &["--mode", "spin"],
+            &["--regime", "plain"],
+        ] {
+            let args = parsed(&[&["chip"], choice].concat()).expect("valid");
+            let refused = run(&args).expect_err("nothing to choose");
+            assert!(refused.to_string().contains("--json"), "{refused}");
+        }
     }
 
     #[test]

@@ -283,9 +283,9 @@ pub struct BenchArgs {
     /// Print one line of JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// How often to measure everything; every figure is the median over the runs
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
-    pub runs: usize,
+    /// How often to measure everything; every figure is the median over the runs [default: 5]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub runs: Option<usize>,
     /// Take few samples, for a first look
     #[arg(long)]
     pub quick: bool,

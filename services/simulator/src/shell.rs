@@ -162,7 +162,8 @@ impl Shell {
             if dropped > 0 && *lost == 0 && port.is_open() {
                 tracing::warn!(?wire, "nobody reads the port fast enough; bytes are lost");
             }
-            *lost = if port.is_open() { dropped } else { 0 };
+            // Told once each time the port is opened.
+            *lost = if port.is_open() { *lost + dropped } else { 0 };
         }
     }
 
