@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use lager_ports::Shutdown;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
 
 /// A child that lived this long was healthy: its restart does not wait.
 const HEALTHY: Duration = Duration::from_secs(1);
@@ -24,6 +25,10 @@ const LONGEST_WAIT: Duration = Duration::from_secs(5);
 const SETTLED: Duration = Duration::from_secs(30);
 /// How often in a row a child may end by itself before it has settled.
 const MOST_FAILURES: u32 = 5;
+/// How long a service may take from its start until it has everything that others keep for it.
+const INTRODUCTION: Duration = Duration::from_millis(500);
+/// How often a child is looked at whose end the kernel does not tell.
+const LOOK: Duration = Duration::from_millis(50);
 /// How long a child may take to stop before it is killed.
 pub const PATIENCE: Duration = Duration::from_secs(3);
 
@@ -129,6 +134,21 @@ impl Supervisor {
         ended
     }
 
+    /// Waits until there is something for [`poll`](Self::poll) to do, but not longer than `at_most`.
+    pub fn wait(&self, at_most: Duration) {
+        let now = Instant::now();
+        let stopped = self.services.iter().filter(|each| each.child.is_none());
+        let due = stopped.map(|service| service.start_at.saturating_duration_since(now));
+        let children = self.services.iter().filter_map(|each| each.child.as_ref());
+        wait_for_an_end(children, due.fold(at_most, Duration::min));
+    }
+
+    /// Whether a service has started a moment ago, and may still wait for what others keep for it.
+    pub fn has_newcomer(&self) -> bool {
+        let mut running = self.services.iter().filter(|each| each.child.is_some());
+        running.any(|service| service.started.elapsed() < INTRODUCTION)
+    }
+
     /// A service that ends by itself at every start, if there is one: more starts will not help.
     pub fn hopeless(&self) -> Option<&'static str> {
         let mut services = self.services.iter();
@@ -217,12 +237,28 @@ impl Drop for Supervisor {
 pub fn ends_within(child: &mut Child, patience: Duration) -> bool {
     let give_up = Instant::now() + patience;
     while matches!(child.try_wait(), Ok(None)) {
-        if Instant::now() >= give_up {
+        let left = give_up.saturating_duration_since(Instant::now());
+        if left.is_zero() {
             return false;
         }
-        std::thread::sleep(Duration::from_millis(5));
+        wait_for_an_end(core::iter::once(&*child), left.min(LOOK));
     }
     true
+}
+
+/// Waits until one of `children`, none of which has been waited for, has ended, a signal comes, or
+/// `at_most` is over.
+fn wait_for_an_end<'a>(children: impl Iterator<Item = &'a Child>, at_most: Duration) {
+    // One that cannot be watched (before Linux 5.3) is looked at when the time is over.
+    let ends: Vec<_> = children
+        .filter_map(|child| pidfd_open(pid_of(child), PidfdFlags::empty()).ok())
+        .collect();
+    let mut ends: Vec<_> = ends
+        .iter()
+        .map(|end| PollFd::new(end, PollFlags::IN))
+        .collect();
+    let at_most = Timespec::try_from(at_most).expect("no wait is as long as the clock's range");
+    let _ = poll(&mut ends, Some(&at_most));
 }
 
 fn pid_of(child: &Child) -> Pid {

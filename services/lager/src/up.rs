@@ -23,10 +23,13 @@ use crate::report::{Narrator, Outcome};
 use crate::runtime::RuntimeFolder;
 use crate::supervisor::Supervisor;
 
-/// The pace of this process's own work: 20 ms of robot time, at most this in real time.
-const TICK: Duration = Duration::from_millis(10);
-/// How often dead nodes are swept from the bus.
-const SWEEP: Duration = Duration::from_millis(250);
+/// The pace of this process's own work in robot time, and at most this in real time. A service that
+/// ends is not kept waiting for it.
+const TICK: Duration = Duration::from_millis(40);
+/// The pace while a service waits to be handed what is kept for it, in real time.
+const HAND_OVER_TICK: Duration = Duration::from_millis(5);
+/// How often nodes of other processes that died are swept from the bus; a service's is at once.
+const SWEEP: Duration = Duration::from_secs(1);
 /// How long an emulated body may take until it has a clock, in real time.
 const BODY_START: Duration = Duration::from_secs(30);
 
@@ -80,12 +83,13 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
     while !shutdown.is_requested() {
         complaints.hear(keepers.remember());
         let ended = supervisor.poll(|service| complaints.hear(keepers.hand_over(service)));
-        for ended in ended {
-            narrator.note(&format!("the {} ended ({})", ended.service, ended.how));
-        }
-        if swept.elapsed() >= SWEEP {
+        if !ended.is_empty() || swept.elapsed() >= SWEEP {
+            complaints.hear(keepers.remember());
             bus.sweep();
             swept = Instant::now();
+        }
+        for ended in ended {
+            narrator.note(&format!("the {} ended ({})", ended.service, ended.how));
         }
         complaints.hear(narrator.look(clock.now() - robot_start));
         hands.tick();
@@ -98,7 +102,10 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
                 break;
             }
         }
-        std::thread::sleep(clock.real(2 * TICK).min(TICK));
+        supervisor.wait(match supervisor.has_newcomer() {
+            true => HAND_OVER_TICK,
+            false => clock.real(TICK).min(TICK),
+        });
     }
 
     let hopeless = supervisor.hopeless();
@@ -178,7 +185,7 @@ fn join(config: &BusConfig, supervisor: &mut Supervisor, shutdown: &Shutdown) ->
         if let Some(ended) = supervisor.poll(|_| {}).first() {
             bail!("the {} does not start ({})", ended.service, ended.how);
         }
-        std::thread::sleep(TICK);
+        supervisor.wait(TICK);
     }
 }
 

@@ -121,6 +121,17 @@ impl MarkReader {
         None
     }
 
+    /// Takes one line state while nobody can judge a mark: what is under the sensors is counted,
+    /// and ends with the first state that is pushed again.
+    pub fn hold(&mut self, state: LineState) {
+        match state {
+            LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
+                self.push(state);
+            }
+            _ => {}
+        }
+    }
+
     /// Forgets what it has collected.
     pub fn clear(&mut self) {
         (self.left, self.right) = (0, 0);
@@ -247,6 +258,19 @@ mod tests {
             Some(Sides::LEFT)
         );
         reader.believe();
+        assert_eq!(reader.push(OnLine), None);
+    }
+
+    #[test]
+    fn a_held_mark_is_given_out_when_it_can_be_judged() {
+        let mut reader = MarkReader::default();
+        for state in thrice(&[OnLine, StationToRight, OnLine]) {
+            reader.hold(state);
+        }
+        assert_eq!(
+            reader.push(OnLine).map(|mark| mark.sides),
+            Some(Sides::RIGHT)
+        );
         assert_eq!(reader.push(OnLine), None);
     }
 

@@ -25,12 +25,20 @@ impl Navigator {
     /// Takes a line frame.
     pub(super) fn line(&mut self, now: Duration, state: LineState, out: &mut Output) {
         self.frames = self.frames.wrapping_add(1);
-        let saw_before = self.sight.replace((now, state)).is_some();
-        if core::mem::take(&mut self.blind) && saw_before && self.is_active() {
+        let before = self.sight.replace((now, state)).map(|(_, before)| before);
+        if before == Some(state) {
+            self.sure_sight = before;
+        }
+        if core::mem::take(&mut self.blind) && before.is_some() && self.is_active() {
             say!(out, "I see again and drive on.");
         }
         if self.mode == Some(Mode::Manual) || !self.follows_line() {
             self.marks.clear();
+            return;
+        }
+        if self.map.is_none() {
+            // A successor that is not introduced yet; the mark is judged when it is.
+            self.marks.hold(state);
             return;
         }
         let mark = self.marks.push(state);

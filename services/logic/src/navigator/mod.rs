@@ -147,6 +147,8 @@ pub struct Navigator {
     mark_cut_short: bool,
     /// The line state last seen, and when.
     sight: Option<(Duration, LineState)>,
+    /// The line state that two frames in a row have shown, which one frame of noise cannot be.
+    sure_sight: Option<LineState>,
     /// No line frame for too long: stand until one comes.
     blind: bool,
     /// Where the line went out of sight, in the odometer's mm.
@@ -184,6 +186,7 @@ impl Navigator {
             marks: MarkReader::default(),
             mark_cut_short: false,
             sight: None,
+            sure_sight: None,
             blind: false,
             line_lost_at: None,
             target: Heading::Right,

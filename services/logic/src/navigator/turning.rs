@@ -85,7 +85,7 @@ impl Navigator {
         if self.phase == Phase::Dropping {
             return self.begin_again(out);
         }
-        let (Some((_, seen)), Some(Command::Wheel(_))) = (self.sight, self.one_shot_command())
+        let (Some(seen), Some(Command::Wheel(_))) = (self.sure_sight, self.one_shot_command())
         else {
             return;
         };

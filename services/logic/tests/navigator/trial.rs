@@ -170,10 +170,16 @@ impl Trial {
     /// Kills the navigator, lets the robot do what it does without for `outage`, and starts the
     /// next one from the last status.
     pub(crate) fn kill(&mut self, outage: Duration) {
+        self.kill_and_introduce_late(outage, Duration::ZERO);
+    }
+
+    /// The same, and the next one gets its frames before it is told the map and who may drive.
+    pub(crate) fn kill_and_introduce_late(&mut self, outage: Duration, late: Duration) {
         self.dead = true;
         self.run_for(outage);
         self.dead = false;
         self.navigator = Navigator::resume(LogicConfig::default(), &self.status);
+        self.run_for(late);
         self.introduce();
     }
 
