@@ -21,6 +21,7 @@ use crate::name::{self, RobotName};
 use crate::publisher::Publisher;
 use crate::request::{Client, Server};
 use crate::subscriber::Subscriber;
+use crate::sweep;
 use crate::transport::Ipc;
 use crate::waiter::{Policy, Waiter};
 
@@ -55,7 +56,8 @@ impl Bus {
         let clock = clock::Source::new(config.speed, config.clock.as_deref())?;
         set_log_level(log_level());
         let node = make_node(&transport, &config.robot, role)?;
-        node.blocking_cleanup_dead_nodes(OTHERS_SWEEP);
+        // What cannot be listed now is swept the next time.
+        let _ = sweep::dead_nodes(&transport);
         doorbell::sweep_all(&transport);
         let port_name = PortName::new(&name::port(role, std::process::id()))
             .expect("a role and a number fit into a port's name");
@@ -94,11 +96,7 @@ impl Bus {
     /// until they are drained; a keeper should still drain first ([`Keeper::remember`]).
     pub fn sweep(&self) -> usize {
         doorbell::sweep(&self.shared.config, &self.shared.robot);
-        // The count is of processes on one machine.
-        self.shared
-            .node
-            .blocking_cleanup_dead_nodes(OTHERS_SWEEP)
-            .cleanups as usize
+        sweep::dead_nodes(&self.shared.config).unwrap_or_default()
     }
 
     /// A writer of `T`, to be used in this thread. It rings the actors of `T`, now and later.
@@ -207,9 +205,6 @@ impl fmt::Debug for Bus {
             .finish_non_exhaustive()
     }
 }
-
-/// How long a sweep waits for another one that has the same dead process in hand.
-pub(crate) const OTHERS_SWEEP: Duration = Duration::from_millis(100);
 
 fn make_node(config: &Config, robot: &RobotName, role: Role) -> Result<Node<Ipc>, OpenError> {
     let name = NodeName::new(&name::node(robot, role, std::process::id()))

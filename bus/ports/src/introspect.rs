@@ -8,12 +8,13 @@ use iceoryx2::prelude::{
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 use lager_topics::{Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
 
-use crate::bus::{Bus, OTHERS_SWEEP};
+use crate::bus::Bus;
 use crate::config::BusConfig;
 use crate::doorbell;
 use crate::error::IntrospectError;
 use crate::name::{self, RobotName};
 use crate::service;
+use crate::sweep;
 use crate::transport::Ipc;
 
 /// How a topic in use compares with this build's table.
@@ -135,14 +136,8 @@ pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
     let config = config.transport()?;
-    let mut removed = 0;
-    Node::<Ipc>::list(&config, |state| {
-        if let IpcNodeState::Dead(dead) = state {
-            removed += usize::from(dead.blocking_remove_stale_resources(OTHERS_SWEEP).is_ok());
-        }
-        CallbackProgression::Continue
-    })
-    .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    let removed = sweep::dead_nodes(&config)
+        .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
     doorbell::sweep_all(&config);
     Ok(removed)
 }

@@ -52,6 +52,7 @@ mod service;
 mod shutdown;
 mod streams;
 mod subscriber;
+mod sweep;
 mod transport;
 mod waiter;
 

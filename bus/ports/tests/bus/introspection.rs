@@ -1,5 +1,9 @@
 //! What tools see of the bus.
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+
 use lager_ports::{Layout, NodeState, Peer, Policy, nodes, remove_stale_nodes};
 use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
 
@@ -154,4 +158,44 @@ fn a_killed_process_is_listed_as_stale_until_it_is_removed() {
     assert_eq!(nodes(&domain.config).unwrap(), []);
     assert_eq!(domain.in_shared_memory(), Vec::<String>::new());
     assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 0);
+}
+
+/// Where the transport keeps the tags and details of the only node.
+fn node_folder(domain: &Domain) -> PathBuf {
+    let nodes = domain.config.root.as_ref().unwrap().join("nodes");
+    let entries = std::fs::read_dir(nodes).unwrap().map(Result::unwrap);
+    let mut folders = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.is_dir());
+    let folder = folders.next().unwrap();
+    assert_eq!(folders.next(), None);
+    folder
+}
+
+#[test]
+fn a_process_killed_while_it_writes_a_tag_is_removed() {
+    let domain = Domain::new();
+    Player::start(&domain, "line-writer").kill();
+    let prefix = domain.config.prefix.as_ref().unwrap();
+    let tag = node_folder(&domain).join(format!("{prefix}7.port_tag"));
+    std::fs::write(&tag, "").unwrap();
+    // As it is while the transport writes.
+    std::fs::set_permissions(&tag, Permissions::from_mode(0o600)).unwrap();
+    assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 1);
+    assert_eq!(nodes(&domain.config).unwrap(), []);
+}
+
+#[test]
+fn a_process_killed_while_it_leaves_is_removed() {
+    let domain = Domain::new();
+    Player::start(&domain, "onlooker").kill();
+    let folder = node_folder(&domain);
+    let details = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|file| file.unwrap().path());
+    let details = details.filter(|file| file.extension().unwrap() == "details");
+    details.for_each(|file| std::fs::remove_file(file).unwrap());
+    assert_eq!(nodes(&domain.config).unwrap()[0].name, "");
+    assert_eq!(remove_stale_nodes(&domain.config).unwrap(), 1);
+    assert_eq!(nodes(&domain.config).unwrap(), []);
 }

@@ -107,6 +107,11 @@ fn player() {
             ready();
             until_parent_ends();
         }
+        "onlooker" => {
+            let _bus = open(Role::Observer);
+            ready();
+            until_parent_ends();
+        }
         "navigator" => {
             let bus = open(Role::Logic);
             let publisher = bus.publisher::<NavStatus>().unwrap();
