@@ -283,10 +283,10 @@ pub struct BenchArgs {
     /// Print one line of JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// How often to measure everything; every figure is the median over the runs [default: 5]
+    /// How often to measure everything; every figure is the median over the runs (not `chip`) [default: 5]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub runs: Option<usize>,
-    /// Take few samples, for a first look
+    /// Take few samples, for a first look (not `chip`)
     #[arg(long)]
     pub quick: bool,
     /// How the receiver waits: spin, adaptive or block [default: all]
