@@ -84,6 +84,7 @@ pub fn run(mut config: Config, args: &UpArgs, shutdown: &Shutdown) -> Result<Exi
         complaints.hear(keepers.remember());
         let ended = supervisor.poll(|service| complaints.hear(keepers.hand_over(service)));
         if !ended.is_empty() || swept.elapsed() >= SWEEP {
+            // A killed service's last word goes with its node.
             complaints.hear(keepers.remember());
             bus.sweep();
             swept = Instant::now();

@@ -185,9 +185,9 @@ fn a_status_that_makes_no_sense_yields_a_fresh_navigator() {
 }
 
 proptest! {
-    // The same missions each time. Of random ones about one in three thousand does not come through: a turn
-    // to the goods that is begun twice and misses the short mark ends askew, by time, or the line is
-    // lost and the robot stands (AMB-49).
+    // The same missions each time. Of random ones about one in three thousand does not come
+    // through: a turn to the goods that is begun twice and misses the short mark ends askew, by
+    // time, or the line is lost and the robot stands (AMB-49).
     #![proptest_config(ProptestConfig {
         cases: 200,
         rng_seed: RngSeed::Fixed(1),
