@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode};
 use lager_benches::fanout::{Contender, READERS_OF, Small};
-use lager_benches::{Regime, parts};
+use lager_benches::{Regime, cast};
 
 fn fanout(criterion: &mut Criterion) {
     for readers in READERS_OF {
@@ -41,7 +41,7 @@ fn fanout(criterion: &mut Criterion) {
 }
 
 fn main() {
-    parts::play_if_asked();
+    cast::play_if_asked();
     let mut criterion = Criterion::default().configure_from_args();
     fanout(&mut criterion);
     criterion.final_summary();

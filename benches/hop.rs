@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode};
 use lager_benches::hop::{Contender, Session, Timing};
-use lager_benches::{Mode, Regime, parts};
+use lager_benches::{Mode, Regime, cast};
 
 fn hop(criterion: &mut Criterion) {
     let mut session = match Session::open(Regime::Plain) {
@@ -43,7 +43,7 @@ fn hop(criterion: &mut Criterion) {
 }
 
 fn main() {
-    parts::play_if_asked();
+    cast::play_if_asked();
     let mut criterion = Criterion::default().configure_from_args();
     hop(&mut criterion);
     criterion.final_summary();

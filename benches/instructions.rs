@@ -14,15 +14,14 @@
 
 use core::time::Duration;
 use std::hint::black_box;
-use std::path::PathBuf;
 
 use gungraun::prelude::*;
 use lager_benches::{a_second_of_bytes, a_second_of_packets, slow};
 use lager_bridge::arbiter::{Arbiter, Verdict};
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_ports::{Bus, BusConfig, Policy, Publisher, Subscriber, Waiter, Wake};
+use lager_ports::{Bus, BusConfig, Place, Policy, Publisher, Subscriber, Waiter, Wake};
 use lager_topics::{
-    MapProduct, Mode, Order, OrderKind, Origin, Phase, Role, SensorLine, Side, SteeringOrder,
+    MapProduct, Mode, Order, Origin, Phase, Role, SensorLine, Side, SteeringOrder, SteeringReport,
     WarehouseMap,
 };
 use lager_wire::{Decoder, LineState, Packet, SteerCommand, Version};
@@ -57,42 +56,21 @@ struct Meeting {
 }
 
 /// Where the meeting is, so that it meets nobody else; leaves nothing behind.
-struct Domain {
-    prefix: String,
-    root: PathBuf,
-}
+struct Domain(Place);
 
 impl Drop for Domain {
     fn drop(&mut self) {
-        // Removed already is as good.
-        let _ = std::fs::remove_dir_all(&self.root);
-        for entry in std::fs::read_dir("/dev/shm")
-            .into_iter()
-            .flatten()
-            .flatten()
-        {
-            if entry
-                .file_name()
-                .to_string_lossy()
-                .starts_with(&self.prefix)
-            {
-                let _ = std::fs::remove_file(entry.path());
-            }
-        }
+        self.0.remove();
     }
 }
 
 fn meeting(subscribers: usize) -> Meeting {
-    let id = format!("lgi{}", std::process::id());
-    let domain = Domain {
-        prefix: format!("{id}_"),
-        root: std::env::temp_dir().join(&id),
-    };
+    let folder = format!("/dev/shm/lgi{}", std::process::id());
     let config = BusConfig {
-        prefix: Some(domain.prefix.clone()),
-        root: Some(domain.root.clone()),
+        folder: Some(folder.into()),
         ..BusConfig::default()
     };
+    let domain = Domain(config.place().unwrap());
     let bridge = Bus::open(&config, Role::Bridge).unwrap();
     let logic = Bus::open(&config, Role::Logic).unwrap();
     let waiter = logic.waiter(Policy::Block).unwrap();
@@ -114,7 +92,10 @@ fn meeting(subscribers: usize) -> Meeting {
         assert_eq!(meeting.waiter.wait(Duration::ZERO), Wake::Rung);
         assert_eq!(meeting.drain(), meeting.subscribers.len());
     }
-    assert!(meeting.domain.root.is_dir(), "it met where it should");
+    assert!(
+        !meeting.domain.0.segments().is_empty(),
+        "it met where it should"
+    );
     meeting
 }
 
@@ -202,6 +183,7 @@ fn driving() -> Navigator {
         },
         Input::Order(&Order { id: 1, product: 1 }),
         Input::Line(LineState::OnLine),
+        Input::Steering(&report()),
     ];
     for input in start {
         navigator.handle(Duration::ZERO, input);
@@ -211,16 +193,37 @@ fn driving() -> Navigator {
     navigator
 }
 
+/// What a steering board says that has just reported.
+fn report() -> SteeringReport {
+    SteeringReport {
+        age_ms: 0,
+        ..SteeringReport::default()
+    }
+}
+
 /// Line frames of a second.
 const FRAMES: u32 = 200;
 
+/// Line frames from one report to the next: as few as keep the robot driving.
+const SILENCE: u32 = 38;
+
+/// The second was driven, not stood through.
+fn still_driving(navigator: Navigator) {
+    let status = navigator.status();
+    assert_eq!(status.phase.get(), Some(Phase::Driving), "{status:?}");
+}
+
 #[library_benchmark]
-#[bench::second_of_frames(setup = driving)]
+#[bench::second_of_frames(setup = driving, teardown = still_driving)]
 fn navigate(mut navigator: Navigator) -> Navigator {
+    let report = report();
     for frame in 1..=FRAMES {
         let now = Duration::from_millis(5) * frame;
         let state = [LineState::OnLine, LineState::LeftOfLine][usize::from(frame % 8 == 0)];
         black_box(navigator.handle(now, Input::Line(black_box(state))));
+        if frame % SILENCE == 0 {
+            black_box(navigator.handle(now, Input::Steering(black_box(&report))));
+        }
     }
     navigator
 }
@@ -229,9 +232,8 @@ fn order(id: u32) -> SteeringOrder {
     SteeringOrder {
         id,
         origin: Origin::Logic.into(),
-        kind: OrderKind::Drive.into(),
         code: 3,
-        arm_granted: 0,
+        ..SteeringOrder::default()
     }
 }
 
@@ -240,7 +242,9 @@ fn steering() -> Arbiter {
     let mut arbiter = Arbiter::new();
     arbiter.board_up(Duration::ZERO, Version::One, false);
     arbiter.set_mode(Mode::Autonomous);
-    assert_eq!(arbiter.order(Duration::ZERO, &order(1)), Verdict::Executes);
+    let verdict = arbiter.order(Duration::ZERO, Duration::ZERO, &order(1));
+    assert_eq!(verdict, Verdict::Executes);
+    arbiter.advance(Duration::ZERO);
     while arbiter.poll(Duration::ZERO).is_some() {}
     arbiter
 }
@@ -249,8 +253,9 @@ fn steering() -> Arbiter {
 #[bench::new_order(setup = steering)]
 fn arbitrate(mut arbiter: Arbiter) -> (Arbiter, Option<SteerCommand>) {
     let now = Duration::from_millis(5);
-    let verdict = arbiter.order(now, black_box(&order(2)));
+    let verdict = arbiter.order(now, now, black_box(&order(2)));
     assert_eq!(verdict, Verdict::Executes);
+    arbiter.advance(now);
     let written = arbiter.poll(now);
     (arbiter, written)
 }

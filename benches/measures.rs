@@ -7,11 +7,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use lager_benches::hop;
-use lager_benches::{BenchError, Mode, Options, Regime, Report, parts};
+use lager_benches::{BenchError, Mode, Options, Regime, Report, cast};
 use rustix::process::{Pid, Signal, kill_process};
 
 fn main() {
-    parts::play_if_asked();
+    cast::play_if_asked();
     let tests: &[(&str, fn())] = &[
         ("a_hop_yields_every_row_once", a_hop_yields_every_row_once),
         (

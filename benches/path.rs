@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode};
 use lager_benches::path::Session;
-use lager_benches::{BenchError, Mode, parts};
+use lager_benches::{BenchError, Mode, cast};
 
 type Open = fn() -> Result<Session, BenchError>;
 
@@ -44,7 +44,7 @@ fn path(criterion: &mut Criterion) {
 }
 
 fn main() {
-    parts::play_if_asked();
+    cast::play_if_asked();
     let mut criterion = Criterion::default().configure_from_args();
     path(&mut criterion);
     criterion.final_summary();

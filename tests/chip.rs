@@ -1,6 +1,7 @@
 //! The robot on its boards' real images: `lager up --body chip`, with the emulator as a process
 //! that can be slow, stopped or killed. `tests/run` builds the emulator and the images first.
 
+use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
@@ -29,13 +30,15 @@ fn built(path: &str) -> String {
     file.to_str().expect("a path in UTF-8").to_owned()
 }
 
-/// `lager up` on the images. They are not found from a program that is built elsewhere.
+/// A mission on the images.
 fn up(domain: &Domain, more: &[&str]) -> Running {
-    let mut arguments: Vec<String> = MISSION
-        .iter()
-        .chain(more)
-        .map(ToString::to_string)
-        .collect();
+    let arguments: Vec<&str> = MISSION.iter().chain(more).copied().collect();
+    started(domain, &arguments)
+}
+
+/// `lager` with the images. They are not found from a program that is built elsewhere.
+fn started(domain: &Domain, given: &[&str]) -> Running {
+    let mut arguments: Vec<String> = given.iter().map(ToString::to_string).collect();
     for (flag, path) in [
         (
             "--emulator",
@@ -43,7 +46,7 @@ fn up(domain: &Domain, more: &[&str]) -> Running {
         ),
         ("--images", "firmware/avr/target/images"),
     ] {
-        if std::env::var_os("CARGO_TARGET_DIR").is_some() && !more.contains(&flag) {
+        if std::env::var_os("CARGO_TARGET_DIR").is_some() && !given.contains(&flag) {
             arguments.extend([flag.to_owned(), built(path)]);
         }
     }
@@ -129,6 +132,88 @@ fn a_mission_on_the_real_images_is_delivered_even_if_they_are_held_up() {
         lossy.push(told);
     }
     panic!("frames lost in each mission: {lossy:#?}");
+}
+
+#[test]
+fn gains_outlive_a_clean_end() {
+    let domain = Domain::new();
+    let steering = domain.eeprom("r1").join("steering.eeprom");
+    let mut up = up(&domain, &[]);
+    let mut watch = Watch::new(&domain, &mut up);
+    watch.wait_until(&mut up, Phase::Driving);
+    let told = domain.run(&["gains", "7", "9"]);
+    assert!(told.status.success(), "{told:?}");
+    // A save takes a board fifty milliseconds of its time.
+    let kept = wait_for("the gains to be kept", || {
+        fs::read(&steering)
+            .ok()
+            .filter(|bytes| bytes[2..4] == [7, 9])
+    });
+    drop(watch);
+    up.signal(Signal::INT);
+    // Interrupted before the mission was delivered.
+    assert_eq!(up.wait(), Some(3), "{}", up.log());
+    assert_eq!(fs::read(&steering).expect("it is still there"), kept);
+
+    let mut again = self::up(&domain, &[]);
+    let mut watch = Watch::new(&domain, &mut again);
+    watch.wait_until(&mut again, Phase::Driving);
+    drop(watch);
+    again.signal(Signal::INT);
+    assert_eq!(again.wait(), Some(3), "{}", again.log());
+    assert_eq!(fs::read(&steering).expect("and for the next"), kept);
+}
+
+#[test]
+fn a_robot_on_the_images_is_put_down_by_hand_and_drives_from_there() {
+    let domain = Domain::new();
+    let mut up = started(
+        &domain,
+        &["up", "--body", "chip", "--headless", "--mission", "1"],
+    );
+    let mut watch = Watch::new(&domain, &mut up);
+    watch.wait_until(&mut up, Phase::Driving);
+    let run = |args: &[&str]| domain.done(args);
+    run(&["mode", "manual"]);
+    run(&["place", "1,2,down"]);
+    let put_down = wait_for("it to stand there", || {
+        let status = watch.status.latest().expect("readable")?;
+        ((status.x, status.y) == (1, 2))
+            .then(|| wait_for("the truth", || watch.truth.latest().ok()?))
+    });
+    // The world of the images has things, too; they outlive the emulator.
+    run(&["obstacle", "put", "0,1,up"]);
+    let refused = domain.run(&["obstacle", "put", "1,2,down"]);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        !refused.status.success() && said.contains("the robot is there"),
+        "{said}"
+    );
+    let emulator = up.service("emulator").expect("it runs");
+    kill_process(pid(emulator), Signal::KILL).expect("a process of ours");
+    wait_for("another emulator", || {
+        up.service("emulator").filter(|now| *now != emulator)
+    });
+    wait_for("its world", || {
+        let listed = domain.run(&["obstacle"]);
+        (listed.stdout == b"0,1,up\n").then_some(())
+    });
+    run(&["obstacle", "take", "0,2,down"]);
+    run(&["place"]);
+    wait_for("it to stand at the start", || {
+        let status = watch.status.latest().expect("readable")?;
+        ((status.x, status.y) == (0, 0)).then_some(())
+    });
+    let start = wait_for("the truth", || watch.truth.latest().ok()?);
+    let away = (put_down.x_mm - start.x_mm).hypot(put_down.y_mm - start.y_mm);
+    // From (1,2) to the delivery node at (0,0), in a world of edges of some 400 mm.
+    assert!(away > 500.0, "the body has moved {away} mm");
+    drop((put_down, start));
+    run(&["mode", "autonomous"]);
+    run(&["fetch", "1"]);
+    watch.wait_until(&mut up, Phase::Driving);
+    drop((up, watch));
+    domain.assert_clean();
 }
 
 /// One mission, with its chips held up for far longer than a board may be silent.
@@ -254,10 +339,8 @@ fn what_is_missing_is_an_error_that_tells_how_to_build_it() {
     let said = String::from_utf8_lossy(&doctor.stdout).into_owned();
     let line = said.lines().find(|line| line.contains("emulated boards"));
     let line = line.expect("a line on the emulated boards");
-    assert!(
-        line.starts_with("BAD") && line.contains("firmware/emulator"),
-        "{said}"
-    );
+    assert!(line.starts_with("BAD"), "{said}");
+    assert!(said.contains("firmware/emulator"), "{said}");
     domain.assert_clean();
 }
 

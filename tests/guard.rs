@@ -69,7 +69,7 @@ fn trips(slow: &str, only: &str, attempts: &str, figures: &[&str]) {
 
 #[test]
 fn an_allocation_beside_each_sample_is_noticed() {
-    let unchanged = guard(&["--slow", "none", "--only", "instructions"]);
+    let unchanged = guard(&["--only", "instructions"]);
     assert_eq!(unchanged.code, Some(0), "{}", unchanged.everything);
     assert!(unchanged.failing.is_empty(), "{}", unchanged.everything);
     if unchanged

@@ -1,6 +1,8 @@
 //! What the tests with real processes share: an isolated bus for each test, the `lager` binary
 //! on it, and a look at what it leaves behind.
 
+mod cable;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -8,10 +10,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, BusConfig};
+use lager_ports::{Bus, BusConfig, StopPage, StopWord};
 use lager_topics::Role;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
+
+pub use cable::Cable;
 
 /// How long a test waits for anything before it calls it stuck. It bounds a hang; it measures
 /// nothing.
@@ -48,13 +52,13 @@ pub fn alone() -> MutexGuard<'static, ()> {
     ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A bus of a test's own: prefix, root and runtime folder; and the machine, as [`alone`] has it, so
-/// a test has one at a time. Call [`Domain::assert_clean`] at the end of a test; a test that failed
-/// earlier leaves what its processes left.
+/// A bus and a folder of a test's own; and the machine, as [`alone`] has it, so a test has one at a
+/// time. Call [`Domain::assert_clean`] at the end of a test; a test that failed earlier leaves what
+/// its processes left.
 #[derive(Debug)]
 pub struct Domain {
-    prefix: String,
-    root: PathBuf,
+    bus: PathBuf,
+    folder: PathBuf,
     _alone: MutexGuard<'static, ()>,
 }
 
@@ -68,12 +72,12 @@ impl Domain {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let alone = alone();
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let prefix = format!("lt{}_{number}_", std::process::id());
-        let root = std::env::temp_dir().join(format!("lager-test-{prefix}"));
-        fs::create_dir_all(&root).expect("a temporary folder");
+        let name = format!("lager-test-{}-{number}", std::process::id());
+        let folder = std::env::temp_dir().join(&name);
+        fs::create_dir_all(&folder).expect("a temporary folder");
         Self {
-            prefix,
-            root,
+            bus: Path::new("/dev/shm").join(name),
+            folder,
             _alone: alone,
         }
     }
@@ -82,11 +86,10 @@ impl Domain {
     pub fn lager(&self, args: &[&str]) -> Command {
         let mut command = Command::new(lager());
         command
-            .args(["--bus-prefix", &self.prefix, "--bus-root"])
-            .arg(self.root.join("bus"))
+            .arg("--bus")
+            .arg(&self.bus)
             .args(args)
-            .env("XDG_RUNTIME_DIR", &self.root)
-            .current_dir(&self.root)
+            .current_dir(&self.folder)
             .stdin(Stdio::null());
         command
     }
@@ -98,8 +101,8 @@ impl Domain {
     pub fn start(&self, args: &[&str]) -> Running {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let log = self.root.join(format!("{number}.log"));
-        let out = self.root.join(format!("{number}.out"));
+        let log = self.folder.join(format!("{number}.log"));
+        let out = self.folder.join(format!("{number}.out"));
         let child = self
             .lager(args)
             .stdout(fs::File::create(&out).expect("a log file"))
@@ -116,6 +119,31 @@ impl Domain {
     #[must_use]
     pub fn run(&self, args: &[&str]) -> Output {
         self.lager(args).output().expect("lager starts")
+    }
+
+    /// Runs `lager` with an order that it renews until it is carried out. One that was not renewed in
+    /// time, because others kept this process from its core, is given anew, as `lager` says to do.
+    ///
+    /// # Panics
+    /// When it cannot be started, or is held up for ever.
+    #[must_use]
+    pub fn run_renewed(&self, args: &[&str]) -> Output {
+        wait_for(&format!("{args:?} to be renewed in time"), || {
+            let output = self.run(args);
+            let said = String::from_utf8_lossy(&output.stderr);
+            let late = said.contains("held up for") || said.contains("not renewed in time");
+            (!late).then_some(output)
+        })
+    }
+
+    /// [`Domain::run_renewed`], which must succeed.
+    ///
+    /// # Panics
+    /// When it does not, with what it said.
+    pub fn done(&self, args: &[&str]) {
+        let output = self.run_renewed(args);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{args:?}: {said}");
     }
 
     /// This test's own way onto the bus, as an observer of `robot`.
@@ -137,43 +165,54 @@ impl Domain {
             robot: robot.parse().expect("a robot's name"),
             speed,
             clock: None,
-            prefix: Some(self.prefix.clone()),
-            root: Some(self.root.join("bus")),
+            folder: Some(self.bus.clone()),
         }
     }
 
     /// Where `robot` keeps its clock page if its body is emulated.
     #[must_use]
     pub fn clock_page(&self, robot: &str) -> PathBuf {
-        let bus = self.root.join("lager").join(&self.prefix);
-        bus.join(robot).join("clock")
+        self.bus.join(robot).join("clock")
+    }
+
+    /// Where the emulated boards of `robot` keep their EEPROMs.
+    #[must_use]
+    pub fn eeprom(&self, robot: &str) -> PathBuf {
+        self.bus.join(robot).join("eeprom")
+    }
+
+    /// The folder in which the bus lives.
+    #[must_use]
+    pub fn bus_folder(&self) -> &Path {
+        &self.bus
     }
 
     /// A folder of this test's own.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        &self.root
+        &self.folder
     }
 
     /// The shared memory and bookkeeping files that are left.
     ///
     /// # Panics
-    /// When `/dev/shm` cannot be read.
+    /// When the bus's folder cannot be used.
     #[must_use]
     pub fn leftovers(&self) -> Vec<String> {
-        let mut left: Vec<String> = fs::read_dir("/dev/shm")
-            .expect("/dev/shm is readable")
-            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-            .filter(|name| name.starts_with(&self.prefix))
+        let place = self.bus("r1", 1.0).place().expect("the bus's folder");
+        let mut left: Vec<String> = place
+            .segments()
+            .iter()
+            .map(|path| path.display().to_string())
             // The transport keeps one small segment for each bus for ever.
             .filter(|name| !name.ends_with(".global_mgmt"))
             .collect();
-        let mut folders = vec![self.root.join("bus"), self.root.join("lager")];
+        let mut folders = vec![self.bus.clone()];
         while let Some(folder) = folders.pop() {
             for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
                 if entry.path().is_dir() {
                     folders.push(entry.path());
-                } else {
+                } else if !is_released_stop(&entry.path()) {
                     left.push(entry.path().display().to_string());
                 }
             }
@@ -191,15 +230,18 @@ impl Domain {
     }
 }
 
+/// A stop word that stops nobody: it outlives every process, and only `up` tidies it away.
+fn is_released_stop(path: &Path) -> bool {
+    path.ends_with(StopPage::FILE)
+        && StopWord::read(path).is_ok_and(|told| told.is_some_and(|told| told.stop().is_none()))
+}
+
 impl Drop for Domain {
-    /// Removes the test's own folder and the bus's one permanent segment.
+    /// Removes the test's own folder and bus.
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.root);
-        for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-            let name = entry.file_name().into_string().unwrap_or_default();
-            if name.starts_with(&self.prefix) && name.ends_with(".global_mgmt") {
-                let _ = fs::remove_file(entry.path());
-            }
+        let _ = fs::remove_dir_all(&self.folder);
+        if let Ok(place) = self.bus("r1", 1.0).place() {
+            place.remove();
         }
     }
 }

@@ -36,6 +36,14 @@ fn twenty_seeds_deliver_in_three_warehouses() {
     for run in runs {
         assert_eq!(run["delivered"].as_array().map(Vec::len), Some(1), "{text}");
         assert_eq!(run["lost"], 0, "{run}");
+        assert_eq!(run["collisions"], 0, "{run}");
+        // E15: on the tightest bend the tape is still under the outer sensors, 35 mm and its half
+        // width from the middle.
+        let lateral = run["lateral_mm"].as_f64().expect("a number");
+        assert!(lateral > 0.0 && lateral < 42.5, "{run}");
+        if run["warehouse"] == "small" {
+            assert!(lateral < 20.0, "it weaves on straight tape: {run}");
+        }
         assert!(run.get("failure").is_none(), "{run}");
     }
 }

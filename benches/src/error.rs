@@ -182,3 +182,11 @@ pub enum BenchError {
     #[error("interrupted; nothing was left behind")]
     Interrupted,
 }
+
+/// What a bus that cannot be used says.
+pub(crate) fn no_bus(error: impl core::fmt::Display) -> BenchError {
+    BenchError::Bus {
+        what: "the bus of the measurement could not be opened",
+        detail: error.to_string(),
+    }
+}

@@ -170,7 +170,7 @@ impl<const WORDS: usize> Session<WORDS> {
         let domain = Domain::new()?;
         let counter = Shared::<Counter>::new()?;
         let bus = Bus::open(&domain.config(), Role::Operator).map_err(failed)?;
-        let member = Member::join(domain.prefix(), domain.root())?;
+        let member = Member::join(&domain.config())?;
         let ours = bus.publisher().map_err(failed)?;
         let bare = bare_service::<WORDS>(&member)?
             .publisher_builder()
@@ -179,8 +179,7 @@ impl<const WORDS: usize> Session<WORDS> {
         let mut part = Part::start(READERS)?;
         let () = part.ask(&Script {
             core: second,
-            prefix: domain.prefix().to_owned(),
-            root: domain.root().to_owned(),
+            folder: domain.folder().to_owned(),
             words: WORDS,
             readers,
             counter: counter.number(),

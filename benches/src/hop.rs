@@ -26,7 +26,6 @@ use std::os::fd::{AsRawFd, OwnedFd};
 use rustix::event::{EventfdFlags, eventfd};
 
 pub use contender::Contender;
-pub(crate) use ours::no_bus;
 pub use players::{Round, Timing};
 
 use crate::baseline::stream;
@@ -176,8 +175,7 @@ impl Session {
             let mut part = Part::start(name)?;
             let () = part.ask(&Setup {
                 core,
-                prefix: domain.prefix().to_owned(),
-                root: domain.root().to_owned(),
+                folder: domain.folder().to_owned(),
                 court: court.number(),
                 lines: numbers(&lines),
             })?;

@@ -12,22 +12,26 @@
 
 mod ball;
 mod baseline;
+pub mod cast;
 pub mod chip;
 mod domain;
 pub mod error;
 pub mod fanout;
 pub mod hop;
 pub mod machine;
-pub mod parts;
+mod parts;
 pub mod path;
 pub mod report;
 mod ring;
 mod run;
 mod scenarios;
+mod schedule;
 mod shared;
 pub mod slow;
 mod stats;
 
+pub use domain::Domain;
 pub use error::BenchError;
+pub use parts::{heed_interrupts, interrupted};
 pub use report::{Mode, Options, Ratio, Regime, Report, Row};
 pub use scenarios::{a_second_of_bytes, a_second_of_packets};

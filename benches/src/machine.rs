@@ -10,6 +10,7 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use crate::error::BenchError;
 use crate::parts::{Part, Play, Stage};
 use crate::report::Regime;
+use crate::schedule::schedule;
 
 pub(crate) const PARTS: &[(&str, Play)] = &[("idle spinner", keep_from_halting)];
 
@@ -154,25 +155,13 @@ fn keep_from_halting(stage: &mut Stage) -> Result<(), BenchError> {
         return Ok(());
     };
     pin(core)?;
-    run_only_when_idle()?;
+    schedule(libc::SCHED_IDLE, 0).map_err(|error| BenchError::Kernel {
+        what: "a process of the lowest priority",
+        detail: error.to_string(),
+    })?;
     stage.tell(&())?;
     loop {
         core::hint::spin_loop();
-    }
-}
-
-#[allow(unsafe_code)]
-fn run_only_when_idle() -> Result<(), BenchError> {
-    let priority = libc::sched_param { sched_priority: 0 };
-    // SAFETY: the parameter outlives the call, which reads it and changes this thread only.
-    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_IDLE, &raw const priority) };
-    if result == 0 {
-        Ok(())
-    } else {
-        Err(BenchError::Kernel {
-            what: "a process of the lowest priority",
-            detail: std::io::Error::last_os_error().to_string(),
-        })
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   director (lager bench, a bench target)             player
-//!     Part::start("hop, first") ── LAGER_BENCH_PART ──> play_if_asked()
+//!     Part::start("hop, first") ── LAGER_BENCH_PART ──> cast::play_if_asked()
 //!     Part::tell / hear         ── lines of JSON ─────> Stage::hear / tell
 //! ```
 //!
@@ -25,20 +25,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::BenchError;
+use crate::schedule::schedule;
 
 /// What a player does: hears from its director through the stage, and returns when it hears
 /// nothing more.
 pub(crate) type Play = fn(&mut Stage) -> Result<(), BenchError>;
-
-/// Every part of every scenario.
-const TABLES: &[&[(&str, Play)]] = &[
-    crate::machine::PARTS,
-    crate::hop::PARTS,
-    crate::ring::PARTS,
-    crate::path::PARTS,
-    crate::path::FLOOR_PARTS,
-    crate::fanout::PARTS,
-];
 
 /// Names the part a process is to play.
 const PART: &str = "LAGER_BENCH_PART";
@@ -46,26 +37,25 @@ const PART: &str = "LAGER_BENCH_PART";
 /// How long a player may be silent unless a longer time is given.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
 
-/// If this process was started to play a part, plays it and ends the process; otherwise returns
-/// at once. To be called first thing in `main` of every executable that measures.
-pub fn play_if_asked() {
+/// If this process was started to play a part of `tables`, plays it and ends the process.
+pub(crate) fn play_one_of(tables: &[&[(&str, Play)]]) {
     let Ok(part) = std::env::var(PART) else {
         return;
     };
-    std::process::exit(match play(&part) {
+    std::process::exit(match play(&part, tables) {
         Ok(()) => 0,
         Err(()) => 1,
     });
 }
 
-fn play(part: &str) -> Result<(), ()> {
+fn play(part: &str, tables: &[&[(&str, Play)]]) -> Result<(), ()> {
     // Without it a player would outlive a director that is killed; with it, one that is
     // orphaned already ends at the first word it does not hear.
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
     let mut stage = Stage {
         input: std::io::stdin().lock(),
     };
-    let played = TABLES
+    let played = tables
         .iter()
         .flat_map(|table| table.iter())
         .find(|(name, _)| *name == part)
@@ -279,6 +269,10 @@ impl Part {
 
 impl Drop for Part {
     fn drop(&mut self) {
+        // Linux waits, without giving its core away, for whoever reads in /proc of a process that it
+        // takes down: a process of real time that keeps a less urgent one from that core would
+        // never end.
+        let _ = schedule(libc::SCHED_OTHER, 0);
         // It may have ended already, which is as good.
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -309,11 +303,11 @@ fn interrupt_flag() -> &'static Arc<AtomicBool> {
 
 /// From now on an interrupt ends the measurement with [`BenchError::Interrupted`], so that
 /// everything is swept on the way out.
-pub(crate) fn heed_interrupts() {
+pub fn heed_interrupts() {
     let _ = interrupt_flag();
 }
 
 /// Whether somebody wants to stop.
-pub(crate) fn interrupted() -> bool {
+pub fn interrupted() -> bool {
     interrupt_flag().load(Ordering::Relaxed)
 }

@@ -31,7 +31,7 @@ use crate::baseline::iceoryx::Member;
 use crate::baseline::{Fault, LIMIT};
 use crate::domain::Domain;
 use crate::error::BenchError;
-use crate::hop::no_bus;
+use crate::error::no_bus;
 use crate::machine::{self, Awake};
 use crate::parts::{Part, Play, Stage};
 use crate::report::{Mode, Options, Regime, Row};
@@ -129,8 +129,7 @@ unsafe impl Board for Hall {}
 #[derive(Debug, Serialize, Deserialize)]
 struct Setup {
     core: usize,
-    prefix: String,
-    root: PathBuf,
+    folder: PathBuf,
     hall: RawFd,
 }
 
@@ -187,8 +186,7 @@ impl Session {
             let mut part = Part::start(name)?;
             let () = part.ask(&Setup {
                 core,
-                prefix: domain.prefix().to_owned(),
-                root: domain.root().to_owned(),
+                folder: domain.folder().to_owned(),
                 hall: hall.number(),
             })?;
             Ok::<Part, BenchError>(part)
@@ -238,8 +236,7 @@ impl Place {
         let place = Self {
             hall: Shared::inherited(setup.hall)?,
             config: BusConfig {
-                prefix: Some(setup.prefix),
-                root: Some(setup.root),
+                folder: Some(setup.folder),
                 ..BusConfig::default()
             },
         };
@@ -252,8 +249,7 @@ impl Place {
     }
 
     fn member(&self) -> Result<Member, BenchError> {
-        let prefix = self.config.prefix.as_deref().unwrap_or_default();
-        Member::join(prefix, self.config.root.as_deref().unwrap_or("".as_ref()))
+        Member::join(&self.config)
     }
 
     /// Twice in each round: when everybody is there, and when everybody is done.

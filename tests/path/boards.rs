@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    BoardStatus, Callsign, PACKET_LENGTH, Payload, ResetCause, SteerCommand, SteerData, SteerFlags,
+    BoardStatus, Callsign, PACKET_LENGTH, Payload, ResetCause, SettingReply, SettingStatus,
+    SteerCommand, SteerData, SteerFlags,
 };
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_setfl};
@@ -17,8 +18,9 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 /// Longest silence within a packet. A pseudo terminal hands bytes over when the scheduler lets it.
 const GAP_US: u32 = 50_000;
 
-/// Boards speak at least this often: a link that is silent for a second is down.
-const SPEAK_EVERY: Duration = Duration::from_millis(200);
+/// Boards speak at least this often: a link that is silent for a second is down, and nobody drives a
+/// board that has not reported for 200 ms.
+const SPEAK_EVERY: Duration = Duration::from_millis(100);
 
 struct Line {
     master: OwnedFd,
@@ -77,14 +79,28 @@ impl Boards {
         let now_us = u32::try_from(self.start.elapsed().as_micros()).expect("a short test");
         self.sensor.take(now_us, |_| ());
         let (commands, written) = (&mut self.commands, &mut self.written);
+        let mut answers = Vec::new();
         self.steering.take(now_us, |payload| {
             *written += 1;
+            if let Payload::Setting(setting) = payload {
+                answers.push(Payload::SettingReply(SettingReply {
+                    key: setting.key,
+                    seq: setting.seq,
+                    value: setting.value,
+                    status: SettingStatus::Accepted,
+                }));
+            }
             if let Payload::SteerCommand(command) = payload
                 && commands.last() != Some(&command)
             {
                 commands.push(command);
             }
         });
+        for answer in answers {
+            if let Some(packet) = self.steering.link.encode(answer) {
+                self.steering.write(&packet);
+            }
+        }
         let silent = self.spoke.map(|at| at.elapsed() >= SPEAK_EVERY);
         if silent[0] {
             self.spoke[0] = Instant::now();

@@ -10,7 +10,6 @@ mod robot;
 mod strace;
 
 use std::io::Read;
-use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 use lager_bridge::BridgeConfig;
@@ -22,8 +21,7 @@ use lager_topics::{Role, SensorDistance, SensorLine, Topic};
 use robot::Robot;
 use strace::{Calls, Part};
 
-const PREFIX: &str = "LAGER_PATH_TEST_PREFIX";
-const ROOT: &str = "LAGER_PATH_TEST_ROOT";
+const FOLDER: &str = "LAGER_PATH_TEST_FOLDER";
 const PORTS: &str = "LAGER_PATH_TEST_PORTS";
 
 /// Commands to be seen.
@@ -31,12 +29,11 @@ const COMMANDS: u64 = 400;
 
 /// Runs one service in a thread of its own until the standard input closes.
 fn play(name: &str, role: Role, service: impl FnOnce(&Bus, &Shutdown) + Send) {
-    let Ok(prefix) = std::env::var(PREFIX) else {
+    let Ok(folder) = std::env::var(FOLDER) else {
         return;
     };
     let config = BusConfig {
-        prefix: Some(prefix),
-        root: std::env::var(ROOT).ok().map(PathBuf::from),
+        folder: Some(folder.into()),
         ..BusConfig::default()
     };
     let shutdown = Shutdown::new();
@@ -44,6 +41,9 @@ fn play(name: &str, role: Role, service: impl FnOnce(&Bus, &Shutdown) + Send) {
         std::thread::Builder::new()
             .name(name.to_owned())
             .spawn_scoped(scope, || {
+                let place = config.place().expect("a folder");
+                // As `lager bridge` does: by its lock others know that it is up.
+                let _lock = place.lock(&config.robot, role).expect("its lock");
                 let bus = Bus::open(&config, role).expect("the bus opens");
                 service(&bus, &shutdown);
             })

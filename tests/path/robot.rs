@@ -14,7 +14,7 @@ use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCo
 
 use crate::boards::Boards;
 use crate::strace::Part;
-use crate::{PORTS, PREFIX, ROOT};
+use crate::{FOLDER, PORTS};
 
 /// Between a command and the next frame: everybody sleeps again.
 const PAUSE: Duration = Duration::from_millis(3);
@@ -137,11 +137,7 @@ impl Robot {
             .each_ref()
             .map(|port| port.to_str().expect("UTF-8"));
         let environment = [
-            (PREFIX, bus.prefix.clone().expect("a prefix")),
-            (
-                ROOT,
-                bus.root.as_ref().expect("a root").display().to_string(),
-            ),
+            (FOLDER, domain.bus_folder().display().to_string()),
             (PORTS, ports.join(":")),
         ];
         let part = |name: &str| {

@@ -7,7 +7,6 @@
 
 use core::fmt::Debug;
 use core::time::Duration;
-use std::path::Path as OsPath;
 use std::time::Instant;
 
 use iceoryx2::config::Config;
@@ -19,7 +18,7 @@ use iceoryx2::prelude::{
     FileName, LogLevel, Node, NodeBuilder, Path, SemanticString, ServiceName, SignalHandlingMode,
     ZeroCopySend, ipc, set_log_level,
 };
-use lager_ports::Clock;
+use lager_ports::{BusConfig, Clock};
 use lager_topics::{Qos, Stamp};
 
 use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
@@ -76,10 +75,10 @@ pub(crate) struct Member {
 }
 
 impl Member {
-    /// Joins the bus with that prefix and root.
-    pub(crate) fn join(prefix: &str, root: &OsPath) -> Result<Self, BenchError> {
+    /// Joins the transport of that bus.
+    pub(crate) fn join(bus: &BusConfig) -> Result<Self, BenchError> {
         set_log_level(LogLevel::Fatal);
-        let config = config(prefix, root)?;
+        let config = config(bus)?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -198,12 +197,14 @@ impl Member {
     }
 }
 
-fn config(prefix: &str, root: &OsPath) -> Result<Config, BenchError> {
+fn config(bus: &BusConfig) -> Result<Config, BenchError> {
     const WHAT: &str = "bare iceoryx2 could not be configured";
+    let place = bus.place().map_err(|error| failed(WHAT, error))?;
     let mut config = Config::default();
-    config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|error| failed(WHAT, error))?;
-    let root =
-        Path::new(root.as_os_str().as_encoded_bytes()).map_err(|error| failed(WHAT, error))?;
+    config.global.prefix =
+        FileName::new(place.prefix().as_bytes()).map_err(|error| failed(WHAT, error))?;
+    let root = Path::new(place.transport_folder().as_os_str().as_encoded_bytes())
+        .map_err(|error| failed(WHAT, error))?;
     config.global.set_root_path(&root);
     config.global.creation_timeout = Duration::from_millis(500);
     config.global.service.cleanup_dead_nodes_on_open = false;

@@ -47,8 +47,7 @@ unsafe impl Board for Counter {}
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Script {
     pub(super) core: usize,
-    pub(super) prefix: String,
-    pub(super) root: PathBuf,
+    pub(super) folder: PathBuf,
     pub(super) words: usize,
     pub(super) readers: usize,
     pub(super) counter: RawFd,
@@ -77,12 +76,11 @@ struct Readers<const WORDS: usize> {
 impl<const WORDS: usize> Readers<WORDS> {
     fn attach(script: &Script) -> Result<Self, BenchError> {
         let config = BusConfig {
-            prefix: Some(script.prefix.clone()),
-            root: Some(script.root.clone()),
+            folder: Some(script.folder.clone()),
             ..BusConfig::default()
         };
         let bus = Bus::open(&config, Role::Observer).map_err(failed)?;
-        let member = Member::join(&script.prefix, &script.root)?;
+        let member = Member::join(&config)?;
         let service = bare_service::<WORDS>(&member)?;
         let one = |_| service.subscriber_builder().create();
         Ok(Self {

@@ -99,7 +99,7 @@ struct Findings {
 }
 
 fn main() -> ExitCode {
-    lager_benches::parts::play_if_asked();
+    lager_benches::cast::play_if_asked();
     lager_benches::slow::refuse_in_vain();
     let arguments = Arguments::parse();
     match guard(&arguments) {

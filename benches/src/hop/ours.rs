@@ -7,7 +7,7 @@ use lager_topics::Topic;
 
 use crate::ball::{Ball, FIRST, Ping, Pong, SECOND};
 use crate::baseline::{End, Fault, LIMIT, TIME_OUT};
-use crate::error::BenchError;
+use crate::error::{BenchError, no_bus};
 use crate::slow;
 
 /// An end that publishes to `Out` and waits for `Back`.
@@ -25,14 +25,6 @@ pub(crate) fn first(config: &BusConfig, policy: Policy) -> Result<Ours<Ping, Pon
 /// The second process's end.
 pub(crate) fn second(config: &BusConfig, policy: Policy) -> Result<Ours<Pong, Ping>, BenchError> {
     Ours::open(&Bus::open(config, SECOND).map_err(no_bus)?, policy)
-}
-
-/// What a bus that cannot be used says.
-pub(crate) fn no_bus(error: impl core::fmt::Display) -> BenchError {
-    BenchError::Bus {
-        what: "the bus of the measurement could not be opened",
-        detail: error.to_string(),
-    }
 }
 
 impl<Out, Back> Ours<Out, Back>

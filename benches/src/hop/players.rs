@@ -42,10 +42,8 @@ unsafe impl Board for Court {}
 pub(crate) struct Setup {
     /// The core to stay on.
     pub(crate) core: usize,
-    /// The bus's prefix.
-    pub(crate) prefix: String,
     /// The bus's folder.
-    pub(crate) root: PathBuf,
+    pub(crate) folder: PathBuf,
     /// The number of the [`Court`].
     pub(crate) court: RawFd,
     /// The numbers of the lines; the first of a pair is the first player's.
@@ -263,8 +261,7 @@ fn play<P: Player>(stage: &mut Stage, player: P) -> Result<(), BenchError> {
         court: &court,
         lines: &lines,
         config: BusConfig {
-            prefix: Some(setup.prefix),
-            root: Some(setup.root),
+            folder: Some(setup.folder),
             ..BusConfig::default()
         },
     };
@@ -340,8 +337,7 @@ impl Table<'_> {
     }
 
     fn member(&self) -> Result<Member, BenchError> {
-        let prefix = self.config.prefix.as_deref().unwrap_or_default();
-        Member::join(prefix, self.config.root.as_deref().unwrap_or("".as_ref()))
+        Member::join(&self.config)
     }
 
     fn polling<H: crate::baseline::iceoryx::Header>(
@@ -355,7 +351,7 @@ impl Table<'_> {
 
     #[cfg(feature = "zenoh")]
     fn peer(&self, first: bool, round: &Round) -> Result<zenoh::Peer, BenchError> {
-        let folder = self.config.root.as_deref().unwrap_or("".as_ref());
+        let folder = self.config.folder.as_deref().unwrap_or("".as_ref());
         // A name of its own for each round: the one before may still be closing.
         let socket = folder.join(format!("zenoh-{}", round.number));
         let side = if first {

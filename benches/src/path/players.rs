@@ -16,6 +16,7 @@ use crate::error::BenchError;
 use crate::machine;
 use crate::parts::{Play, Stage};
 use crate::report::Mode;
+use crate::schedule::schedule;
 
 /// The parts of this file.
 pub(super) const BRIDGE: &str = "path, bridge";
@@ -54,8 +55,7 @@ impl Place {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Script {
     pub(super) place: Place,
-    pub(super) prefix: String,
-    pub(super) root: PathBuf,
+    pub(super) folder: PathBuf,
     /// How bridge and logic wait.
     pub(super) mode: Mode,
     /// The bridge's serial ports.
@@ -65,8 +65,7 @@ pub(super) struct Script {
 impl Script {
     pub(super) fn open(&self, role: Role) -> Result<Bus, BenchError> {
         let config = BusConfig {
-            prefix: Some(self.prefix.clone()),
-            root: Some(self.root.clone()),
+            folder: Some(self.folder.clone()),
             ..BusConfig::default()
         };
         Bus::open(&config, role).map_err(bus_error("joining the bus"))
@@ -159,7 +158,9 @@ pub(super) struct RealTime(());
 
 impl RealTime {
     pub(super) fn begin(priority: i32) -> Result<Self, BenchError> {
-        schedule(libc::SCHED_FIFO, priority)?;
+        schedule(libc::SCHED_FIFO, priority).map_err(|error| BenchError::RealTime {
+            detail: error.to_string(),
+        })?;
         Ok(Self(()))
     }
 }
@@ -168,21 +169,5 @@ impl Drop for RealTime {
     fn drop(&mut self) {
         // Anybody may become less urgent.
         let _ = schedule(libc::SCHED_OTHER, 0);
-    }
-}
-
-#[allow(unsafe_code)]
-fn schedule(class: i32, priority: i32) -> Result<(), BenchError> {
-    let parameter = libc::sched_param {
-        sched_priority: priority,
-    };
-    // SAFETY: the parameter outlives the call, which reads it and changes this thread only.
-    let result = unsafe { libc::sched_setscheduler(0, class, &raw const parameter) };
-    if result == 0 {
-        Ok(())
-    } else {
-        Err(BenchError::RealTime {
-            detail: std::io::Error::last_os_error().to_string(),
-        })
     }
 }

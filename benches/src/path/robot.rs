@@ -43,7 +43,7 @@ use crate::report::Mode;
 const UP_WITHIN: Duration = Duration::from_secs(10);
 
 /// Reports come this often, in ns: often enough for the link (1 s) and for the order in force.
-const REPORT_EVERY: u64 = 200_000_000;
+const REPORT_EVERY: u64 = 100_000_000;
 
 /// Frames that must be answered one after the other before a robot counts as awake.
 const IN_A_ROW: usize = 5;
@@ -109,8 +109,7 @@ impl Robot {
         ];
         let script = Script {
             place: Place::default(),
-            prefix: domain.prefix().to_owned(),
-            root: domain.root().to_owned(),
+            folder: domain.folder().to_owned(),
             mode,
             ports: [sensor.cable.path().clone(), steering.cable.path().clone()],
         };
@@ -311,12 +310,20 @@ impl Robot {
         };
         let start = now_ns();
         self.sensor.cable.write(&packet)?;
+        let give_up = start + limit;
         let mut buffer = [0; 256];
         loop {
-            let count = self.steering.cable.read_until(start + limit, &mut buffer)?;
+            let look = give_up.min(now_ns() + REPORT_EVERY);
+            let count = self.steering.cable.read_until(look, &mut buffer)?;
             let end = now_ns();
-            if count == 0 {
+            if count == 0 && end >= give_up {
                 return Ok(Answer::None);
+            }
+            if count == 0 {
+                // When the machine stood still, a report is late, and the robot stands until one
+                // comes. A board sends it whether it is answered or not.
+                self.report()?;
+                continue;
             }
             if let Some(code) = self.take(&buffer[..count]) {
                 return Ok(if (code == FOLLOW) == follows {

@@ -14,7 +14,7 @@ use crate::ball::{Ball, Ping, SECOND};
 use crate::baseline::iceoryx;
 use crate::baseline::{Fault, LIMIT, TIME_OUT};
 use crate::error::BenchError;
-use crate::hop::no_bus;
+use crate::error::no_bus;
 use crate::parts::Stage;
 use crate::report::Mode;
 

@@ -14,7 +14,7 @@ use crate::ball::{Ball, FIRST, Ping};
 use crate::baseline::iceoryx::{self, Sender};
 use crate::baseline::{Fault, LIMIT};
 use crate::error::BenchError;
-use crate::hop::no_bus;
+use crate::error::no_bus;
 use crate::parts::Stage;
 use crate::report::Mode;
 use crate::slow;

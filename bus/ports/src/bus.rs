@@ -16,13 +16,18 @@ use crate::config::BusConfig;
 use crate::doorbell::{self, Board};
 use crate::error::{IntrospectError, OpenError, PortError};
 use crate::introspect::{self, NodeInfo, TopicInfo};
-use crate::keeper::{self, Keeper};
+use crate::keeper::Keeper;
+use crate::kept::{self, KeptError};
+use crate::mend;
 use crate::name::{self, RobotName};
+use crate::place::Place;
 use crate::publisher::Publisher;
 use crate::request::{Client, Server};
+use crate::shortage::Shortage;
 use crate::subscriber::Subscriber;
 use crate::sweep;
 use crate::transport::Ipc;
+use crate::untyped::Here;
 use crate::waiter::{Policy, Waiter};
 
 /// A process's membership on the bus; clones share it.
@@ -35,7 +40,8 @@ pub struct Bus {
 }
 
 struct Shared {
-    node: Node<Ipc>,
+    node: Here<Node<Ipc>>,
+    place: Place,
     config: Config,
     robot: RobotName,
     role: Role,
@@ -52,18 +58,25 @@ impl Bus {
     /// # Errors
     /// The configuration is not usable, or the bus's files or the body's clock are not.
     pub fn open(config: &BusConfig, role: Role) -> Result<Self, OpenError> {
-        let transport = config.transport()?;
+        let place = config.place()?;
+        let transport = config.transport(&place)?;
         let clock = clock::Source::new(config.speed, config.clock.as_deref())?;
         set_log_level(log_level());
-        let node = make_node(&transport, &config.robot, role)?;
+        // Before anything is opened that could be waited for.
+        mend::refuse_foreign(&place)?;
+        mend::unfinished(&place);
+        let node = make_node(&transport, &place, &config.robot, role)?;
+        mend::protect(&place);
         // What cannot be listed now is swept the next time.
         let _ = sweep::dead_nodes(&transport);
-        doorbell::sweep_all(&transport);
+        doorbell::sweep_all(&place);
+        place.sweep_locks();
         let port_name = PortName::new(&name::port(role, std::process::id()))
             .expect("a role and a number fit into a port's name");
         Ok(Self {
             shared: Arc::new(Shared {
-                node,
+                node: Here::new(node),
+                place,
                 config: transport,
                 robot: config.robot.clone(),
                 role,
@@ -84,6 +97,11 @@ impl Bus {
         &self.shared.robot
     }
 
+    /// Where the bus lives.
+    pub fn place(&self) -> &Place {
+        &self.shared.place
+    }
+
     /// What this process is on the bus.
     pub fn role(&self) -> Role {
         self.shared.role
@@ -95,8 +113,15 @@ impl Bus {
     /// Samples a killed writer has sent stay with subscribers that have received from it before,
     /// until they are drained; a keeper should still drain first ([`Keeper::remember`]).
     pub fn sweep(&self) -> usize {
-        doorbell::sweep(&self.shared.config, &self.shared.robot);
+        mend::unfinished(&self.shared.place);
+        doorbell::sweep(&self.shared.place, &self.shared.robot);
         sweep::dead_nodes(&self.shared.config).unwrap_or_default()
+    }
+
+    /// Whether others can still find this process on the bus; not if somebody has removed the bus's
+    /// files, or the bus was cleared.
+    pub fn is_listed(&self) -> bool {
+        self.shared.place.is_current() && sweep::is_listed(&self.shared.config, &self.shared.node)
     }
 
     /// A writer of `T`, to be used in this thread. It rings the actors of `T`, now and later.
@@ -148,14 +173,15 @@ impl Bus {
     }
 
     /// The last value of a topic this process writes itself, from before its restart; waits for
-    /// it at most `timeout` of real time. `None` is a first start, or nobody kept it.
+    /// it at most `timeout` of real time. `None`: the topic can be read, and nobody kept anything.
     ///
     /// Call it before making the topic's publisher.
     ///
     /// # Errors
-    /// As for a subscriber.
-    pub fn kept<T: Topic>(&self, timeout: Duration) -> Result<Option<T::Payload>, PortError> {
-        keeper::kept::<T>(self, timeout)
+    /// It is not known whether there is one, because it cannot be read; what passes by itself was
+    /// waited for. Whoever would go on from that value must not take this for a first start.
+    pub fn kept<T: Topic>(&self, timeout: Duration) -> Result<Option<T::Payload>, KeptError> {
+        kept::kept::<T>(self, timeout)
     }
 
     /// Every topic in use on this bus, of every robot.
@@ -206,7 +232,12 @@ impl fmt::Debug for Bus {
     }
 }
 
-fn make_node(config: &Config, robot: &RobotName, role: Role) -> Result<Node<Ipc>, OpenError> {
+fn make_node(
+    config: &Config,
+    place: &Place,
+    robot: &RobotName,
+    role: Role,
+) -> Result<Node<Ipc>, OpenError> {
     let name = NodeName::new(&name::node(robot, role, std::process::id()))
         .expect("robot, role and number fit into a node's name");
     NodeBuilder::new()
@@ -215,12 +246,15 @@ fn make_node(config: &Config, robot: &RobotName, role: Role) -> Result<Node<Ipc>
         .signal_handling_mode(SignalHandlingMode::Disabled)
         .create::<Ipc>()
         .map_err(|failure| {
-            let root = config.global.root_path().to_string();
+            if let Some(shortage) = Shortage::now() {
+                return OpenError::Short(shortage);
+            }
+            let folder = place.folder().to_owned();
             match failure {
-                NodeCreationFailure::InsufficientPermissions => OpenError::Permission { root },
+                NodeCreationFailure::InsufficientPermissions => OpenError::Permission { folder },
                 other => OpenError::Transport {
                     detail: format!("{other:?}"),
-                    root,
+                    folder,
                 },
             }
         })

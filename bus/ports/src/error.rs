@@ -4,25 +4,75 @@ use std::path::PathBuf;
 
 use lager_topics::Role;
 
+use crate::shortage::Shortage;
+use crate::stop::StopError;
+
 /// Why a process could not join the bus.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OpenError {
-    /// The prefix cannot be part of a file name.
-    #[error("`{0}` cannot be the bus's prefix; use letters, digits, `_` and `-` only")]
-    Prefix(String),
-    /// The root is not an absolute path.
-    #[error("`{0}` cannot be the bus's root folder; give an absolute path")]
-    Root(PathBuf),
-    /// The root leaves no room for the names of sockets.
-    #[error(
-        "the bus's root folder `{root}` is too long; use at most {limit} bytes, for example one below /tmp"
-    )]
-    RootTooLong {
+    /// The folder is not an absolute path.
+    #[error("`{0}` cannot be the bus's folder; give an absolute path, in UTF-8")]
+    RelativeFolder(PathBuf),
+    /// The folder leaves no room for the names of sockets.
+    #[error("the bus's folder {folder} is too long; use at most {limit} bytes")]
+    FolderTooLong {
         /// The folder.
-        root: PathBuf,
+        folder: PathBuf,
         /// The longest that works, in bytes.
         limit: usize,
     },
+    /// A file or a link.
+    #[error(
+        "{0} is a file or a symbolic link and cannot be the bus's folder; remove it, or name a folder with --bus"
+    )]
+    NoFolder(PathBuf),
+    /// Another user's.
+    #[error(
+        "{folder} belongs to UID {uid} ({name}); use `sudo -u {name} lager ...` for that user's robots, or name another folder with --bus"
+    )]
+    ForeignFolder {
+        /// The folder.
+        folder: PathBuf,
+        /// Its owner.
+        uid: u32,
+        /// The owner as `sudo -u` knows him.
+        name: String,
+    },
+    /// Other users may enter it.
+    #[error(
+        "other users may enter the bus's folder {folder} (mode {mode:04o}); use `chmod 700 {folder}`, if nobody else's files are in it"
+    )]
+    SharedFolder {
+        /// The folder.
+        folder: PathBuf,
+        /// Its mode.
+        mode: u32,
+    },
+    /// Another user has put a segment where the bus's are.
+    #[error(
+        "{path} belongs to UID {uid} ({name}), who could end every process of this bus with it; remove it (`sudo rm {path}`), or name another folder with --bus"
+    )]
+    ForeignSegment {
+        /// The segment.
+        path: PathBuf,
+        /// Its owner.
+        uid: u32,
+        /// The owner's name.
+        name: String,
+    },
+    /// It cannot be made or looked at.
+    #[error(
+        "the bus's folder {folder} cannot be used ({detail}); make it for this user, or name another one with --bus"
+    )]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system says.
+        detail: String,
+    },
+    /// This process or this machine has run out of something.
+    #[error("the bus could not be opened: {0}")]
+    Short(Shortage),
     /// The speed is not a positive number.
     #[error("a robot cannot live {0} times as fast as real time; give a positive number")]
     Speed(f64),
@@ -43,27 +93,30 @@ pub enum OpenError {
     ForeignClock(PathBuf),
     /// The user may not write where the bus lives.
     #[error(
-        "no permission to use the bus's files in {root} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user"
+        "no permission to use the bus's files in {folder} and /dev/shm; run all of a robot's processes as one user, or remove files left by another user"
     )]
     Permission {
-        /// The folder.
-        root: String,
+        /// The bus's folder.
+        folder: PathBuf,
     },
     /// The transport failed.
     #[error(
-        "the bus could not be opened ({detail}); check that /dev/shm and {root} exist and are not full, then try again"
+        "the bus could not be opened ({detail}); check that /dev/shm and {folder} exist and are not full, then try again"
     )]
     Transport {
         /// What the transport says.
         detail: String,
-        /// The folder.
-        root: String,
+        /// The bus's folder.
+        folder: PathBuf,
     },
 }
 
 /// Why a port could not be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
+    /// The bridge cannot use its stop word.
+    #[error(transparent)]
+    Stop(#[from] StopError),
     /// All places for observers are taken.
     #[error(
         "`{topic}` already has {limit} observers, which is the limit; stop one of them (`lager topic info {topic}` lists them) and try again"
@@ -156,6 +209,14 @@ pub enum PortError {
         /// What was met last.
         detail: String,
     },
+    /// This process or this machine has run out of something.
+    #[error("`{topic}` could not be opened: {shortage}")]
+    Short {
+        /// The topic or request.
+        topic: String,
+        /// What there is too little of.
+        shortage: Shortage,
+    },
     /// Only services that act on a topic may wait.
     #[error("{role} is not woken by any topic: observers poll on a timer")]
     NotAnActor {
@@ -238,8 +299,6 @@ pub enum IntrospectError {
     #[error(transparent)]
     Config(#[from] OpenError),
     /// The transport failed.
-    #[error(
-        "the bus's files could not be listed ({0}); check the permissions of the bus's root folder"
-    )]
+    #[error("the bus's files could not be listed ({0}); check the permissions of the bus's folder")]
     Transport(String),
 }

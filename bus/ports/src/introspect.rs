@@ -12,10 +12,12 @@ use crate::bus::Bus;
 use crate::config::BusConfig;
 use crate::doorbell;
 use crate::error::IntrospectError;
+use crate::mend;
 use crate::name::{self, RobotName};
 use crate::service;
 use crate::sweep;
 use crate::transport::Ipc;
+use crate::untyped::Kind;
 
 /// How a topic in use compares with this build's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,7 +128,7 @@ pub struct NodeInfo {
 /// # Errors
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
-    list(&config.transport()?)
+    list(&config.transport(&config.place()?)?)
 }
 
 /// Removes what killed processes left behind, without joining the bus; returns how many of them
@@ -135,10 +137,13 @@ pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
 /// # Errors
 /// The configuration is not usable, or the bus's files cannot be listed.
 pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
-    let config = config.transport()?;
+    let place = config.place()?;
+    let config = config.transport(&place)?;
+    mend::unfinished(&place);
     let removed = sweep::dead_nodes(&config)
         .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
-    doorbell::sweep_all(&config);
+    doorbell::sweep_all(&place);
+    place.sweep_locks();
     Ok(removed)
 }
 
@@ -222,7 +227,7 @@ impl TopicVisitor for Look<'_> {
 
     fn visit<T: Topic>(self) -> TopicInfo {
         let without_ends = |layout| TopicInfo::without_ends(self.robot, T::NAME, layout);
-        let service = match service::existing_topic::<T>(self.bus, self.robot) {
+        let service = match service::existing_topic(self.bus, self.robot, &Kind::of::<T>()) {
             Ok(Some(service)) => service,
             Ok(None) => return without_ends(Layout::Unused),
             Err(_) => return without_ends(Layout::Other),
@@ -239,7 +244,7 @@ impl TopicVisitor for Look<'_> {
             CallbackProgression::Continue
         });
         for actor in T::QOS.actors {
-            let pids = doorbell::woken(self.bus.transport(), self.robot, *actor);
+            let pids = doorbell::woken(self.bus.place(), self.robot, *actor);
             info.woken.extend(pids.into_iter().map(|pid| Peer {
                 role: Some(*actor),
                 pid,

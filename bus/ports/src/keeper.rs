@@ -5,21 +5,21 @@
 //! the value over, with history, so that the successor reads it with [`crate::Bus::kept`].
 //!
 //! ```text
-//! supervisor, every tick:   remember(); sweep
+//! supervisor, every tick:   remember(), which tries again what a hand_over() could not; sweep
 //! service died:             remember(); hand_over(); start it again
 //! successor:                kept(); make its own publisher; publish
 //! supervisor, next tick:    remember() sees the successor and withdraws
 //! ```
 
 use core::fmt;
-use core::time::Duration;
-use std::time::Instant;
 
 use lager_topics::{Stamp, Topic};
 
 use crate::bus::Bus;
+use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError, SendError};
 use crate::publisher::Publisher;
+use crate::streams::Newest;
 use crate::subscriber::Subscriber;
 
 /// Keeps the last value of a topic for its writer's successor; stays in the thread that made it.
@@ -27,6 +27,9 @@ pub struct Keeper<T: Topic> {
     bus: Bus,
     subscriber: Subscriber<T>,
     kept: Option<(T::Payload, Stamp)>,
+    newest: Newest,
+    /// The kept value is to be handed over and is not yet.
+    due: bool,
     stand_in: Option<Publisher<T>>,
 }
 
@@ -36,52 +39,68 @@ impl<T: Topic> Keeper<T> {
             bus: bus.clone(),
             subscriber: Subscriber::new(bus)?,
             kept: None,
+            newest: Newest::default(),
+            due: false,
             stand_in: None,
         })
     }
 
     /// Drains the topic, keeps what was published last, and withdraws a handed-over value once
-    /// the successor speaks. Call it on a tick, and before every sweep.
+    /// the successor speaks. A hand-over that failed is tried again. Call it on a tick, and before
+    /// every sweep.
     ///
     /// # Errors
-    /// The transport failed; what was kept stays kept.
-    pub fn remember(&mut self) -> Result<(), ReceiveError> {
-        while let Some(sample) = self.subscriber.receive()? {
-            let stamp = *sample.stamp();
-            if self.is_own(&stamp) {
-                continue;
-            }
-            let newer = self
-                .kept
-                .as_ref()
-                .is_none_or(|(_, kept)| stamp.publish_time_ns >= kept.publish_time_ns);
-            if newer {
-                self.kept = Some((*sample, stamp));
-                self.stand_in = None;
-            }
+    /// The transport failed; what was kept stays kept, and the next call tries again.
+    pub fn remember(&mut self) -> Result<(), KeeperError> {
+        let drained = self.drain();
+        if self.due {
+            self.offer()?;
         }
         if let Some(stand_in) = &self.stand_in {
             stand_in.tick();
         }
-        Ok(())
+        Ok(drained?)
     }
 
     /// Publishes the kept value with its original times, for the successor to find at its start.
     /// Without a kept value it does nothing; again and again it only serves late joiners.
     ///
     /// # Errors
-    /// No publisher could be made, or it could not send.
-    pub fn hand_over(&mut self) -> Result<(), HandOverError> {
-        let Some((payload, stamp)) = &self.kept else {
-            return Ok(());
-        };
+    /// No publisher could be made, or it could not send; [`Keeper::remember`] tries again.
+    pub fn hand_over(&mut self) -> Result<(), KeeperError> {
         if let Some(stand_in) = &self.stand_in {
             stand_in.tick();
             return Ok(());
         }
+        self.due = self.kept.is_some();
+        self.offer()
+    }
+
+    fn drain(&mut self) -> Result<(), ReceiveError> {
+        while let Some(sample) = self.subscriber.receive()? {
+            let stamp = *sample.stamp();
+            let now_ns = Clock::monotonic_ns();
+            if !self.is_own(&stamp) && self.newest.takes(stamp.publish_time_ns, now_ns) {
+                // The dead one's last word, found late, is what is to be handed over.
+                let is_late = self.kept.as_ref().is_some_and(|(_, kept)| {
+                    (kept.writer, kept.epoch) == (stamp.writer, stamp.epoch)
+                });
+                self.due = is_late && (self.due || self.stand_in.is_some());
+                self.stand_in = None;
+                self.kept = Some((*sample, stamp));
+            }
+        }
+        Ok(())
+    }
+
+    fn offer(&mut self) -> Result<(), KeeperError> {
+        let Some((payload, stamp)) = &self.kept else {
+            return Ok(());
+        };
         let stand_in = Publisher::new(&self.bus)?;
         stand_in.resend(*payload, stamp)?;
         self.stand_in = Some(stand_in);
+        self.due = false;
         Ok(())
     }
 
@@ -115,30 +134,16 @@ impl<T: Topic> fmt::Debug for Keeper<T> {
     }
 }
 
-/// Why a kept value could not be handed over.
+/// Why a value could not be remembered or handed over.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum HandOverError {
+pub enum KeeperError {
+    /// The topic could not be read.
+    #[error(transparent)]
+    Receive(#[from] ReceiveError),
     /// No publisher could be made.
     #[error(transparent)]
     Port(#[from] PortError),
     /// It could not send.
     #[error(transparent)]
     Send(#[from] SendError),
-}
-
-/// Waits for a value of a topic this process is about to write.
-pub(crate) fn kept<T: Topic>(
-    bus: &Bus,
-    timeout: Duration,
-) -> Result<Option<T::Payload>, PortError> {
-    let mut subscriber = Subscriber::<T>::new(bus)?;
-    let start = Instant::now();
-    loop {
-        match subscriber.latest() {
-            Ok(Some(sample)) => return Ok(Some(*sample)),
-            // A writer that cannot be reached is most likely the killed one.
-            Ok(None) | Err(_) if start.elapsed() >= timeout => return Ok(None),
-            Ok(None) | Err(_) => std::thread::sleep(Duration::from_millis(1)),
-        }
-    }
 }

@@ -8,6 +8,8 @@ use std::str::FromStr;
 
 use lager_topics::Role;
 
+use crate::place;
+
 const FAMILY: &str = "lager";
 
 /// The name of a robot: 1 to 24 characters of `a`-`z`, `0`-`9` and `-`.
@@ -45,6 +47,11 @@ pub enum RobotNameError {
     /// It is too long.
     #[error("the robot's name `{0}` has more than 24 characters; choose a shorter one")]
     TooLong(String),
+    /// The transport's folder stands beside the robots' under this name.
+    #[error(
+        "no robot can be called `{0}`, as the bus keeps its own files under that name; choose another"
+    )]
+    Reserved(String),
     /// It has a character that is not allowed.
     #[error("the robot's name `{name}` contains `{character}`; only a-z, 0-9 and - are allowed")]
     Character {
@@ -71,6 +78,9 @@ impl FromStr for RobotName {
         }
         if text.len() > Self::MAX_LENGTH {
             return Err(RobotNameError::TooLong(text.to_owned()));
+        }
+        if place::is_transport(text) {
+            return Err(RobotNameError::Reserved(text.to_owned()));
         }
         Ok(Self(text.to_owned()))
     }
@@ -131,6 +141,7 @@ mod tests {
         assert!(reason("R1").contains("contains `R`"));
         assert!(reason("r/1").contains("contains `/`"));
         assert!(reason("å").contains("contains `å`"));
+        assert!(reason("iceoryx2").contains("its own files"));
         assert!(reason("abcdefghijklmnopqrstuvwxy").contains("more than 24"));
     }
 

@@ -9,6 +9,7 @@ use iceoryx2::config::Config;
 
 use crate::bus::Bus;
 use crate::error::PortError;
+use crate::shortage::Shortage;
 
 /// How an attempt to open or create something failed.
 pub(crate) enum Fault {
@@ -62,7 +63,9 @@ pub(crate) fn patiently<T>(
 
 fn given_up(topic: &str, detail: String) -> PortError {
     let topic = topic.to_owned();
-    if detail == "ServiceInCorruptedState" {
+    if let Some(shortage) = Shortage::now() {
+        PortError::Short { topic, shortage }
+    } else if detail == "ServiceInCorruptedState" {
         PortError::Damaged { topic }
     } else {
         PortError::Busy { topic, detail }

@@ -4,134 +4,50 @@
 //! process that appears while its asker waits, and is forgotten when its asker gives up.
 
 use core::fmt;
+use core::marker::PhantomData;
 use core::time::Duration;
 use std::time::Instant;
 
-use iceoryx2::pending_response::PendingResponse;
-use iceoryx2::port::ReceiveError as IpcReceiveError;
-use iceoryx2::port::client::Client as IpcClient;
-use iceoryx2::port::server::Server as IpcServer;
-use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, PortFactory};
-use iceoryx2::service::port_factory::client::ClientCreateError;
-use iceoryx2::service::port_factory::server::ServerCreateError;
-use lager_topics::Request;
+use lager_topics::{Payload, Request};
 
 use crate::bus::Bus;
-use crate::doorbell::Rope;
+use crate::clock::Clock;
 use crate::error::{CallError, PortError, ReceiveError};
-use crate::service::{self, Fault, MAX_CLIENTS, MAX_SERVERS, RequestService, patiently};
-use crate::transport::Ipc;
+use crate::untyped::{Answerer, Asker, Question};
 
 type Ask<R> = <R as Request>::Request;
 type Answer<R> = <R as Request>::Reply;
 
 /// The asking side of a request; stays in the thread that made it.
 pub struct Client<R: Request> {
-    inner: IpcClient<Ipc, Ask<R>, (), Answer<R>, ()>,
-    service: RequestService<R>,
-    rope: Rope,
+    asker: Asker,
+    request: PhantomData<R>,
 }
-
-/// How often an asker looks for its answer. Nobody wakes it, since askers are not actors.
-const LOOK_EVERY: Duration = Duration::from_micros(200);
 
 impl<R: Request> Client<R> {
     pub(crate) fn new(bus: &Bus) -> Result<Self, PortError> {
-        let rope = Rope::to(bus, R::ACTOR, R::ID)?;
-        let service = service::request::<R>(bus)?;
-        let inner = patiently(bus, R::NAME, || {
-            service
-                .client_builder()
-                .name(bus.port_name())
-                .backpressure_strategy(BackpressureStrategy::DiscardData)
-                .create()
-                .map_err(|error| match error {
-                    ClientCreateError::ExceedsMaxSupportedClients => {
-                        Fault::Full(PortError::TooManyWriters {
-                            topic: R::NAME.to_owned(),
-                            limit: MAX_CLIENTS,
-                        })
-                    }
-                    other => service::no_resources(R::NAME, other),
-                })
-        })?;
         Ok(Self {
-            inner,
-            service,
-            rope,
+            asker: Asker::new(bus, Question::of::<R>())?,
+            request: PhantomData,
         })
     }
 
-    /// Asks and waits for the answer, at most `timeout` of real time.
+    /// Asks and waits for the answer, at most `timeout` of real time. The question carries that
+    /// deadline: an actor that finds it later must not act on it any more.
     ///
     /// A question that was put to a process which then died is put again to its successor, if
     /// that appears in time; so a request must be harmless when carried out twice.
     ///
     /// # Errors
     /// Nobody answers such requests, or not in time.
-    pub fn call(&self, request: Ask<R>, timeout: Duration) -> Result<Answer<R>, CallError> {
+    pub fn call(&self, mut request: Ask<R>, timeout: Duration) -> Result<Answer<R>, CallError> {
         let start = Instant::now();
-        let mut asked = Vec::new();
-        let mut pending = None;
-        loop {
-            let present = self.servers();
-            if present.iter().any(|server| !asked.contains(server)) {
-                // The earlier question is withdrawn before it is put again.
-                drop(pending.take());
-                let question = self.ask(request)?;
-                if question.number_of_server_connections() > 0 {
-                    asked = present;
-                    pending = Some(question);
-                }
-            }
-            if let Some(question) = &pending {
-                match question.receive() {
-                    Ok(Some(answer)) => return Ok(*answer.payload()),
-                    Ok(None) => (),
-                    Err(error) => return Err(transport::<R>(error)),
-                }
-            }
-            if start.elapsed() >= timeout {
-                return Err(if asked.is_empty() {
-                    CallError::NoServer {
-                        request: R::NAME,
-                        actor: R::ACTOR,
-                    }
-                } else {
-                    CallError::NoAnswer {
-                        request: R::NAME,
-                        actor: R::ACTOR,
-                    }
-                });
-            }
-            std::thread::sleep(LOOK_EVERY);
-        }
-    }
-
-    #[allow(clippy::type_complexity)]
-    fn ask(
-        &self,
-        request: Ask<R>,
-    ) -> Result<PendingResponse<Ipc, Ask<R>, (), Answer<R>, ()>, CallError> {
-        let question = self.inner.send_copy(request).map_err(transport::<R>)?;
-        self.rope.ring();
-        Ok(question)
-    }
-
-    fn servers(&self) -> Vec<u128> {
-        let mut servers = Vec::new();
-        self.service.dynamic_config().list_servers(|details| {
-            servers.push(details.server_id.value());
-            CallbackProgression::Continue
-        });
-        servers
-    }
-}
-
-fn transport<R: Request>(error: impl fmt::Debug) -> CallError {
-    CallError::Transport {
-        request: R::NAME,
-        detail: format!("{error:?}"),
+        let lifetime_ms = u32::try_from(timeout.as_millis()).unwrap_or(u32::MAX);
+        R::date(&mut request, Clock::monotonic_ns(), lifetime_ms);
+        let mut reply = Answer::<R>::default();
+        self.asker
+            .call(bytes(&request), bytes_mut(&mut reply), start, timeout)?;
+        Ok(reply)
     }
 }
 
@@ -147,30 +63,16 @@ impl<R: Request> fmt::Debug for Client<R> {
 /// The answering side of a request; stays in the thread that made it. Askers ring the waiter of
 /// the request's actor.
 pub struct Server<R: Request> {
-    inner: IpcServer<Ipc, Ask<R>, (), Answer<R>, ()>,
+    answerer: Answerer,
+    request: PhantomData<R>,
 }
 
 impl<R: Request> Server<R> {
     pub(crate) fn new(bus: &Bus) -> Result<Self, PortError> {
-        let service = service::request::<R>(bus)?;
-        let inner = patiently(bus, R::NAME, || {
-            service
-                .server_builder()
-                .name(bus.port_name())
-                .max_loaned_responses_per_request(1)
-                .backpressure_strategy(BackpressureStrategy::DiscardData)
-                .create()
-                .map_err(|error| match error {
-                    ServerCreateError::ExceedsMaxSupportedServers => {
-                        Fault::Full(PortError::TooManyReaders {
-                            topic: R::NAME.to_owned(),
-                            limit: MAX_SERVERS,
-                        })
-                    }
-                    other => service::no_resources(R::NAME, other),
-                })
-        })?;
-        Ok(Self { inner })
+        Ok(Self {
+            answerer: Answerer::new(bus, &Question::of::<R>())?,
+            request: PhantomData,
+        })
     }
 
     /// Answers everything that has been asked; returns how much that was.
@@ -182,21 +84,13 @@ impl<R: Request> Server<R> {
         mut answer: impl FnMut(&Ask<R>) -> Answer<R>,
     ) -> Result<usize, ReceiveError> {
         let mut answered = 0;
-        loop {
-            match self.inner.receive() {
-                Ok(Some(question)) => {
-                    let reply = answer(question.payload());
-                    // An asker that is gone by now needs no answer.
-                    let _ = question.send_copy(reply);
-                    answered += 1;
-                }
-                Ok(None) => return Ok(answered),
-                Err(IpcReceiveError::ExceedsMaxBorrows) => {
-                    return Err(ReceiveError::TooManyHeld { limit: 1 });
-                }
-                Err(other) => return Err(ReceiveError::Transport(format!("{other:?}"))),
-            }
+        while let Some(asked) = self.answerer.next()? {
+            let mut request = Ask::<R>::default();
+            asked.copy_to(bytes_mut(&mut request));
+            asked.answer(bytes(&answer(&request)));
+            answered += 1;
         }
+        Ok(answered)
     }
 }
 
@@ -207,4 +101,18 @@ impl<R: Request> fmt::Debug for Server<R> {
             .field("request", &R::NAME)
             .finish_non_exhaustive()
     }
+}
+
+/// A payload as others see it.
+#[allow(unsafe_code, reason = "a payload is its bytes")]
+fn bytes<P: Payload>(payload: &P) -> &[u8] {
+    // SAFETY: a payload has no padding (`lager_topics::payload!`), so all of its bytes have values.
+    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(payload).cast(), size_of::<P>()) }
+}
+
+/// A payload to be filled with what others have sent.
+#[allow(unsafe_code, reason = "a payload is its bytes")]
+fn bytes_mut<P: Payload>(payload: &mut P) -> &mut [u8] {
+    // SAFETY: a payload has no padding, and any bytes are one (`lager_topics::Field`).
+    unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(payload).cast(), size_of::<P>()) }
 }

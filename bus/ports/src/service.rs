@@ -11,13 +11,15 @@ use iceoryx2::service::builder::request_response::{
     RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
-use lager_topics::{Payload, Qos, Request, Schema, Stamp, Topic};
+use lager_topics::Qos;
 
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::name::{self, RobotName};
 pub(crate) use crate::patience::{Fault, patiently};
+use crate::shortage::Shortage;
 use crate::transport::Ipc;
+use crate::untyped::{Bytes, Header, Kind, Question};
 
 /// Samples a subscriber may hold at the same time.
 pub(crate) const MAX_HELD: usize = 4;
@@ -37,18 +39,17 @@ const MAX_EVENT_ID: usize = 3;
 
 const SCHEMA_KEY: &str = "lager.schema";
 
-pub(crate) type TopicService<T> = publish_subscribe::PortFactory<Ipc, <T as Topic>::Payload, Stamp>;
+pub(crate) type TopicService = publish_subscribe::PortFactory<Ipc, Bytes, Header>;
 
-pub(crate) type RequestService<R> =
-    request_response::PortFactory<Ipc, <R as Request>::Request, (), <R as Request>::Reply, ()>;
+pub(crate) type RequestService = request_response::PortFactory<Ipc, Bytes, Header, Bytes, Header>;
 
 pub(crate) type EventService = event::PortFactory<Ipc>;
 
 /// Opens or creates the service of a topic with the limits of the table.
-pub(crate) fn topic<T: Topic>(bus: &Bus) -> Result<TopicService<T>, PortError> {
-    patiently(bus, T::NAME, || {
-        let qos = T::QOS;
-        builder::<T>(bus.node(), bus.robot())?
+pub(crate) fn topic(bus: &Bus, kind: &Kind) -> Result<TopicService, PortError> {
+    patiently(bus, kind.name, || {
+        let qos = kind.qos;
+        builder(bus.node(), bus.robot(), kind)?
             .max_publishers(qos.max_publishers())
             .max_subscribers(qos.max_subscribers())
             .max_nodes(qos.max_nodes())
@@ -56,49 +57,76 @@ pub(crate) fn topic<T: Topic>(bus: &Bus) -> Result<TopicService<T>, PortError> {
             .subscriber_max_borrowed_samples(MAX_HELD)
             .history_size(qos.history)
             .enable_safe_overflow(true)
-            .open_or_create_with_attributes(&layout::<T::Payload, Stamp>())
-            .map_err(|error| topic_fault(T::NAME, &qos, error))
+            .open_or_create_with_attributes(&layout(kind.layout))
+            .map_err(|error| topic_fault(kind.name, &qos, error))
     })
 }
 
 /// Opens the service of a robot's topic if it exists. Never creates it.
-pub(crate) fn existing_topic<T: Topic>(
+pub(crate) fn existing_topic(
     bus: &Bus,
     robot: &RobotName,
-) -> Result<Option<TopicService<T>>, PortError> {
-    patiently(bus, T::NAME, || {
-        match builder::<T>(bus.node(), robot)?.open_with_attributes(&layout::<T::Payload, Stamp>())
-        {
+    kind: &Kind,
+) -> Result<Option<TopicService>, PortError> {
+    patiently(bus, kind.name, || {
+        match builder(bus.node(), robot, kind)?.open_with_attributes(&layout(kind.layout)) {
             Ok(service) => Ok(Some(service)),
             Err(
                 PublishSubscribeOpenError::DoesNotExist
                 | PublishSubscribeOpenError::IsMarkedForDestruction,
             ) => Ok(None),
             Err(error) => Err(topic_fault(
-                T::NAME,
-                &T::QOS,
+                kind.name,
+                &kind.qos,
                 PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(error),
             )),
         }
     })
 }
 
-fn builder<T: Topic>(
+#[allow(
+    unsafe_code,
+    reason = "the transport believes what it is told of the types"
+)]
+fn builder(
     node: &Node<Ipc>,
     robot: &RobotName,
-) -> Result<iceoryx2::service::builder::publish_subscribe::Builder<T::Payload, Stamp, Ipc>, Fault> {
-    Ok(node
-        .service_builder(&service_name(robot, T::NAME)?)
-        .publish_subscribe::<T::Payload>()
-        .user_header::<Stamp>())
+    kind: &Kind,
+) -> Result<iceoryx2::service::builder::publish_subscribe::Builder<Bytes, Header, Ipc>, Fault> {
+    let builder = node
+        .service_builder(&service_name(robot, kind.name)?)
+        .publish_subscribe::<Bytes>()
+        .user_header::<Header>();
+    // SAFETY: both are of the types that the typed ports read and write.
+    Ok(unsafe {
+        builder
+            .__internal_set_payload_type_details(&(kind.payload)())
+            .__internal_set_user_header_type_details(&Kind::header())
+    })
 }
 
 /// Opens or creates the service of a request.
-pub(crate) fn request<R: Request>(bus: &Bus) -> Result<RequestService<R>, PortError> {
-    patiently(bus, R::NAME, || {
-        bus.node()
-            .service_builder(&service_name(bus.robot(), R::NAME)?)
-            .request_response::<R::Request, R::Reply>()
+#[allow(
+    unsafe_code,
+    reason = "the transport believes what it is told of the types"
+)]
+pub(crate) fn request(bus: &Bus, question: &Question) -> Result<RequestService, PortError> {
+    patiently(bus, question.name, || {
+        let builder = bus
+            .node()
+            .service_builder(&service_name(bus.robot(), question.name)?)
+            .request_response::<Bytes, Bytes>()
+            .request_user_header::<Header>()
+            .response_user_header::<Header>();
+        // SAFETY: all are of the types that the typed ends read and write.
+        let builder = unsafe {
+            builder
+                .__internal_set_request_payload_type_details(&(question.request)())
+                .__internal_set_response_payload_type_details(&(question.reply)())
+                .__internal_set_request_header_type_details(&Question::header())
+                .__internal_set_response_header_type_details(&Question::header())
+        };
+        builder
             .max_clients(MAX_CLIENTS)
             .max_servers(MAX_SERVERS)
             .max_nodes(MAX_REQUEST_NODES)
@@ -110,30 +138,30 @@ pub(crate) fn request<R: Request>(bus: &Bus) -> Result<RequestService<R>, PortEr
             .enable_safe_overflow_for_responses(true)
             // A request whose asker has given up must not be carried out later.
             .enable_fire_and_forget_requests(false)
-            .open_or_create_with_attributes(&layout::<R::Request, R::Reply>())
-            .map_err(|error| request_fault(R::NAME, error))
+            .open_or_create_with_attributes(&layout(question.layout))
+            .map_err(|error| request_fault(question.name, error))
     })
 }
 
 /// Opens or creates the event service beside a topic, for listeners of plain iceoryx2.
-pub(crate) fn event<T: Topic>(bus: &Bus) -> Result<EventService, PortError> {
-    patiently(bus, T::NAME, || {
+pub(crate) fn event(bus: &Bus, kind: &Kind) -> Result<EventService, PortError> {
+    patiently(bus, kind.name, || {
         bus.node()
-            .service_builder(&service_name(bus.robot(), T::NAME)?)
+            .service_builder(&service_name(bus.robot(), kind.name)?)
             .event()
             .max_listeners(MAX_STANDARD_LISTENERS)
-            .max_notifiers(T::QOS.max_publishers())
-            .max_nodes(T::QOS.max_nodes())
+            .max_notifiers(kind.qos.max_publishers())
+            .max_nodes(kind.qos.max_nodes())
             .event_id_max_value(MAX_EVENT_ID)
             .open_or_create()
-            .map_err(|error| event_fault(T::NAME, &T::QOS, error))
+            .map_err(|error| event_fault(kind.name, &kind.qos, error))
     })
 }
 
 /// The layout both sides must share: a difference refuses the service.
-pub(crate) fn layout<A: Payload, B: Schema>() -> AttributeVerifier {
+fn layout([first, second]: [u64; 2]) -> AttributeVerifier {
     let key = AttributeKey::new(SCHEMA_KEY.as_bytes()).expect("the key is short and not empty");
-    let value = AttributeValue::new(format!("{:016x}.{:016x}", A::HASH, B::HASH).as_bytes())
+    let value = AttributeValue::new(format!("{first:016x}.{second:016x}").as_bytes())
         .expect("two hashes are short and not empty");
     AttributeVerifier::new()
         .require(&key, &value)
@@ -264,8 +292,12 @@ fn crowded(topic: &str, limit: usize) -> Fault {
 
 /// A port that could not be made for want of resources.
 pub(crate) fn no_resources(topic: &str, detail: impl core::fmt::Debug) -> Fault {
-    Fault::Lasting(PortError::Transport {
-        topic: topic.to_owned(),
-        detail: format!("{detail:?}"),
+    let topic = topic.to_owned();
+    Fault::Lasting(match Shortage::now() {
+        Some(shortage) => PortError::Short { topic, shortage },
+        None => PortError::Transport {
+            topic,
+            detail: format!("{detail:?}"),
+        },
     })
 }

@@ -1,8 +1,15 @@
-//! Exact loss accounting: what a reader knows of each stream it has heard.
+//! What a reader believes of stamps: exact loss accounting, and which of two samples is newer.
 //!
 //! A stream is one publisher's life, `(writer, epoch)`, numbered from 0 without gaps. Pure, so
-//! that the law can be tested without a bus: **received + lost = sent**, for every stream that
-//! began after its reader, whatever was overwritten, once its last sample has been received.
+//! that the laws can be tested without a bus:
+//!
+//! * **received + lost = sent**, for every stream that began after its reader, whatever was
+//!   overwritten, once its last sample has been received.
+//! * **A stamp may be a lie**, by a damaged or foreign writer. So a gap counts only if it could
+//!   have been sent since the stream was last heard, a later lower number shows that a gap was
+//!   none, and a sample from the future is not newer than the present ([`Newest`]).
+
+use core::ops::Range;
 
 use lager_topics::Stamp;
 
@@ -10,10 +17,22 @@ use lager_topics::Stamp;
 /// restarted ones, and the longest silent is forgotten first.
 const REMEMBERED: usize = 128;
 
+/// No writer publishes samples faster than one in so many nanoseconds; the fastest seen takes
+/// a multiple of it.
+const SHORTEST_NS: u64 = 20;
+
+/// How far ahead of its reader's clock a stamp may be before it is passed over: all processes of
+/// a machine read the same clock, so nothing true is.
+const AHEAD_NS: u64 = 1_000_000_000;
+
 struct Stream {
     writer: u32,
     epoch: u64,
     next: u64,
+    /// The numbers counted as missed by the last sample.
+    gap: Range<u64>,
+    /// A moment after which the rest of the stream was sent.
+    heard_ns: u64,
 }
 
 /// Counters over all streams of one topic.
@@ -36,10 +55,9 @@ impl Streams {
         }
     }
 
-    /// Notes a received sample.
-    pub(crate) fn note(&mut self, stamp: &Stamp) {
+    /// Notes a received sample; `clock` is read where the stamp is not simply the next one.
+    pub(crate) fn note(&mut self, stamp: &Stamp, clock: impl Fn() -> u64) {
         self.received += 1;
-        let next = stamp.sequence.wrapping_add(1);
         let found = self
             .known
             .iter()
@@ -48,27 +66,41 @@ impl Streams {
             Some(index) => {
                 self.known[..=index].rotate_right(1);
                 let stream = &mut self.known[0];
-                // A number that was there before is a repetition and no loss.
-                self.lost += stamp.sequence.saturating_sub(stream.next);
-                stream.next = stream.next.max(next);
-            }
-            None => {
-                // A stream older than this reader begins with whatever it hears first; a younger
-                // one has been missed from its first sample on.
-                if stamp.epoch > self.attached_ns {
-                    self.lost += stamp.sequence;
+                if stamp.sequence == stream.next {
+                    stream.next = stream.next.saturating_add(1);
+                    stream.gap = 0..0;
+                    stream.heard_ns = stream.heard_ns.max(stamp.publish_time_ns);
+                } else {
+                    let (withdrawn, missed) = stream.jump(stamp, clock());
+                    self.lost = self.lost.saturating_sub(withdrawn).saturating_add(missed);
                 }
-                if self.known.len() == REMEMBERED {
-                    self.known.pop();
-                }
-                self.known.push(Stream {
-                    writer: stamp.writer,
-                    epoch: stamp.epoch,
-                    next,
-                });
-                self.known.rotate_right(1);
             }
+            None => self.meet(stamp, clock()),
         }
+    }
+
+    /// Takes up a stream that has not been heard before.
+    fn meet(&mut self, stamp: &Stamp, now_ns: u64) {
+        if stamp.sequence > sendable(stamp.epoch, now_ns) {
+            return;
+        }
+        // A stream older than this reader begins with whatever it hears first; a younger one has
+        // been missed from its first sample on.
+        let is_younger = stamp.epoch > self.attached_ns;
+        if is_younger {
+            self.lost = self.lost.saturating_add(stamp.sequence);
+        }
+        if self.known.len() == REMEMBERED {
+            self.known.pop();
+        }
+        self.known.push(Stream {
+            writer: stamp.writer,
+            epoch: stamp.epoch,
+            next: stamp.sequence.saturating_add(1),
+            gap: if is_younger { 0..stamp.sequence } else { 0..0 },
+            heard_ns: stamp.epoch.max(self.attached_ns).min(now_ns),
+        });
+        self.known.rotate_right(1);
     }
 
     /// Samples received.
@@ -87,16 +119,71 @@ impl Streams {
     }
 }
 
+impl Stream {
+    /// Goes on with a number that is not the next one. Returns how many losses counted before were
+    /// none after all, and how many are to be counted now.
+    fn jump(&mut self, stamp: &Stamp, now_ns: u64) -> (u64, u64) {
+        let mut withdrawn = 0;
+        if stamp.sequence < self.next {
+            if !self.gap.contains(&stamp.sequence) {
+                // It was there before: a repetition.
+                return (0, 0);
+            }
+            // Numbers only grow: the one behind the gap was not this writer's.
+            withdrawn = self.gap.end - self.gap.start;
+            self.next = self.gap.start;
+            self.gap = 0..0;
+        }
+        let missed = stamp.sequence - self.next;
+        self.heard_ns = self.heard_ns.min(now_ns);
+        if missed > sendable(self.heard_ns, now_ns) {
+            return (withdrawn, 0);
+        }
+        self.gap = self.next..stamp.sequence;
+        self.next = stamp.sequence.saturating_add(1);
+        self.heard_ns = self.heard_ns.max(stamp.publish_time_ns.min(now_ns));
+        (withdrawn, missed)
+    }
+}
+
+/// How many samples one writer can have sent between two moments.
+fn sendable(since_ns: u64, now_ns: u64) -> u64 {
+    now_ns.saturating_sub(since_ns) / SHORTEST_NS
+}
+
+/// When the newest sample of a state was published that a reader has taken. Several writers'
+/// samples come in no order, and a keeper's may be older than one seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Newest {
+    publish_ns: u64,
+}
+
+impl Newest {
+    /// Whether a sample published at `publish_ns` takes the place of what was taken before.
+    pub(crate) fn takes(&mut self, publish_ns: u64, now_ns: u64) -> bool {
+        if publish_ns < self.publish_ns || publish_ns > now_ns.saturating_add(AHEAD_NS) {
+            return false;
+        }
+        // A little ahead it counts as published now, so that it silences nobody.
+        self.publish_ns = publish_ns.min(now_ns);
+        true
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// The reader's clock, unless a test has one of its own.
+    const NOW: u64 = 1_000_000_000;
 
     fn stamp(writer: u32, epoch: u64, sequence: u64) -> Stamp {
         Stamp {
             writer,
             epoch,
             sequence,
+            publish_time_ns: epoch,
             ..Stamp::default()
         }
     }
@@ -104,7 +191,7 @@ mod tests {
     fn lost_after(stamps: &[Stamp]) -> u64 {
         let mut streams = Streams::new(100);
         for stamp in stamps {
-            streams.note(stamp);
+            streams.note(stamp, || NOW);
         }
         streams.lost()
     }
@@ -146,16 +233,143 @@ mod tests {
         let mut streams = Streams::new(100);
         let capacity = streams.known.capacity();
         for epoch in 0..10_000 {
-            streams.note(&stamp(1, 200 + epoch, 0));
+            streams.note(&stamp(1, 200 + epoch, 0), || NOW);
             // The writer that keeps talking is never forgotten.
-            streams.note(&stamp(7, 150, epoch));
+            streams.note(&stamp(7, 150, epoch), || NOW);
         }
         assert_eq!(streams.known.capacity(), capacity);
         assert_eq!(streams.lost(), 0);
         assert_eq!(streams.received(), 20_000);
     }
 
+    #[test]
+    fn one_impossible_number_changes_nothing() {
+        for lie in [u64::MAX, u64::MAX - 1, 1 << 40] {
+            assert_eq!(
+                lost_after(&[
+                    stamp(1, 200, 0),
+                    stamp(1, 200, lie),
+                    stamp(1, 200, 1),
+                    stamp(1, 200, 4)
+                ]),
+                2
+            );
+            // As a stream of its own, before or after the reader, or from the future.
+            for epoch in [50, 200, u64::MAX] {
+                assert_eq!(lost_after(&[stamp(9, epoch, lie), stamp(9, epoch, lie)]), 0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_gap_that_a_later_number_contradicts_was_none() {
+        let lie = stamp(1, 200, 1_000);
+        assert_eq!(
+            lost_after(&[stamp(1, 200, 0), lie, stamp(1, 200, 1)]),
+            0,
+            "the number right behind the one before the lie"
+        );
+        assert_eq!(
+            lost_after(&[stamp(1, 200, 0), lie, stamp(1, 200, 3), stamp(1, 200, 4)]),
+            2,
+            "the true gap is counted"
+        );
+        assert_eq!(
+            lost_after(&[stamp(1, 200, 1_000), stamp(1, 200, 3)]),
+            3,
+            "at the beginning of a stream"
+        );
+    }
+
+    #[test]
+    fn a_time_from_the_future_hides_losses_no_longer_than_until_the_next_sample() {
+        let at = |sequence, publish_time_ns| Stamp {
+            publish_time_ns,
+            ..stamp(1, 200, sequence)
+        };
+        let mut streams = Streams::new(100);
+        streams.note(&at(0, 200), || 1_000);
+        streams.note(&at(1, u64::MAX), || 2_000);
+        streams.note(&at(7, 3_000), || 3_000);
+        streams.note(&at(8, 4_000), || 4_000);
+        // The sample in between is taken for missed.
+        assert_eq!(streams.lost(), 6);
+    }
+
+    #[test]
+    fn a_state_is_replaced_by_a_newer_one_and_not_by_one_from_the_future() {
+        let mut newest = Newest::default();
+        assert!(newest.takes(NOW - 5, NOW));
+        assert!(!newest.takes(NOW - 6, NOW));
+        for lie in [NOW + AHEAD_NS + 1, u64::MAX] {
+            assert!(!newest.takes(lie, NOW), "{lie}");
+        }
+        assert!(newest.takes(NOW + AHEAD_NS, NOW), "a little ahead");
+        assert!(newest.takes(NOW + 1, NOW + 1), "and nobody is silenced");
+    }
+
     proptest! {
+        /// However stamps lie, each makes a reader count no more than one writer could have sent
+        /// since the reader is there, and a writer that speaks the truth is counted exactly.
+        #[test]
+        fn no_stamps_make_the_loss_absurd(
+            stamps in proptest::collection::vec(
+                (0..3_u32, any::<u64>(), any::<u64>(), any::<u64>(), 0..10_000_u64), 1..60),
+            small in any::<bool>(),
+        ) {
+            let mut streams = Streams::new(100);
+            let mut now = 100;
+            let scale = |value: u64| if small { value % 1_000 } else { value };
+            for (writer, epoch, sequence, publish_time_ns, pause) in &stamps {
+                now += pause;
+                let before = streams.lost();
+                streams.note(&Stamp {
+                    writer: *writer,
+                    epoch: scale(*epoch),
+                    sequence: scale(*sequence),
+                    publish_time_ns: scale(*publish_time_ns),
+                    ..Stamp::default()
+                }, || now);
+                prop_assert!(streams.lost() <= before + sendable(100, now));
+            }
+            let (lost, epoch) = (streams.lost(), now);
+            for sequence in 0..50 {
+                now += 1_000;
+                streams.note(&stamp(77, epoch, sequence * 2), || now);
+            }
+            prop_assert_eq!(streams.lost(), lost + 49);
+            prop_assert_eq!(streams.received(), stamps.len() as u64 + 50);
+        }
+
+        /// Between any two samples of a true stream somebody else uses its name once.
+        #[test]
+        fn a_liar_with_anothers_name_is_found_out(
+            stream in proptest::collection::vec(
+                (any::<bool>(), proptest::option::of(0..200_u64), any::<bool>()), 1..60),
+        ) {
+            let mut streams = Streams::new(100);
+            let (mut missed, mut lies, mut next) = (0, 0, 0);
+            let last = (true, None, false);
+            for (number, (is_kept, lie, is_huge)) in (0..).zip(stream.into_iter().chain([last])) {
+                if !is_kept {
+                    continue;
+                }
+                let now = 1_000_000 + number * 1_000;
+                let mut note = |sequence| {
+                    let sample = stamp(1, 200, sequence);
+                    streams.note(&Stamp { publish_time_ns: now, ..sample }, || now);
+                };
+                note(number);
+                missed += number - next;
+                next = number + 1;
+                if let Some(lie) = lie {
+                    note(if is_huge { u64::MAX - lie } else { lie });
+                    lies += 1;
+                }
+            }
+            prop_assert!(streams.lost().abs_diff(missed) <= lies);
+        }
+
         #[test]
         fn received_and_lost_are_all_that_was_sent(
             kept in proptest::collection::vec(
@@ -181,12 +395,12 @@ mod tests {
             for turn in turns {
                 let queue = turn.index(queues.len());
                 if let Some(stamp) = queues[queue].pop_front() {
-                    streams.note(&stamp);
+                    streams.note(&stamp, || NOW);
                 }
             }
             for queue in queues {
                 for stamp in queue {
-                    streams.note(&stamp);
+                    streams.note(&stamp, || NOW);
                 }
             }
             prop_assert_eq!(streams.received() + streams.lost(), sent);

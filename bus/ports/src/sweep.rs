@@ -35,6 +35,17 @@ pub(crate) fn dead_nodes(config: &Config) -> Result<usize, NodeListFailure> {
     Ok(removed)
 }
 
+/// Whether the files by which others find this node are there. A tag of a port brings its folder
+/// back, its details only come with itself.
+pub(crate) fn is_listed(config: &Config, node: &Node<Ipc>) -> bool {
+    let beside = PathBuf::from(config.global.node_dir().to_string());
+    let details = format!("{}node.details", config.global.prefix);
+    beside
+        .join(node.id().value().to_string())
+        .join(details)
+        .is_file()
+}
+
 fn remove(config: &Config, dead: DeadNodeView<Ipc>) -> bool {
     let files = Files::of(config, &dead);
     if dead.details().is_none() {

@@ -1,7 +1,8 @@
 //! The service type with which `ports` opens iceoryx2.
 //!
-//! It is iceoryx2's `ipc::Service` in all but one thing: what a port or a loan shares with its
-//! handles lives in a [`Pooled`] instead of an `Rc`, so that loaning does not go to the heap.
+//! It is iceoryx2's `ipc::Service` in all but two things: what a port or a loan shares with its
+//! handles lives in a [`Pooled`] instead of an `Rc`, so that loaning does not go to the heap; and
+//! segments are opened as a [`Storage`], which does not wait for ever for one that was never finished.
 //! Everything that another process can see, which is files, names, hashes, layouts and locks, is
 //! taken from `ipc::Service` itself. So stock processes, tools and bindings of the same version
 //! meet ours as they meet each other (tests/bus/interop.rs).
@@ -14,8 +15,16 @@ use iceoryx2::prelude::{ZeroCopySend, ipc};
 use iceoryx2::service::Service;
 use iceoryx2::service::internal::ServiceInternal;
 use iceoryx2_bb_elementary_traits::testing::abandonable::Abandonable;
+use iceoryx2_bb_lock_free::mpmc::counting_bit_set::RelocatableCountingBitSet;
+use iceoryx2_cal::event::trigger::State;
+use iceoryx2_cal::event::trigger::unix_datagram_socket::GenericUnixDatagramSocketTrigger;
+use iceoryx2_cal::resizable_shared_memory::dynamic::DynamicMemory;
+use iceoryx2_cal::shared_memory::common::details::{AllocatorDetails, Memory};
+use iceoryx2_cal::shm_allocator::pool_allocator::PoolAllocator;
+use iceoryx2_cal::zero_copy_connection::common::details::{Connection, SharedManagementData};
 
 use crate::pooled::Pooled;
+use crate::storage::Storage;
 
 /// iceoryx2 between processes, without the heap. Only a name for types: it has no values.
 #[derive(Clone, Debug)]
@@ -26,16 +35,17 @@ impl Service for Ipc {
 
     type StaticStorage = <ipc::Service as Service>::StaticStorage;
     type ConfigSerializer = <ipc::Service as Service>::ConfigSerializer;
-    type PersistentDynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> =
-        <ipc::Service as Service>::PersistentDynamicStorage<T>;
+    type PersistentDynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> = Storage<T>;
     type Bag = <ipc::Service as Service>::Bag;
-    type DynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> =
-        <ipc::Service as Service>::DynamicStorage<T>;
+    type DynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> = Storage<T>;
     type ServiceNameHasher = <ipc::Service as Service>::ServiceNameHasher;
-    type SharedMemory = <ipc::Service as Service>::SharedMemory;
-    type ResizableSharedMemory = <ipc::Service as Service>::ResizableSharedMemory;
-    type Connection = <ipc::Service as Service>::Connection;
-    type Event = <ipc::Service as Service>::Event;
+    type SharedMemory = Memory<PoolAllocator, Storage<AllocatorDetails<PoolAllocator>>>;
+    type ResizableSharedMemory = DynamicMemory<PoolAllocator, Self::SharedMemory>;
+    type Connection = Connection<Storage<SharedManagementData>>;
+    type Event = GenericUnixDatagramSocketTrigger<
+        RelocatableCountingBitSet,
+        Storage<State<RelocatableCountingBitSet, ()>>,
+    >;
     type Monitoring = <ipc::Service as Service>::Monitoring;
     type Reactor = <ipc::Service as Service>::Reactor;
     type BlackboardMgmt<T: Send + Sync + Debug + ZeroCopySend + 'static> =

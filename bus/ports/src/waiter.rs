@@ -82,6 +82,11 @@ pub enum Wake {
 /// Looks between two of the clock: reading it costs as much as some looks.
 const LOOKS: u32 = 64;
 
+/// How long to look before letting others run that wait for this core, in ns. Whatever brings the
+/// ring may be one of them: a writer, or a kernel thread that hands on a serial port's bytes. The
+/// kernel would let it wait for the rest of the looker's time, 2 ms and more.
+const GIVE_WAY_NS: u64 = 4_000;
+
 /// Of so many wakes one is taken to be for everything: samples may come without a ring, from writers
 /// that know of none.
 const WAKES: u32 = 16;
@@ -255,6 +260,7 @@ impl Waiter {
                 return true;
             }
             let end = until.min(deadline);
+            let mut gave_way = Clock::monotonic_ns();
             loop {
                 let found = look(done);
                 let now = Clock::monotonic_ns();
@@ -265,6 +271,10 @@ impl Waiter {
                 }
                 if now >= end {
                     break;
+                }
+                if now - gave_way >= GIVE_WAY_NS {
+                    std::thread::yield_now();
+                    gave_way = now;
                 }
             }
             if deadline <= end {

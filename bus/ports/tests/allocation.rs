@@ -67,22 +67,14 @@ fn nothing_is_allocated_per_frame() {
     assert_eq!(counted, 1, "the counter counts");
 
     let id = format!("lpa{}", std::process::id());
-    let root = std::env::temp_dir().join(&id);
     let config = BusConfig {
-        prefix: Some(format!("{id}_")),
-        root: Some(root.clone()),
+        folder: Some(std::path::Path::new("/dev/shm").join(id)),
         ..BusConfig::default()
     };
     for policy in [Policy::Block, Policy::Spin, Policy::ADAPTIVE] {
         exchange(&config, policy);
     }
-    std::fs::remove_dir_all(root).unwrap();
-    for entry in std::fs::read_dir("/dev/shm").unwrap() {
-        let path = entry.unwrap().path();
-        if path.file_name().unwrap().to_string_lossy().starts_with(&id) {
-            std::fs::remove_file(path).unwrap();
-        }
-    }
+    config.place().unwrap().remove();
 }
 
 /// Sensor frame to order, again and again, with observers attached.

@@ -10,8 +10,7 @@
 //! * [`Stamp`] is the header in front of every sample.
 //!
 //! **Invariant:** every bit pattern of every payload is a valid value. Enums travel as
-//! [`Tag`], text as [`Text`], so a foreign or broken writer cannot cause undefined
-//! behaviour in a reader.
+//! [`Tag`], so a foreign or broken writer cannot cause undefined behaviour in a reader.
 
 mod hash;
 pub mod list;
@@ -21,17 +20,15 @@ pub mod schema;
 mod stamp;
 pub mod table;
 mod tag;
-mod text;
 
 pub use payloads::*;
 pub use role::{Role, UnknownRole};
 pub use schema::{Field, FieldInfo, Payload, Schema};
 pub use stamp::Stamp;
 pub use table::{
-    BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, NavMap,
-    NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request, SERVICE_SLOTS, SensorDistance,
-    SensorLine, SteeringCommand, SteeringState, TOPICS, Topic, TopicEntry, TopicVisitor, TruthPose,
-    UnknownTopic, by_id, visit,
+    BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
+    NavBlocks, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request, SERVICE_SLOTS,
+    SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS, Topic, TopicEntry,
+    TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, visit,
 };
 pub use tag::{Coded, Tag};
-pub use text::Text;

@@ -6,8 +6,9 @@ use core::fmt;
 
 use crate::hash;
 use crate::payloads::{
-    Answer, Ask, DistanceFrame, Event, Health, Input, LineFrame, NavigatorStatus, Order,
-    PathLatency, Route, SteeringOrder, SteeringReport, Thought, Truth, WarehouseMap,
+    Answer, Ask, BlockedWays, DistanceFrame, Event, Health, Input, LineFrame, NavigatorStatus,
+    Order, OrderQueue, PathLatency, Route, SteeringOrder, SteeringReport, Thought, Truth,
+    WarehouseMap, WorldAnswer, WorldAsk,
 };
 use crate::role::Role;
 use crate::schema::{FieldInfo, Payload, Schema};
@@ -96,6 +97,10 @@ pub trait Request: 'static {
     const ACTOR: Role;
     /// One line for people.
     const SUMMARY: &'static str;
+
+    /// Writes into a request when it is asked, in ns of `CLOCK_MONOTONIC`, and for how long its
+    /// asker waits. Whoever answers refuses one whose time is over.
+    fn date(request: &mut Self::Request, issued_ns: u64, lifetime_ms: u32);
 }
 
 /// One line of [`TOPICS`].
@@ -223,20 +228,28 @@ topics! {
     "The nodes the robot means to pass.",
     { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
 
+    NavBlocks = "nav/blocks", BlockedWays,
+    "The ways on which something stands.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+
     MissionOrder = "mission/order", Order,
     "Products to fetch.",
     { buffer: 16, history: 0, publishers: 4, actors: &[Role::Logic], republish: false };
 
+    MissionQueue = "mission/queue", OrderQueue,
+    "The order under way and those that wait for their turn.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+
     MissionEvent = "mission/event", Event,
     "What happened on a mission.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[], republish: false };
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Comm], republish: false };
 
     OperatorInput = "operator/input", Input,
     "Buttons and acknowledgements of a person.",
     { buffer: 16, history: 0, publishers: 8, actors: &[Role::Logic, Role::Bridge], republish: false };
 
     LogThought = "log/thought", Thought,
-    "What the services say in words.",
+    "What the services think, for people to read.",
     { buffer: 64, history: 0, publishers: 8, actors: &[], republish: false };
 
     LatencyPath = "latency/path", PathLatency,
@@ -258,6 +271,29 @@ impl Request for BridgeRequest {
     type Reply = Answer;
     const ACTOR: Role = Role::Bridge;
     const SUMMARY: &'static str = "Changes of the mode and of settings.";
+
+    fn date(request: &mut Ask, issued_ns: u64, lifetime_ms: u32) {
+        request.issued_ns = issued_ns;
+        request.lifetime_ms = lifetime_ms;
+    }
+}
+
+/// `world/request`: what a person's hands do in the simulated world, answered by the simulator or
+/// the emulator. Real boards have nobody who answers.
+#[derive(Clone, Copy, Debug)]
+pub struct WorldRequest;
+
+impl Request for WorldRequest {
+    const NAME: &'static str = "world/request";
+    type Request = WorldAsk;
+    type Reply = WorldAnswer;
+    const ACTOR: Role = Role::Simulator;
+    const SUMMARY: &'static str = "What a person's hands do in the simulated world.";
+
+    fn date(request: &mut WorldAsk, issued_ns: u64, lifetime_ms: u32) {
+        request.issued_ns = issued_ns;
+        request.lifetime_ms = lifetime_ms;
+    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Payloads as tools see them: JSON, and memory written by somebody else.
 
 use lager_topics::{
-    BoardHealth, DistanceFrame, Finish, Health, LineFrame, MapProduct, Role, Route, RouteNode,
-    SERVO_UNKNOWN, Side, SteeringReport, TOPICS, Tag, Text, Thought, Topic, TopicVisitor, Truth,
-    WarehouseMap, visit,
+    BoardHealth, Coded, DistanceFrame, FailureKind, Finish, Health, Hold, LineFrame, MapProduct,
+    Remedy, Role, Route, RouteNode, SERVO_UNKNOWN, Side, SteeringReport, TOPICS, Tag, Thought,
+    ThoughtKind, Topic, TopicVisitor, Truth, WarehouseMap, visit,
 };
 use lager_wire::LineState;
 use serde::Serialize;
@@ -71,10 +71,10 @@ fn a_list_shows_its_used_part_and_comes_back_whole() {
 
 #[test]
 fn a_list_longer_than_its_place_is_refused() {
-    let nodes: Vec<_> = (0..257).map(|_| RouteNode { x: 1, y: 1 }).collect();
-    let text = serde_json::json!({"length": 257, "nodes": nodes}).to_string();
+    let nodes: Vec<_> = (0..513).map(|_| RouteNode { x: 1, y: 1 }).collect();
+    let text = serde_json::json!({"length": 513, "nodes": nodes}).to_string();
     let error = serde_json::from_str::<Route>(&text).unwrap_err();
-    assert!(error.to_string().contains("at most 256"), "{error}");
+    assert!(error.to_string().contains("at most 512"), "{error}");
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_count_beyond_the_list_does_not_panic() {
         length: u16::MAX,
         ..Route::default()
     };
-    assert_eq!(route.nodes().len(), 256);
+    assert_eq!(route.nodes().len(), 512);
     let truth = Truth {
         good_count: u16::MAX,
         ..Truth::default()
@@ -92,16 +92,32 @@ fn a_count_beyond_the_list_does_not_panic() {
 }
 
 #[test]
-fn a_sentence_names_its_speaker() {
+fn a_thought_is_values_and_becomes_a_sentence_where_it_is_read() {
     let thought = Thought {
-        text: Text::new("Jag är framme."),
         from: Role::Logic.into(),
+        product: 7,
+        seen: 3,
+        ..ThoughtKind::Fetching.into()
     };
+    let told = json(&thought);
     assert_eq!(
-        json(&thought),
-        serde_json::json!({"text": "Jag är framme.", "from": "Logic"})
+        (&told["kind"], &told["from"], &told["seen"]),
+        (&"Fetching".into(), &"Logic".into(), &3.into())
     );
     assert_eq!(there_and_back(&thought), thought);
+    assert_eq!(thought.to_string(), "I fetch product 7; 3 crossings to go.");
+}
+
+#[test]
+fn every_failure_and_every_hold_but_none_names_what_would_end_it() {
+    for (kind, name) in FailureKind::VARIANTS {
+        let ended_already = matches!(kind, FailureKind::None | FailureKind::PutDown);
+        assert_eq!(kind.remedy() == Remedy::None, ended_already, "{name}");
+    }
+    for (hold, name) in Hold::VARIANTS {
+        let none = *hold == Hold::None;
+        assert_eq!(hold.remedy() == Remedy::None, none, "{name}");
+    }
 }
 
 #[test]

@@ -5,8 +5,8 @@
 //! board status   reset  bad     lost  refused  exde  timeouts  load %  longest loop
 //! ```
 
+use crate::bytes::{Bytes, Fault};
 use crate::handshake::ResetCause;
-use crate::payload::{Bytes, Fault};
 
 /// One servo of the arm, as it last answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -4,13 +4,14 @@
 //! payload byte 0   bits 0-1 synack, bits 2-7 callsign      the original's one byte (U12)
 //! payload byte 1   version of the packet rules             version 1 only
 //! payload byte 2   why the board started                   version 1 only
-//! payload 3 to 7   0
+//! payload byte 3   1: it has been up since it started      version 1 only
+//! payload 4 to 7   0
 //! ```
 //!
 //! It is apart because the link machines decide what a handshake means; here it is only bytes.
 
+use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
-use crate::payload::{Bytes, Fault, unused_from};
 
 coded! {
     /// The rules a packet is built by.
@@ -78,6 +79,10 @@ pub struct Handshake {
     pub version: Version,
     /// Why the sender started; always `Unknown` from an original board.
     pub reset: ResetCause,
+    /// Whether the link has been up since the sender started. A board that asks again and says no
+    /// has started anew, however long it was silent before. Always `false` from the Pi and from an
+    /// original board.
+    pub was_up: bool,
 }
 
 impl Handshake {
@@ -91,6 +96,7 @@ impl Handshake {
         if version == Version::One {
             payload[1] = version.code();
             payload[2] = self.reset.code();
+            payload[3] = self.was_up.into();
         }
     }
 
@@ -101,8 +107,8 @@ impl Handshake {
         ) else {
             return Err(Fault { index: 0 });
         };
-        let reset = match version {
-            Version::Original => ResetCause::Unknown,
+        let (reset, was_up) = match version {
+            Version::Original => (ResetCause::Unknown, false),
             Version::One => {
                 if sign == Callsign::Error {
                     return Err(Fault { index: 0 });
@@ -110,8 +116,14 @@ impl Handshake {
                 if payload[1] != version.code() {
                     return Err(Fault { index: 1 });
                 }
-                unused_from(3, payload)?;
-                ResetCause::from_code(payload[2]).ok_or(Fault { index: 2 })?
+                let reset = ResetCause::from_code(payload[2]).ok_or(Fault { index: 2 })?;
+                let was_up = match payload[3] {
+                    0 => false,
+                    1 => true,
+                    _ => return Err(Fault { index: 3 }),
+                };
+                unused_from(4, payload)?;
+                (reset, was_up)
             }
         };
         Ok(Self {
@@ -119,6 +131,7 @@ impl Handshake {
             sign,
             version,
             reset,
+            was_up,
         })
     }
 }

@@ -14,7 +14,9 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod arm;
 mod board;
+mod bytes;
 mod coded;
 mod command;
 mod crc;
@@ -29,7 +31,9 @@ mod setting;
 mod steer;
 mod text;
 
+pub use arm::{ArmLimits, ArmPose, ArmProfile, ArmProfileError, JointLimits, SERVO_MAX};
 pub use board::{ArmData, BoardStatus};
+pub use bytes::PAYLOAD_LENGTH;
 pub use command::{ArmCommand, Command, WheelCommand};
 pub use crc::checksum;
 pub use decoder::{Decoder, DecoderCounters};
@@ -37,7 +41,7 @@ pub use handshake::{Callsign, Handshake, ResetCause, SynAck, Version};
 pub use line::{Centimetres, LineBits, LineState};
 pub use operator::{OperatorArm, OperatorCommand};
 pub use packet::{DecodeError, END, MIN_LENGTH, PACKET_LENGTH, Packet, PacketId};
-pub use payload::{Kind, PAYLOAD_LENGTH, Payload};
+pub use payload::{Kind, Payload};
 pub use setting::{Setting, SettingKey, SettingReply, SettingStatus};
 pub use steer::{SteerCommand, SteerData, SteerFlags};
 pub use text::{Binary, CodeTextError, parse_code};

@@ -2,9 +2,9 @@
 
 use core::fmt;
 
+use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
 use crate::handshake::Version;
-use crate::payload::{Bytes, Fault, unused_from};
 
 coded! {
     /// The robot's position on the line (U13), as the robot stands: `LeftOfLine` means that the

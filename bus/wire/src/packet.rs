@@ -11,9 +11,10 @@
 
 use core::fmt;
 
+use crate::bytes::PAYLOAD_LENGTH;
 use crate::crc::checksum;
 use crate::handshake::Version;
-use crate::payload::{Kind, PAYLOAD_LENGTH, Payload};
+use crate::payload::{Kind, Payload};
 
 /// The length of a full packet (U8), and of every version-1 packet.
 pub const PACKET_LENGTH: usize = 11;

@@ -4,33 +4,12 @@
 //! every byte it can (unused bytes, complements, ranges), the original checks what it must.
 
 use crate::board::{ArmData, BoardStatus};
+use crate::bytes::{Bytes, Fault};
 use crate::coded::coded;
 use crate::handshake::{Callsign, Handshake, Version};
 use crate::line::{Centimetres, LineBits, LineState};
 use crate::setting::{Setting, SettingReply};
 use crate::steer::{SteerCommand, SteerData};
-
-/// How many payload bytes a full packet has (U7).
-pub const PAYLOAD_LENGTH: usize = 8;
-
-/// The payload part of a packet; bytes beyond a short packet's payload are 0.
-pub(crate) type Bytes = [u8; PAYLOAD_LENGTH];
-
-/// The payload byte that breaks a rule.
-pub(crate) struct Fault {
-    pub(crate) index: u8,
-}
-
-/// Version 1's rule that bytes without a meaning are 0.
-pub(crate) fn unused_from(first: u8, payload: &Bytes) -> Result<(), Fault> {
-    match (first..)
-        .zip(&payload[usize::from(first)..])
-        .find(|(_, byte)| **byte != 0)
-    {
-        Some((index, _)) => Err(Fault { index }),
-        None => Ok(()),
-    }
-}
 
 coded! {
     /// A packet's kind, the high nibble of its first byte (U5). 6 to 9 exist in version 1 only.

@@ -4,9 +4,11 @@
 //! setting   key  seq  value low  value high  !key    !seq  0  0
 //! reply     key  seq  value low  value high  status  0     0  0
 //! ```
+//!
+//! The keys from [`SettingKey::ArmTorqueLimit`] on are the values of an [`crate::ArmProfile`].
 
+use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;
-use crate::payload::{Bytes, Fault, unused_from};
 
 coded! {
     /// What can be set.
@@ -19,6 +21,57 @@ coded! {
         RawLine = 3,
         /// Starts the line sensor's calibration.
         Calibrate = 4,
+        /// Puts the arm's profile that was told before in force; the value is its check value
+        /// ([`crate::ArmProfile::check`]).
+        ArmProfile = 15,
+        /// Torque limit of the arm's servos, 1 to 1023.
+        ArmTorqueLimit = 16,
+        /// Load that ends a squeeze, 1 to 1023.
+        ArmSqueezeLoad = 17,
+        /// Position of the open gripper.
+        ArmGripperOpen = 18,
+        /// Position of the gripper closed on nothing.
+        ArmGripperClosed = 19,
+        /// Least position of the base.
+        ArmBaseLowest = 20,
+        /// Greatest position of the base.
+        ArmBaseHighest = 21,
+        /// Least position of the shoulder.
+        ArmShoulderLowest = 22,
+        /// Greatest position of the shoulder.
+        ArmShoulderHighest = 23,
+        /// Least position of the elbow.
+        ArmElbowLowest = 24,
+        /// Greatest position of the elbow.
+        ArmElbowHighest = 25,
+        /// Least position of the wrist.
+        ArmWristLowest = 26,
+        /// Greatest position of the wrist.
+        ArmWristHighest = 27,
+        /// Least position of the rotation.
+        ArmRotationLowest = 28,
+        /// Greatest position of the rotation.
+        ArmRotationHighest = 29,
+        /// Least position of the gripper.
+        ArmGripperLowest = 30,
+        /// Greatest position of the gripper.
+        ArmGripperHighest = 31,
+        /// Position of the base in the neutral pose.
+        ArmNeutralBase = 32,
+        /// Position of the shoulder in the neutral pose.
+        ArmNeutralShoulder = 33,
+        /// Position of the elbow in the neutral pose.
+        ArmNeutralElbow = 34,
+        /// Position of the wrist in the neutral pose.
+        ArmNeutralWrist = 35,
+        /// Position of the base in the drop pose.
+        ArmDropBase = 36,
+        /// Position of the shoulder in the drop pose.
+        ArmDropShoulder = 37,
+        /// Position of the elbow in the drop pose.
+        ArmDropElbow = 38,
+        /// Position of the wrist in the drop pose.
+        ArmDropWrist = 39,
     }
 }
 

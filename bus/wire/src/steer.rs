@@ -9,9 +9,9 @@
 //!
 //! The complements are there so that noise cannot move the robot even where a CRC fits by chance.
 
+use crate::bytes::{Bytes, Fault, PAYLOAD_LENGTH, unused_from};
 use crate::command::Command;
 use crate::handshake::Version;
-use crate::payload::{Bytes, Fault, PAYLOAD_LENGTH, unused_from};
 use crate::text::binary_digits;
 
 /// A command to the steering board.
@@ -80,9 +80,11 @@ impl SteerFlags {
     pub const RIGHT_REVERSE: Self = Self(2);
     /// The arm lock is closed (T4).
     pub const ARM_LOCKED: Self = Self(4);
-    /// Line words arrive from the sensor board.
+    /// Line words arrive from the sensor board, and following was not given up for their want.
     pub const EXDE_OK: Self = Self(8);
-    /// The command grew too old and the board has stopped by itself.
+    /// The board has stopped by itself: the command grew too old, or following has lost its line.
+    /// The latter ends that command (`ABORTED` under its number), and nothing but another command
+    /// turns the wheels again; without `EXDE_OK` it lost the words, with it the tape in them.
     pub const FAILSAFE: Self = Self(16);
     /// The command numbered `finished_seq` was broken off.
     pub const ABORTED: Self = Self(32);

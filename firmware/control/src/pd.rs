@@ -4,6 +4,10 @@
 //! from the sensor board; D is a difference over ten milliseconds however often words come, so that the
 //! gains mean the same at every baud rate. Words that come at another pace are scaled to it.
 //!
+//! Where the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the sign
+//! of `e`. A robot whose motors need much duty for little speed gets round the tightest bend by it;
+//! without, the error stands at its end there, and the least disturbance more loses the line.
+//!
 //! ```text
 //!   samples:   ...  e3   e2   e1   e(now)
 //!   age in ms:      15   10    5     0
@@ -27,6 +31,9 @@ impl Default for Gains {
         Self { p: 2, d: 2 }
     }
 }
+
+/// Beyond this error, in half sensor steps, the line is under the outer sensors.
+const OUTER: i8 = 5;
 
 /// The time D is a difference over, in microseconds.
 const SPAN_US: u32 = 10_000;
@@ -81,7 +88,8 @@ impl Pd {
         if since_us > STALE_US {
             self.count = 0;
         }
-        let p = i16::from(self.gains.p) * i16::from(error);
+        let beyond = error - error.clamp(-OUTER, OUTER);
+        let p = i16::from(self.gains.p) * i16::from(error + beyond);
         let d = self.derivative(error, now_us);
         if self.count == 0 || since_us >= SPACING_US {
             self.remember(Sample {

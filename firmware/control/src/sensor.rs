@@ -186,7 +186,7 @@ impl SensorUnit {
                 i16::from(self.calibration.is_running()),
                 SettingStatus::OutOfRange,
             ),
-            (SettingKey::GainP | SettingKey::GainD, _) => (0, SettingStatus::NotHere),
+            _ => (0, SettingStatus::NotHere),
         };
         SettingReply {
             key: setting.key,

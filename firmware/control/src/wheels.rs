@@ -8,11 +8,13 @@
 //! ```
 //!
 //! Every wheel command replaces the mode before it; only a turn ends by itself. In all modes but following
-//! the duty is the standard one or 0.
+//! the duty is the standard one or 0. Following is watched ([`crate::follow`]): without words or tape it is
+//! given up, and stays so until the next command.
 
 use lager_wire::{LineBits, WheelCommand};
 
-use crate::turn::{Angle, Turn, Way};
+use crate::follow::{Follow, Lost};
+use crate::turn::{Angle, Rotation, Turn};
 use crate::{Motor, PWM_STANDARD};
 
 /// Duties of both sides, left first.
@@ -32,12 +34,16 @@ pub(crate) enum Along {
 enum Mode {
     Standby,
     Manual(WheelCommand),
-    Follow(Along),
+    Follow {
+        along: Along,
+        seq: u8,
+        watch: Follow,
+    },
     /// `under_way` is empty until the wheels may turn.
     Turn {
         command: WheelCommand,
         seq: u8,
-        way: Way,
+        rotation: Rotation,
         angle: Angle,
         under_way: Option<Turn>,
     },
@@ -57,13 +63,18 @@ impl Wheels {
     }
 
     /// Takes up the mode of a command, in place of what was.
-    pub(crate) fn start(&mut self, command: WheelCommand, seq: u8) {
-        let turn = |way, angle| Mode::Turn {
+    pub(crate) fn start(&mut self, command: WheelCommand, seq: u8, now_us: u32) {
+        let turn = |rotation, angle| Mode::Turn {
             command,
             seq,
-            way,
+            rotation,
             angle,
             under_way: None,
+        };
+        let follow = |along| Mode::Follow {
+            along,
+            seq,
+            watch: Follow::new(now_us),
         };
         self.mode = match command {
             WheelCommand::Standby => Mode::Standby,
@@ -71,12 +82,12 @@ impl Wheels {
             | WheelCommand::ManualBackward
             | WheelCommand::ManualLeft
             | WheelCommand::ManualRight => Mode::Manual(command),
-            WheelCommand::ActiveForward => Mode::Follow(Along::Forward),
-            WheelCommand::ActiveBackward => Mode::Follow(Along::Backward),
-            WheelCommand::LeftPerp => turn(Way::Left, Angle::Perpendicular),
-            WheelCommand::LeftDiag => turn(Way::Left, Angle::Diagonal),
-            WheelCommand::RightPerp => turn(Way::Right, Angle::Perpendicular),
-            WheelCommand::RightDiag => turn(Way::Right, Angle::Diagonal),
+            WheelCommand::ActiveForward => follow(Along::Forward),
+            WheelCommand::ActiveBackward => follow(Along::Backward),
+            WheelCommand::LeftPerp => turn(Rotation::Left, Angle::Perpendicular),
+            WheelCommand::LeftDiag => turn(Rotation::Left, Angle::Diagonal),
+            WheelCommand::RightPerp => turn(Rotation::Right, Angle::Perpendicular),
+            WheelCommand::RightDiag => turn(Rotation::Right, Angle::Diagonal),
         };
     }
 
@@ -93,7 +104,7 @@ impl Wheels {
     pub(crate) fn advance(&mut self, may_turn: bool, now_us: u32) -> Option<u8> {
         let Mode::Turn {
             seq,
-            way,
+            rotation,
             angle,
             under_way,
             ..
@@ -110,7 +121,7 @@ impl Wheels {
             Some(_) => None,
             None => {
                 if may_turn {
-                    *under_way = Some(Turn::new(*way, *angle, now_us));
+                    *under_way = Some(Turn::new(*rotation, *angle, now_us));
                 }
                 None
             }
@@ -119,12 +130,29 @@ impl Wheels {
 
     /// A word from the sensor board.
     pub(crate) fn on_word(&mut self, bits: LineBits, at_us: u32) {
-        if let Mode::Turn {
-            under_way: Some(turn),
-            ..
-        } = &mut self.mode
-        {
-            turn.on_word(bits, at_us);
+        match &mut self.mode {
+            Mode::Turn {
+                under_way: Some(turn),
+                ..
+            } => turn.on_word(bits, at_us),
+            Mode::Follow { watch, .. } => watch.on_word(bits, at_us),
+            _ => {}
+        }
+    }
+
+    /// Gives up a following that has lost its words or its tape; its number, once.
+    pub(crate) fn give_up(&mut self, now_us: u32) -> Option<u8> {
+        match &mut self.mode {
+            Mode::Follow { seq, watch, .. } => watch.gives_up(now_us).then_some(*seq),
+            _ => None,
+        }
+    }
+
+    /// For want of what following was given up, until the next command.
+    pub(crate) fn lost(&self) -> Option<Lost> {
+        match &self.mode {
+            Mode::Follow { watch, .. } => watch.lost(),
+            _ => None,
         }
     }
 
@@ -137,15 +165,17 @@ impl Wheels {
             Mode::Manual(WheelCommand::ManualBackward) => (back, back),
             Mode::Manual(WheelCommand::ManualLeft) => (back, ahead),
             Mode::Manual(WheelCommand::ManualRight) => (ahead, back),
-            Mode::Follow(along) => correction.map_or(STILL, |u| follow(*along, u)),
+            Mode::Follow { along, watch, .. } if watch.lost().is_none() => {
+                correction.map_or(STILL, |u| follow(*along, u))
+            }
             Mode::Turn {
                 under_way: Some(turn),
                 ..
-            } => match turn.way() {
-                Way::Left => (back, ahead),
-                Way::Right => (ahead, back),
+            } => match turn.rotation() {
+                Rotation::Left => (back, ahead),
+                Rotation::Right => (ahead, back),
             },
-            Mode::Standby | Mode::Manual(_) | Mode::Turn { .. } => STILL,
+            Mode::Standby | Mode::Manual(_) | Mode::Follow { .. } | Mode::Turn { .. } => STILL,
         }
     }
 
@@ -157,23 +187,46 @@ impl Wheels {
         matches!(self.mode, Mode::Turn { .. })
     }
 
+    /// Whether a line is followed.
+    pub(crate) fn follows(&self) -> bool {
+        matches!(self.mode, Mode::Follow { .. })
+    }
+
+    /// Whether the line is followed forwards.
+    pub(crate) fn follows_forward(&self) -> bool {
+        matches!(
+            self.mode,
+            Mode::Follow {
+                along: Along::Forward,
+                ..
+            }
+        )
+    }
+
     /// The command this mode is.
     pub(crate) fn command(&self) -> WheelCommand {
         match self.mode {
             Mode::Standby => WheelCommand::Standby,
             Mode::Manual(command) | Mode::Turn { command, .. } => command,
-            Mode::Follow(Along::Forward) => WheelCommand::ActiveForward,
-            Mode::Follow(Along::Backward) => WheelCommand::ActiveBackward,
+            Mode::Follow {
+                along: Along::Forward,
+                ..
+            } => WheelCommand::ActiveForward,
+            Mode::Follow {
+                along: Along::Backward,
+                ..
+            } => WheelCommand::ActiveBackward,
         }
     }
 
-    /// When a turn under way ends at the latest.
+    /// When a turn under way ends at the latest, or following is given up if nothing comes.
     pub(crate) fn next_due_us(&self) -> Option<u32> {
         match &self.mode {
             Mode::Turn {
                 under_way: Some(turn),
                 ..
             } => Some(turn.ends_us()),
+            Mode::Follow { watch, .. } => watch.next_due_us(),
             _ => None,
         }
     }
@@ -238,7 +291,7 @@ mod tests {
     #[test]
     fn a_turn_waits_until_it_may_begin_and_then_has_its_whole_time() {
         let mut wheels = Wheels::new();
-        wheels.start(WheelCommand::RightDiag, 5);
+        wheels.start(WheelCommand::RightDiag, 5, 0);
         assert_eq!(wheels.advance(false, 0), None);
         assert_eq!(wheels.motors(None), STILL);
         assert_eq!(wheels.advance(true, 10_000), None);
@@ -254,7 +307,7 @@ mod tests {
     #[test]
     fn without_a_line_following_stands_still() {
         let mut wheels = Wheels::new();
-        wheels.start(WheelCommand::ActiveForward, 1);
+        wheels.start(WheelCommand::ActiveForward, 1, 0);
         assert_eq!(wheels.motors(None), STILL);
         assert_eq!(
             wheels.motors(Some(4)),

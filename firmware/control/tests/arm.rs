@@ -5,7 +5,7 @@ mod support;
 use lager_control::SteeringConfig;
 use lager_wire::SteerFlags;
 use support::Bench;
-use support::arm::{arm_data, done};
+use support::arm::{arm_data, done, refused};
 use support::servos::Servos;
 
 const CLOCKWISE: u8 = 0xF1;
@@ -73,18 +73,33 @@ fn every_step_moves_its_joint_three_units_its_way() {
 }
 
 #[test]
-fn steps_stay_inside_the_limits() {
+fn steps_end_at_the_limits_and_are_refused_there() {
     let mut config = SteeringConfig::default();
-    config.arm.limits[0].highest = 514;
+    config.arm.profile.limits.base.highest = 514;
     let mut bench = Bench::ready_with(config, Servos::at([512; 8]));
-    for _ in 0..3 {
-        done(&mut bench, LEFT, 100);
+    done(&mut bench, LEFT, 100);
+    assert_eq!(bench.pins.servos.positions()[0], 514, "two of the three");
+    for count in 1..=3 {
+        refused(&mut bench, LEFT);
+        assert_eq!(bench.status().refused, count);
     }
     assert_eq!(bench.pins.servos.positions()[0], 514);
+    done(&mut bench, RIGHT, 100);
+    assert_eq!(bench.pins.servos.positions()[0], 511, "back is allowed");
     let mut bench = Bench::ready_with(SteeringConfig::default(), Servos::at([1; 8]));
     done(&mut bench, RIGHT, 100);
-    done(&mut bench, RIGHT, 100);
+    refused(&mut bench, RIGHT);
     assert_eq!(bench.pins.servos.positions()[0], 0);
+}
+
+#[test]
+fn an_arm_outside_its_limits_is_only_stepped_back() {
+    let mut config = SteeringConfig::default();
+    config.arm.profile.limits.base.highest = 600;
+    let mut bench = Bench::ready_with(config, Servos::at([700; 8]));
+    refused(&mut bench, LEFT);
+    done(&mut bench, RIGHT, 100);
+    assert_eq!(bench.pins.servos.positions()[0], 697, "a step, no leap");
 }
 
 #[test]
@@ -174,8 +189,8 @@ fn a_squeeze_on_nothing_ends_closed() {
 #[test]
 fn a_gripper_that_closes_the_other_way_is_a_matter_of_numbers() {
     let mut config = SteeringConfig::default();
-    config.arm.gripper_open = 500;
-    config.arm.gripper_closed = 560;
+    config.arm.profile.gripper_open = 500;
+    config.arm.profile.gripper_closed = 560;
     let mut servos = Servos::at([512; 8]);
     servos.id(8).position = 500.0;
     let mut bench = Bench::ready_with(config, servos);
@@ -189,21 +204,21 @@ fn drop_lowers_opens_and_comes_back_up() {
     servos.id(8).stop = 399.0;
     let mut bench = Bench::ready_with(SteeringConfig::default(), servos);
     done(&mut bench, DROP, 12_000);
-    let config = SteeringConfig::default().arm;
+    let config = SteeringConfig::default().arm.profile;
     let shoulder = &bench.pins.servos.id(2).goals;
     assert_eq!(
         shoulder[shoulder.len() - 2..],
-        [config.drop.shoulder, config.carry.shoulder]
+        [config.drop.shoulder, config.neutral.shoulder]
     );
     assert_eq!(
         bench.pins.servos.positions(),
         [
-            config.carry.base,
-            config.carry.shoulder,
-            1023 - config.carry.shoulder,
-            config.carry.elbow,
-            1023 - config.carry.elbow,
-            config.carry.wrist,
+            config.neutral.base,
+            config.neutral.shoulder,
+            1023 - config.neutral.shoulder,
+            config.neutral.elbow,
+            1023 - config.neutral.elbow,
+            config.neutral.wrist,
             512,
             config.gripper_open,
         ]
@@ -228,7 +243,7 @@ fn drop_opens_only_when_the_arm_is_down() {
         }
     }
     assert_eq!(bench.pins.servos.id(8).goals.last(), Some(&512));
-    let low = SteeringConfig::default().arm.drop.shoulder;
+    let low = SteeringConfig::default().arm.profile.drop.shoulder;
     assert!(bench.pins.servos.positions()[1].abs_diff(low) <= 6);
 }
 

@@ -169,21 +169,124 @@ fn without_words_there_is_no_following() {
 }
 
 #[test]
-fn turns_last_their_time_and_are_done() {
-    for (code, motors, ms) in [
-        (LEFT_PERP, TURNING_LEFT, 3_000),
-        (RIGHT_PERP, TURNING_RIGHT, 3_000),
-        (LEFT_DIAG, TURNING_LEFT, 1_500),
-        (RIGHT_DIAG, TURNING_RIGHT, 1_500),
-    ] {
+fn following_that_lost_its_words_is_over_until_another_command() {
+    for code in [FOLLOW, FOLLOW_BACK] {
+        let mut bench = Bench::ready();
+        let seq = bench.command(code);
+        bench.run_ms(500);
+        assert_ne!(bench.pins.motors, OFF);
+        bench.line = None;
+        bench.pins.motor_log.clear();
+        bench.run_ms(110);
+        let report = bench.report();
+        assert_eq!((report.finished_seq, report.code), (seq, code));
+        assert!(flag(&bench, SteerFlags::FAILSAFE) && flag(&bench, SteerFlags::ABORTED));
+        assert!(!flag(&bench, SteerFlags::EXDE_OK), "and why");
+        bench.line = Some(MIDDLE);
+        bench.run_ms(2_000);
+        assert_eq!(bench.pins.motors, OFF, "renewing does not start it");
+        assert_eq!(bench.pins.motor_log.len(), 1, "off once");
+        assert!(flag(&bench, SteerFlags::FAILSAFE) && !flag(&bench, SteerFlags::EXDE_OK));
+        bench.command(code);
+        bench.run_ms(20);
+        assert_ne!(bench.pins.motors, OFF);
+        assert!(!flag(&bench, SteerFlags::FAILSAFE) && flag(&bench, SteerFlags::EXDE_OK));
+    }
+}
+
+#[test]
+fn following_that_lost_its_tape_is_over_until_another_command() {
+    for code in [FOLLOW, FOLLOW_BACK] {
+        let mut bench = Bench::ready();
+        bench.command(code);
+        bench.run_ms(500);
+        // A gap that closes is one.
+        bench.line = Some(0);
+        bench.run_ms(1_900);
+        bench.line = Some(MIDDLE);
+        bench.run_ms(100);
+        assert_ne!(bench.pins.motors, OFF);
+        bench.line = Some(0);
+        bench.run_ms(1_950);
+        assert_ne!(bench.pins.motors, OFF);
+        bench.pins.motor_log.clear();
+        bench.run_ms(100);
+        let report = bench.report();
+        assert_eq!(report.finished_seq, bench.seq());
+        assert!(flag(&bench, SteerFlags::FAILSAFE) && flag(&bench, SteerFlags::ABORTED));
+        assert!(flag(&bench, SteerFlags::EXDE_OK), "the words are there");
+        bench.line = Some(MIDDLE);
+        bench.run_ms(2_000);
+        assert_eq!(bench.pins.motors, OFF, "tape alone does not start it");
+        assert_eq!(bench.pins.motor_log.len(), 1, "off once");
+        bench.command(STANDBY);
+        bench.run_ms(20);
+        assert!(!flag(&bench, SteerFlags::FAILSAFE));
+        bench.command(code);
+        bench.run_ms(20);
+        assert_ne!(bench.pins.motors, OFF);
+    }
+}
+
+#[test]
+fn only_following_needs_words_and_tape() {
+    for code in [FORWARD, BACKWARD, LEFT, RIGHT] {
         let mut bench = Bench::ready();
         bench.line = Some(0);
+        bench.command(code);
+        bench.run_ms(3_000);
+        bench.line = None;
+        bench.run_ms(3_000);
+        assert_ne!(bench.pins.motors, OFF, "code {code}");
+        assert!(!flag(&bench, SteerFlags::FAILSAFE));
+    }
+}
+
+#[test]
+fn the_arm_is_locked_until_the_first_standby() {
+    let mut bench = Bench::boot(0, SteeringConfig::default(), Servos::at([512; 8]));
+    bench.line = Some(MIDDLE);
+    bench.run_ms(300);
+    assert!(flag(&bench, SteerFlags::ARM_LOCKED));
+    let goals = bench.pins.servos.id(2).goals.len();
+    let seq = bench.command(ARM_UP);
+    bench.run_ms(300);
+    assert_eq!(bench.report().finished_seq, seq);
+    assert!(flag(&bench, SteerFlags::REFUSED));
+    assert_eq!(bench.pins.servos.id(2).goals.len(), goals, "nothing moved");
+    // A turn ends in a standby of the board's own, which is not the Pi's word.
+    bench.line = Some(0);
+    bench.command(LEFT_DIAG);
+    bench.run_ms(2_000);
+    assert!(flag(&bench, SteerFlags::ARM_LOCKED));
+    bench.command(STANDBY);
+    bench.run_ms(20);
+    assert!(!flag(&bench, SteerFlags::ARM_LOCKED));
+    let seq = bench.command(ARM_UP);
+    bench.run_ms(300);
+    assert_eq!(bench.report().finished_seq, seq);
+    assert!(!flag(&bench, SteerFlags::REFUSED));
+    assert!(bench.pins.servos.id(2).goals.len() > goals);
+}
+
+#[test]
+fn turns_last_their_time_and_three_eighths_more_where_no_tape_comes() {
+    for (code, motors, line, ms) in [
+        (LEFT_PERP, TURNING_LEFT, None, 3_000),
+        (RIGHT_PERP, TURNING_RIGHT, None, 3_000),
+        (LEFT_DIAG, TURNING_LEFT, None, 1_500),
+        (RIGHT_DIAG, TURNING_RIGHT, None, 1_500),
+        (LEFT_PERP, TURNING_LEFT, Some(0), 4_125),
+        (RIGHT_DIAG, TURNING_RIGHT, Some(0), 2_062),
+    ] {
+        let mut bench = Bench::ready();
+        bench.line = line;
         let seq = bench.command(code);
         bench.run_ms(1_000);
         assert_eq!(bench.pins.motors, motors);
         assert!(flag(&bench, SteerFlags::BUSY) && flag(&bench, SteerFlags::ARM_LOCKED));
         assert_eq!(bench.report().code, code);
-        bench.run_ms(3_000);
+        bench.run_ms(3_500);
         assert_eq!(turned_ms(&bench, motors), [ms], "code {code}");
         let report = bench.report();
         assert_eq!((report.finished_seq, report.code), (seq, STANDBY));
@@ -201,7 +304,7 @@ fn turns_last_their_time_and_are_done() {
 #[test]
 fn two_equal_turns_in_a_row_are_two_turns_and_a_refresh_is_none() {
     let mut bench = Bench::ready();
-    bench.line = Some(0);
+    bench.line = None;
     let first = bench.command(LEFT_PERP);
     bench.run_ms(3_500);
     assert_eq!(bench.report().finished_seq, first);
@@ -258,7 +361,7 @@ fn a_new_command_breaks_a_turn_off_and_that_is_reported() {
     assert_eq!(bench.report().finished_seq, turn);
     assert!(flag(&bench, SteerFlags::ABORTED));
     let second = bench.command(LEFT_DIAG);
-    bench.run_ms(2_000);
+    bench.run_ms(2_300);
     assert_eq!(bench.report().finished_seq, second);
     assert!(!flag(&bench, SteerFlags::ABORTED));
 }

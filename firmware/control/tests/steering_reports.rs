@@ -28,7 +28,7 @@ fn the_end_of_a_turn_is_reported_at_once() {
     let mut bench = Bench::ready();
     bench.line = Some(0);
     let seq = bench.command(LEFT_DIAG);
-    bench.run_ms(2_000);
+    bench.run_ms(2_300);
     let stopped = bench.pins.motor_log.last().unwrap().0;
     let reports = bench.reports();
     let (told, _) = reports
@@ -136,7 +136,7 @@ fn it_reports_every_5_ms_and_its_state_twice_a_second() {
         assert!(arm.iter().filter(|(_, id)| *id == servo).count() >= 6);
     }
     let report = bench.report();
-    assert_eq!((report.battery_decivolts, report.servo_errors), (118, 0));
+    assert_eq!((report.battery_decivolts, report.servo_errors), (111, 0));
     assert_eq!(WheelCommand::Standby.code(), report.code);
 }
 

@@ -7,14 +7,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{Receiver, channel};
 
 use clap::Parser;
 use lager_emulator::chip::Image;
 use lager_emulator::measure::measure;
 use lager_emulator::rig::{Images, RigOptions};
 use lager_emulator::shell::{EmulatorConfig, run};
-use lager_emulator::truth::Truth;
-use lager_plant::Warehouse;
+use lager_emulator::truth::{Hand, TruthLine};
+use lager_plant::{Make, Warehouse};
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 /// The robot's two boards as chips: the real firmware images in simavr, wired to each other and
@@ -62,7 +63,12 @@ struct Cli {
     /// Keeps both boards' EEPROM, and so their settings, in this folder
     #[arg(long, value_name = "FOLDER")]
     eeprom: Option<PathBuf>,
-    /// Writes how the robot really is to standard output, a line of JSON 50 times a second
+    /// So many things stand on edges at random, and come and go
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=64))]
+    obstacles: u32,
+    /// Writes how the robot really is to standard output, a line of JSON 50 times a second, and
+    /// does what a line on standard input says, which it answers: {"place": {"x_mm": 0, "y_mm": 0,
+    /// "heading_rad": 0}}, {"put": {"between": [[0, 0], [1, 0]]}}, or "take" in place of "put"
     #[arg(long)]
     truth: bool,
     /// Goes on with the world of a line that --truth wrote, read from standard input
@@ -97,6 +103,11 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
     let rig = RigOptions {
         warehouse: warehouse(&cli.warehouse)?,
         seed: cli.seed,
+        // Figures are measured on the robot as drawn, so that they can be compared.
+        make: match cli.sensor_link {
+            Some(_) => Make::Varied,
+            None => Make::Nominal,
+        },
         baud: cli.baud,
     };
     let (Some(sensor_link), Some(steering_link), false) =
@@ -115,6 +126,8 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
         eeprom: cli.eeprom,
         truth: cli.truth,
         resume: cli.resume.then(kept).transpose()?,
+        obstacles: cli.obstacles,
+        hands: cli.truth.then(hands),
     };
     let shutdown = Arc::new(AtomicBool::new(false));
     for signal in [
@@ -124,7 +137,7 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
     ] {
         signal_hook::flag::register(signal, Arc::clone(&shutdown))?;
     }
-    run(&images, &config, &shutdown)?;
+    run(&images, config, &shutdown)?;
     Ok(())
 }
 
@@ -152,7 +165,7 @@ fn warehouse(name: &str) -> Result<Warehouse, String> {
         .map_err(|error| format!("the warehouse file {name} is not valid: {error}"))
 }
 
-fn kept() -> Result<Truth, String> {
+fn kept() -> Result<TruthLine, String> {
     let mut line = String::new();
     io::stdin()
         .lock()
@@ -160,6 +173,23 @@ fn kept() -> Result<Truth, String> {
         .map_err(|error| format!("the kept world cannot be read from standard input: {error}"))?;
     serde_json::from_str(&line)
         .map_err(|error| format!("standard input has no line of --truth: {error}"))
+}
+
+/// What standard input has hands do, a line each, from a thread that ends with its last line.
+fn hands() -> Receiver<Hand> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in io::stdin().lines().map_while(Result::ok) {
+            match serde_json::from_str(&line) {
+                Ok(hand) if sender.send(hand).is_err() => return,
+                Ok(_) => {}
+                Err(error) => {
+                    eprintln!("lager-emulator: `{line}` is nothing that hands can do: {error}");
+                }
+            }
+        }
+    });
+    receiver
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -5,7 +5,8 @@
 //!              |
 //!   ports --bytes--> rig.run_until --bytes--> ports
 //!                          |--> clock page, every time
-//!                          '--> a line of truth, 50 times a second and when goods change state
+//!                          |--> a line of truth, 50 times a second and when goods change state
+//!                          '<-- a place, when somebody takes the robot up and puts it there
 //! ```
 //! Where the machine is too slow, the chips' time falls behind and is not made up for: whoever
 //! follows the page sees a slow robot, not a jumpy one.
@@ -17,6 +18,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
 
 use lager_pty::{Port, PtyError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -25,7 +27,7 @@ use thiserror::Error;
 use crate::clock::{ClockError, ClockPage, monotonic_ns};
 use crate::eeprom::{EepromError, EepromFile};
 use crate::rig::{Board, Images, Rig, RigError, RigOptions};
-use crate::truth::Truth;
+use crate::truth::{Hand, TruthLine};
 
 /// The most chip time between two looks at the ports.
 const SLICE: Duration = Duration::from_micros(500);
@@ -57,7 +59,11 @@ pub struct EmulatorConfig {
     /// Whether lines of truth are written to standard output.
     pub truth: bool,
     /// The world to go on with.
-    pub resume: Option<Truth>,
+    pub resume: Option<TruthLine>,
+    /// So many things come and go on the edges.
+    pub obstacles: u32,
+    /// What somebody's hands do while it runs.
+    pub hands: Option<Receiver<Hand>>,
 }
 
 /// Why the emulator ended.
@@ -99,10 +105,12 @@ pub enum RunError {
 /// The images, the warehouse, the ports, the clock page or the output cannot be used.
 pub fn run(
     images: &Images,
-    config: &EmulatorConfig,
+    mut config: EmulatorConfig,
     shutdown: &AtomicBool,
 ) -> Result<(), RunError> {
     let mut rig = Rig::new(images, &config.rig)?;
+    rig.world_mut()
+        .scatter_obstacles(config.obstacles, config.rig.seed);
     if let Some(truth) = &config.resume {
         rig.resume(&truth.world_state());
     }
@@ -127,8 +135,9 @@ pub fn run(
         eeproms,
         eeprom_due: Duration::ZERO,
         truth: config.truth,
+        hands: config.hands.take(),
         truth_due: Duration::ZERO,
-        goods_told: 0,
+        changes_told: 0,
         bytes: Vec::with_capacity(4_096),
     };
     while !shutdown.load(Ordering::Relaxed) {
@@ -182,8 +191,9 @@ struct Shell {
     eeproms: Vec<(Board, EepromFile)>,
     eeprom_due: Duration,
     truth: bool,
+    hands: Option<Receiver<Hand>>,
     truth_due: Duration,
-    goods_told: u64,
+    changes_told: u64,
     bytes: Vec<u8>,
 }
 
@@ -198,6 +208,7 @@ impl Shell {
             return Ok(());
         }
         self.listen();
+        self.obey_hands()?;
         self.rig.run_for(due);
         self.speak()?;
         if let Some(clock) = &mut self.clock {
@@ -229,6 +240,15 @@ impl Shell {
         }
     }
 
+    /// Does what somebody's hands do, and says what became of it.
+    fn obey_hands(&mut self) -> Result<(), RunError> {
+        for hand in self.hands.iter().flat_map(Receiver::try_iter) {
+            let told = hand.act(&mut self.rig.world_mut());
+            write_line(&told)?;
+        }
+        Ok(())
+    }
+
     /// What has arrived at the Pi's end is handed over.
     fn speak(&mut self) -> Result<(), RunError> {
         for board in Board::BOTH {
@@ -255,18 +275,13 @@ impl Shell {
             return Ok(());
         }
         let now = self.rig.now();
-        let changes = self.rig.world().goods().changes();
-        if now < self.truth_due && changes == self.goods_told {
+        let changes = self.rig.world().changes();
+        if now < self.truth_due && changes == self.changes_told {
             return Ok(());
         }
-        self.goods_told = changes;
+        self.changes_told = changes;
         self.truth_due = now + TRUTH_PERIOD;
-        let mut out = io::stdout().lock();
-        serde_json::to_writer(&mut out, &Truth::of(&self.rig))
-            .map_err(io::Error::from)
-            .and_then(|()| out.write_all(b"\n"))
-            .and_then(|()| out.flush())
-            .map_err(RunError::Truth)
+        write_line(&TruthLine::of(&self.rig))
     }
 
     /// Sleeps for `time`, or until somebody writes to an open port. A closed one cannot be waited
@@ -283,6 +298,16 @@ impl Shell {
         // An interrupted sleep is only a shorter one.
         let _ = poll(&mut fds, Some(&time));
     }
+}
+
+/// Writes a line of JSON to standard output.
+fn write_line(line: &impl serde::Serialize) -> Result<(), RunError> {
+    let mut out = io::stdout().lock();
+    serde_json::to_writer(&mut out, line)
+        .map_err(io::Error::from)
+        .and_then(|()| out.write_all(b"\n"))
+        .and_then(|()| out.flush())
+        .map_err(RunError::Truth)
 }
 
 #[cfg(test)]

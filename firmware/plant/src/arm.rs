@@ -118,19 +118,6 @@ mod tests {
     }
 
     #[test]
-    fn the_arm_reaches_goods_on_their_shelf_and_the_floor_at_the_bar() {
-        // 250 mm ahead of the axle at the height of goods on a shelf, and a pose to drop from.
-        let reach = with(&[(2, -201.0), (3, 201.0), (4, -24.0), (5, 24.0)]);
-        assert!((reach.ahead - crate::scene::STAND).abs() < 3.0, "{reach:?}");
-        assert!(
-            (reach.up - crate::goods::SHELF_HEIGHT).abs() < 3.0,
-            "{reach:?}"
-        );
-        let low = with(&[(2, -212.0), (3, 212.0)]);
-        assert!(low.up < 70.0 && low.ahead > 200.0, "{low:?}");
-    }
-
-    #[test]
     fn gap_and_position_are_inverse() {
         for wanted in [0.0, 50.0, 80.0] {
             assert!((gap(claw_position(wanted)) - wanted).abs() < 1e-9);

@@ -1,7 +1,7 @@
 //! The robot's body on the floor: pose, and how two wheel speeds change it.
 //!
-//! The pose is that of the middle of the wheels' axle. Nothing collides: what stands in the way
-//! is only seen by the IR ranger.
+//! The pose is that of the middle of the wheels' axle. What stands in the way is not known here
+//! ([`crate::contact`]).
 
 use core::f64::consts::TAU;
 

@@ -3,7 +3,7 @@
 //! Product 1 of `small` is near; `curved` and `large` have exits that bend, one at the tightest
 //! radius there is.
 
-use crate::warehouse::{Curve, Exit, Product, Side, Warehouse};
+use crate::warehouse::{Curve, Exit, Floor, Product, Side, Warehouse};
 
 impl Warehouse {
     /// The names of the built-in warehouses; the first is the default.
@@ -30,6 +30,7 @@ impl Warehouse {
                 product(2, [0, 1], Side::Up),
                 product(3, [1, 1], Side::Left),
             ],
+            floor: Floor::default(),
             obstacles: Vec::new(),
         }
     }
@@ -50,6 +51,7 @@ impl Warehouse {
                 product(3, [2, 1], Side::Right),
                 product(4, [2, 0], Side::Left),
             ],
+            floor: Floor::default(),
             obstacles: Vec::new(),
         }
     }
@@ -72,6 +74,7 @@ impl Warehouse {
                 product(5, [1, 1], Side::Left),
                 product(6, [3, 1], Side::Up),
             ],
+            floor: Floor::default(),
             obstacles: Vec::new(),
         }
     }

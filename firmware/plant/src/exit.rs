@@ -12,11 +12,25 @@ use core::f64::consts::PI;
 
 use crate::body::Pose;
 use crate::scene::{node, side_mm};
-use crate::tape::{BAR, FAR, HALF};
 use crate::warehouse::{STRAIGHT_CM, Warehouse};
+
+/// Width of the tape in mm (E1).
+pub const WIDTH: f64 = 15.0;
+/// Length of the delivery bar in mm (E4).
+pub const BAR: f64 = 300.0;
+/// Half the width of the tape.
+pub(crate) const HALF: f64 = WIDTH / 2.0;
+/// Farther away than any spot is wide.
+pub(crate) const FAR: f64 = 1.0e6;
 
 /// Pieces overlap by this much in mm, so that no seam shows between them.
 const OVERLAP: f64 = 5.0;
+
+/// Sensors that have run past the end of a strip by this much, in mm, are still beside it.
+const BEYOND: f64 = 100.0;
+/// Who follows a piece looks along it within 45 degrees: on a bend the sensors are ahead of the
+/// axle.
+const ALONG: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
 /// One piece of the exit line, or the bar.
 #[derive(Clone, Copy, Debug)]
@@ -73,6 +87,41 @@ impl Piece {
                     return FAR;
                 }
                 (dx.hypot(dy) - radius).abs() - HALF
+            }
+        }
+    }
+
+    /// What the distance is at least; quicker.
+    pub(crate) fn at_least(&self, x: f64, y: f64) -> f64 {
+        match *self {
+            Self::Strip { .. } => self.distance(x, y),
+            Self::Arc { centre, radius, .. } => {
+                ((x - centre[0]).hypot(y - centre[1]) - radius).abs() - HALF
+            }
+        }
+    }
+
+    /// How far a point is from the middle of the tape, if it is along the piece and the heading is
+    /// too.
+    pub(crate) fn beside(&self, x: f64, y: f64, heading: f64) -> Option<f64> {
+        let is_along = |tangent: f64| (heading - tangent).cos().abs() > ALONG;
+        match *self {
+            Self::Strip {
+                start,
+                sin,
+                cos,
+                length,
+            } => {
+                let (dx, dy) = (x - start.x, y - start.y);
+                let along = dx * cos + dy * sin;
+                let near = (-BEYOND..=length + BEYOND).contains(&along);
+                (near && is_along(start.heading)).then(|| (dy * cos - dx * sin).abs())
+            }
+            Self::Arc { centre, radius, .. } => {
+                let (dx, dy) = (x - centre[0], y - centre[1]);
+                let near = self.distance(x, y) < FAR;
+                let off = (dx.hypot(dy) - radius).abs();
+                (near && is_along(dy.atan2(dx) + PI / 2.0)).then_some(off)
             }
         }
     }
@@ -161,79 +210,4 @@ fn bend(at: Pose, radius: f64, turn: f64) -> (Piece, Pose) {
         sweep: turn.abs(),
     };
     (piece, pose)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tape::Tape;
-    use crate::warehouse::{Curve, Exit};
-
-    #[test]
-    fn curved_exits_have_no_gap_and_leave_the_warehouse_alone() {
-        for curve in [Curve::Straight, Curve::Left, Curve::Right, Curve::S] {
-            for delivery in [[0, 0], [2, 0], [0, 2], [2, 2]] {
-                let mut warehouse = Warehouse::builtin("small").unwrap();
-                warehouse.delivery = delivery;
-                warehouse.exit = Exit {
-                    length_cm: 120,
-                    curve,
-                    radius_cm: 25,
-                };
-                warehouse.validate().unwrap();
-                let tape = Tape::new(&warehouse);
-                let mut walked = walk(&warehouse, &tape);
-                assert!(
-                    (1170.0..1190.0).contains(&walked.1),
-                    "{curve:?}: {} mm",
-                    walked.1
-                );
-                let bar = tape.bar();
-                walked.0.heading -= bar.heading;
-                assert!(
-                    (walked.0.x - bar.x).hypot(walked.0.y - bar.y) < 21.0,
-                    "{curve:?} {delivery:?}"
-                );
-                assert!(
-                    walked.0.heading.sin().abs() < 0.1,
-                    "{curve:?} {}",
-                    walked.0.heading
-                );
-            }
-        }
-    }
-
-    /// Walks along the middle of the exit line as a follower with a short look-ahead would.
-    fn walk(warehouse: &Warehouse, tape: &Tape) -> (Pose, f64) {
-        let start = crate::scene::start(warehouse);
-        let mut at = Pose {
-            heading: start.heading + PI,
-            ..start
-        };
-        let mut length = 0.0;
-        while length < 1500.0 {
-            let best = (-20..=20)
-                .map(|step| at.heading + f64::from(step) * 0.01)
-                .map(|heading| Pose { heading, ..at }.point(4.0, 0.0))
-                .min_by(|a, b| tape.distance(a.0, a.1).total_cmp(&tape.distance(b.0, b.1)))
-                .unwrap();
-            if tape.distance(best.0, best.1) > 0.0 {
-                break;
-            }
-            let heading = (best.1 - at.y).atan2(best.0 - at.x);
-            let turned = (heading - at.heading + PI).rem_euclid(2.0 * PI) - PI;
-            at = Pose {
-                x: at.x,
-                y: at.y,
-                heading: at.heading + turned * 0.5,
-            };
-            let (x, y) = at.point(1.0, 0.0);
-            at = Pose { x, y, ..at };
-            length += 1.0;
-            if (at.x - tape.bar().x).hypot(at.y - tape.bar().y) < 20.0 {
-                break;
-            }
-        }
-        (at, length)
-    }
 }

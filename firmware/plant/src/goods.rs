@@ -6,24 +6,30 @@
 //!     ^                                | ^                           |
 //!     '-- claw opens over its shelf ---' '--- claw closes around it -'
 //! ```
-//! Goods are cubes that do not touch each other; the claw takes at most one.
+//! Goods are cubes that do not touch each other; the claw takes at most one. Held by an edge,
+//! with the claw's middle more than 25 mm from the goods', they slip out after some seconds, as if
+//! the claw had been opened; how many the seed says.
 
 use crate::arm::Claw;
 use crate::body::Pose;
+use crate::make::Make;
+use crate::noise::Noise;
 use crate::scene::stand_3d;
 use crate::tape::Tape;
 use crate::warehouse::Warehouse;
 
 /// Side of a piece of goods in mm.
 pub const SIDE: f64 = 50.0;
-/// Height of the middle of goods on a shelf, in mm.
-pub const SHELF_HEIGHT: f64 = 60.0;
 /// Height of the middle of goods on the floor, in mm.
 pub const FLOOR_HEIGHT: f64 = SIDE / 2.0;
 /// How far the claw's middle may be from the goods' to take them, in mm along the floor.
 pub const REACH: f64 = 40.0;
 /// How far the claw's middle may be above or below the goods' to take them, in mm.
 pub const REACH_UP: f64 = 30.0;
+/// How far the claw's middle may be from the goods' for a firm grip, in mm along the floor.
+pub const FIRM: f64 = 25.0;
+/// How long a bad grip holds, in s.
+const SLIPS_AFTER: [f64; 2] = [1.0, 6.0];
 /// How much wider than the goods the claw must open to let go, in mm.
 const PLAY: f64 = 4.0;
 
@@ -57,13 +63,18 @@ pub struct Goods {
     list: Vec<Good>,
     stands: Vec<[f64; 3]>,
     held: Option<usize>,
+    /// How long the grip will still hold, in s; for ever if it is firm.
+    grip: f64,
+    /// How long a bad one holds.
+    slips_after: f64,
+    slips: u32,
     last_gap: f64,
     changes: u64,
 }
 
 impl Goods {
-    /// Every product's goods on its shelf.
-    pub fn new(warehouse: &Warehouse) -> Self {
+    /// Every product's goods on its shelf; how long a bad grip holds comes from `noise`.
+    pub fn new(warehouse: &Warehouse, mut noise: Noise, make: Make) -> Self {
         let side = crate::scene::side_mm(warehouse);
         let stands: Vec<_> = warehouse
             .products
@@ -84,6 +95,9 @@ impl Goods {
             list,
             stands,
             held: None,
+            grip: f64::INFINITY,
+            slips_after: make.draw(&mut noise, 3.0, SLIPS_AFTER[0], SLIPS_AFTER[1]),
+            slips: 0,
             last_gap: 0.0,
             changes: 0,
         }
@@ -102,6 +116,26 @@ impl Goods {
     /// Counts the changes of any state; who publishes the goods looks here.
     pub fn changes(&self) -> u64 {
         self.changes
+    }
+
+    /// How often goods have slipped out of the claw.
+    pub fn slips(&self) -> u32 {
+        self.slips
+    }
+
+    /// The goods, for whatever pushes those on the floor.
+    pub(crate) fn list_mut(&mut self) -> &mut [Good] {
+        &mut self.list
+    }
+
+    /// Goods on the floor were pushed: they count as delivered where they lie now, or no longer.
+    pub(crate) fn pushed(&mut self, tape: &Tape) {
+        for good in &mut self.list {
+            if matches!(good.state, GoodState::Lying | GoodState::Delivered) {
+                good.state = on_floor(tape, good.position[0], good.position[1]);
+            }
+        }
+        self.changes += 1;
     }
 
     /// Takes up the goods of a kept world: those whose number is known here.
@@ -123,13 +157,20 @@ impl Goods {
         if self.held.is_some() { SIDE } else { 0.0 }
     }
 
-    /// Lets the claw act on the goods.
-    pub fn step(&mut self, pose: &Pose, claw: &Claw, tape: &Tape) {
+    /// Lets the claw act on the goods for `seconds`.
+    pub fn step(&mut self, seconds: f64, pose: &Pose, claw: &Claw, tape: &Tape) {
         let (x, y) = pose.point(claw.ahead, claw.left);
         let at = [x, y, claw.up];
         match self.held {
             Some(index) if claw.gap > SIDE + PLAY => self.release(index, at, tape),
-            Some(index) => self.list[index].position = at,
+            Some(index) => {
+                self.list[index].position = at;
+                self.grip -= seconds;
+                if self.grip <= 0.0 {
+                    self.slips += 1;
+                    self.release(index, at, tape);
+                }
+            }
             None if claw.gap <= SIDE && self.last_gap > SIDE => self.take(at),
             None => {}
         }
@@ -146,7 +187,11 @@ impl Goods {
                 aside(good) <= REACH && (good.position[2] - at[2]).abs() <= REACH_UP
             })
             .min_by(|(_, a), (_, b)| aside(a).total_cmp(&aside(b)));
-        if let Some((index, _)) = nearest {
+        if let Some((index, good)) = nearest {
+            self.grip = match aside(good) <= FIRM {
+                true => f64::INFINITY,
+                false => self.slips_after,
+            };
             self.list[index].state = GoodState::Held;
             self.list[index].position = at;
             self.held = Some(index);
@@ -161,19 +206,26 @@ impl Goods {
         let good = &mut self.list[index];
         (good.position, good.state) = if over_stand {
             (stand, GoodState::Shelf)
-        } else if tape.is_delivered(at[0], at[1]) {
-            ([at[0], at[1], FLOOR_HEIGHT], GoodState::Delivered)
         } else {
-            ([at[0], at[1], FLOOR_HEIGHT], GoodState::Lying)
+            ([at[0], at[1], FLOOR_HEIGHT], on_floor(tape, at[0], at[1]))
         };
         self.held = None;
         self.changes += 1;
     }
 }
 
+fn on_floor(tape: &Tape, x: f64, y: f64) -> GoodState {
+    match tape.is_delivered(x, y) {
+        true => GoodState::Delivered,
+        false => GoodState::Lying,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arm;
+    use crate::scene::{SHELF_HEIGHT, STAND};
 
     struct Bench {
         goods: Goods,
@@ -186,7 +238,7 @@ mod tests {
             let warehouse = Warehouse::builtin("small").unwrap();
             let tape = Tape::new(&warehouse);
             Self {
-                goods: Goods::new(&warehouse),
+                goods: Goods::new(&warehouse, Noise::new(1, 1), Make::Nominal),
                 bar: tape.bar(),
                 tape,
             }
@@ -200,7 +252,7 @@ mod tests {
                 up,
                 gap,
             };
-            self.goods.step(&pose, &claw, &self.tape);
+            self.goods.step(0.001, &pose, &claw, &self.tape);
         }
 
         fn state(&self) -> GoodState {
@@ -255,6 +307,26 @@ mod tests {
     }
 
     #[test]
+    fn goods_slip_out_of_a_bad_grip() {
+        for (x, slips) in [(750.0 + FIRM - 1.0, 0), (750.0 + FIRM + 1.0, 1)] {
+            let mut bench = Bench::new();
+            bench.claw(x, 250.0, 60.0, 80.0);
+            bench.claw(x, 250.0, 60.0, 50.0);
+            assert_eq!(bench.goods.held(), Some(1));
+            for _ in 0..3_001 {
+                bench.claw(300.0, 300.0, 200.0, 50.0);
+            }
+            assert_eq!(bench.goods.slips(), slips);
+            let left = if slips == 0 {
+                GoodState::Held
+            } else {
+                GoodState::Lying
+            };
+            assert_eq!(bench.state(), left);
+        }
+    }
+
+    #[test]
     fn kept_goods_are_taken_up() {
         let mut bench = Bench::new();
         bench.claw(750.0, 250.0, 60.0, 80.0);
@@ -264,5 +336,20 @@ mod tests {
         fresh.goods.restore(&kept);
         assert_eq!(fresh.goods.list(), kept);
         assert_eq!(fresh.goods.held(), Some(1));
+    }
+
+    #[test]
+    fn the_arm_reaches_goods_on_their_shelf_and_the_floor_at_the_bar() {
+        // 250 mm ahead of the axle at the height of goods on a shelf, and a pose to drop from.
+        let pose = |shoulder: f64, elbow: f64| {
+            let (up, low) = (512.0 + shoulder, 511.0 - shoulder);
+            let (out, back) = (512.0 + elbow, 511.0 - elbow);
+            arm::claw(&[512.0, up, low, out, back, 512.0, 512.0, 512.0])
+        };
+        let reach = pose(-201.0, -24.0);
+        assert!((reach.ahead - STAND).abs() < 3.0, "{reach:?}");
+        assert!((reach.up - SHELF_HEIGHT).abs() < 3.0, "{reach:?}");
+        let low = pose(-212.0, 0.0);
+        assert!(low.up < 70.0 && low.ahead > 200.0, "{low:?}");
     }
 }

@@ -1,7 +1,8 @@
 //! The IR ranger at the front, a Sharp GP2Y0A21 (AMB-14): distance in, ADC value out.
 //!
 //! It measures about every 38 ms and holds its output in between. Below 10 cm the output folds
-//! back: the voltage falls again although the object comes nearer.
+//! back: the voltage falls again although the object comes nearer. Rangers differ within the
+//! datasheet's limits: in the output at 80 cm, in what it rises by until 10 cm, and in their pace.
 //!
 //! ```text
 //!  3.1 V  _
@@ -12,11 +13,17 @@
 //! ```
 
 use crate::body::{IR_AHEAD, Pose};
+use crate::make::Make;
 use crate::noise::Noise;
 use crate::scene::Block;
 
-/// Time between two measurements in ns (datasheet: 38.3 ms typical).
+/// Time between two measurements in ns (datasheet: 38.3 ms typical, 28.7 to 47.9).
 pub const CYCLE_NS: u64 = 38_300_000;
+const CYCLES_MS: [f64; 2] = [28.7, 47.9];
+/// Output at 80 cm of any ranger, in volts (datasheet: 0.25 to 0.55).
+const AT_80: [f64; 2] = [0.25, 0.55];
+/// Output at 10 cm less that at 80 cm, in volts (datasheet: 1.65 to 2.15).
+const SPAN: [f64; 2] = [1.65, 2.15];
 
 /// Output over distance in (cm, volt) from 10 cm on: figure 2 of the datasheet E4-A00201EN,
 /// white paper.
@@ -58,17 +65,34 @@ const GAIN_ERROR: f64 = 0.02;
 #[derive(Clone, Debug)]
 pub struct IrRanger {
     gain: f64,
+    /// Added after the gain.
+    offset: f64,
+    cycle_ns: u64,
     volts: f64,
     next_ns: u64,
     noise: Noise,
 }
 
 impl IrRanger {
-    /// A ranger whose gain error and noise come from `noise`. Its first measurement is due at
+    /// A ranger whose deviation and noise come from `noise`. Its first measurement is due at
     /// once.
-    pub fn new(mut noise: Noise) -> Self {
+    pub fn new(mut noise: Noise, make: Make) -> Self {
+        let drawn = [FAR_FIELD[0].1, FAR_FIELD[FAR_FIELD.len() - 1].1];
+        let typical = drawn[0] - drawn[1];
+        let span = make.draw(&mut noise, typical, SPAN[0], SPAN[1]);
+        let at_80 = make.draw(&mut noise, drawn[1], AT_80[0], AT_80[1]);
+        let cycle_ms = make.draw(&mut noise, 38.3, CYCLES_MS[0], CYCLES_MS[1]);
+        let gain = match make {
+            Make::Nominal => 1.0 + noise.spread(GAIN_ERROR),
+            Make::Varied => span / typical,
+        };
         Self {
-            gain: 1.0 + noise.spread(GAIN_ERROR),
+            gain,
+            offset: match make {
+                Make::Nominal => 0.0,
+                Make::Varied => at_80 - gain * drawn[1],
+            },
+            cycle_ns: (cycle_ms * 1e6) as u64,
             volts: NOTHING,
             next_ns: 0,
             noise,
@@ -80,9 +104,9 @@ impl IrRanger {
         if now_ns < self.next_ns {
             return;
         }
-        self.next_ns = now_ns + CYCLE_NS;
+        self.next_ns = now_ns + self.cycle_ns;
         let clean = match distance(pose, blocks) {
-            Some(millimetres) => volts(millimetres / 10.0) * self.gain,
+            Some(millimetres) => volts(millimetres / 10.0) * self.gain + self.offset,
             None => NOTHING,
         };
         self.volts = clean + self.noise.bell(NOISE);
@@ -203,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_output_holds_between_measurements() {
-        let mut ranger = IrRanger::new(Noise::new(1, 1));
+        let mut ranger = IrRanger::new(Noise::new(1, 1), Make::Nominal);
         let pose = Pose {
             x: 200.0,
             y: 0.0,
@@ -220,5 +244,37 @@ mod tests {
         assert_eq!(ranger.adc(), held);
         ranger.step(CYCLE_NS, &nearer, &blocked());
         assert!(ranger.adc() > held + 50);
+    }
+
+    #[test]
+    fn rangers_differ_within_the_datasheets_limits() {
+        let block = |millimetres: f64| {
+            let face = IR_AHEAD + millimetres;
+            vec![Block {
+                low: [face, -100.0],
+                high: [face + 100.0, 100.0],
+            }]
+        };
+        let mut lowest = f64::MAX;
+        let mut highest = 0.0_f64;
+        for seed in 0..200 {
+            let mut ranger = IrRanger::new(Noise::new(seed, 1), Make::Varied);
+            let mut output = |millimetres, at_ns| {
+                ranger.step(at_ns, &Pose::default(), &block(millimetres));
+                ranger.volts
+            };
+            let far = output(800.0, 0);
+            let near = output(100.0, 100_000_000);
+            let noise = 4.0 * NOISE;
+            assert!((AT_80[0] - noise..AT_80[1] + noise).contains(&far), "{far}");
+            let rise = near - far;
+            assert!(
+                (SPAN[0] - 2.0 * noise..SPAN[1] + 2.0 * noise).contains(&rise),
+                "{rise}"
+            );
+            lowest = lowest.min(far);
+            highest = highest.max(far);
+        }
+        assert!(highest - lowest > 0.2);
     }
 }

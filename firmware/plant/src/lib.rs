@@ -12,30 +12,38 @@
 //!
 //! ```text
 //!  duty --> motors --> body --> pose --+--> line sensor --> ADC
+//!             ^ battery     ^ contact   |
 //!                                      +--> IR ranger ----> ADC
 //!  bytes <-> servos --> arm ---------- + --> goods
 //! ```
 #![forbid(unsafe_code)]
 
 pub mod arm;
+pub mod battery;
 pub mod body;
 mod builtin;
+pub mod contact;
 mod exit;
 pub mod goods;
 pub mod ir;
 pub mod line;
+pub mod make;
 pub mod motor;
 pub mod noise;
+mod obstacles;
 pub mod scene;
 pub mod servo;
 pub mod tape;
 mod validate;
 pub mod warehouse;
+pub mod weave;
 mod world;
 
 pub use body::Pose;
 pub use goods::{Good, GoodState};
+pub use make::Make;
+pub use obstacles::{HandsOff, MOST_OBSTACLES, Standing};
 pub use servo::ServoFault;
 pub use validate::WarehouseError;
-pub use warehouse::{Curve, Edge, Exit, Obstacle, Product, Side, Warehouse};
+pub use warehouse::{Curve, Edge, Exit, Floor, Obstacle, Product, Side, Warehouse};
 pub use world::{World, WorldState};

@@ -7,11 +7,18 @@
 //!        ==========+==========      axle
 //! ```
 //! Black tape reflects little, so its voltage is high (S6). Every spot has its own white and
-//! black level from the seed, and each reading has a little noise.
+//! black level from the seed, and each reading has a little noise. Where the robot is varied
+//! ([`crate::make`]), floor and tape differ from place to place too: the floor is darker and the
+//! tape paler by up to 25 steps, in waves of 0.7 to 3 m. A floor may also have a weaker contrast
+//! altogether ([`crate::warehouse::Floor`]).
+
+use core::f64::consts::TAU;
 
 use crate::body::{LINE_SENSOR_AHEAD, Pose};
+use crate::make::Make;
 use crate::noise::Noise;
-use crate::tape::Tape;
+use crate::tape::{Near, Tape};
+use crate::warehouse::Floor;
 
 /// Number of sensors (S5).
 pub const CHANNELS: usize = 11;
@@ -20,30 +27,92 @@ pub const PITCH: f64 = 7.0;
 /// Radius of the spot one sensor sees, in mm.
 pub const SPOT: f64 = 2.5;
 
-/// The mean 8-bit reading over white floor and over tape.
-const WHITE: f64 = 45.0;
-const BLACK: f64 = 205.0;
+/// How far from the middle of the array anything is seen, in mm.
+const REACH: f64 = (CHANNELS - 1) as f64 / 2.0 * PITCH + SPOT;
+
 /// How far a sensor's own levels are from the mean.
 const LEVEL_SPREAD: f64 = 15.0;
 /// Deviation of one reading.
 const READING_NOISE: f64 = 2.0;
+/// How much floor and tape differ from place to place.
+const DRIFT: f64 = 25.0;
+/// Wavelengths of that in mm.
+const WAVES: [f64; 2] = [700.0, 3_000.0];
+
+/// How the floor, or the tape, differs from place to place: two waves across each other.
+#[derive(Clone, Copy, Debug)]
+struct Drift {
+    /// Angle in rad for each mm, and at the origin.
+    waves: [[f64; 2]; 2],
+    most: f64,
+}
+
+impl Drift {
+    fn new(noise: &mut Noise, make: Make, most: f64) -> Self {
+        let mut wave = || {
+            let length = make.draw(noise, WAVES[1], WAVES[0], WAVES[1]);
+            [TAU / length, noise.spread(TAU / 2.0)]
+        };
+        Self {
+            waves: [wave(), wave()],
+            most: match make {
+                Make::Nominal => 0.0,
+                Make::Varied => most,
+            },
+        }
+    }
+
+    /// From 0 to the most.
+    fn at(&self, x: f64, y: f64) -> f64 {
+        if self.most == 0.0 {
+            return 0.0;
+        }
+        let [along, across] = self.waves;
+        let sum = (along[0] * x + along[1]).sin() + (across[0] * y + across[1]).sin();
+        (0.5 + sum / 4.0) * self.most
+    }
+}
+
+/// What all sensors of a pose have in common: worked out once for each place the robot comes to.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    pose: Pose,
+    /// The middle of the array.
+    middle: (f64, f64),
+    /// From one sensor to the next.
+    step: (f64, f64),
+    /// How much the floor is darker here, and the tape paler.
+    drift: [f64; 2],
+    /// The tape that any of them may see.
+    near: Near,
+}
 
 /// The array and its imperfections.
 #[derive(Clone, Debug)]
 pub struct LineSensor {
     white: [f64; CHANNELS],
     black: [f64; CHANNELS],
+    /// Of the floor and of the tape.
+    drifts: [Drift; 2],
+    place: Option<Place>,
     noise: Noise,
 }
 
 impl LineSensor {
-    /// An array whose levels and noise come from `noise`.
-    pub fn new(mut noise: Noise) -> Self {
-        let mut levels = |mean: f64| core::array::from_fn(|_| mean + noise.spread(LEVEL_SPREAD));
-        let (white, black) = (levels(WHITE), levels(BLACK));
+    /// An array over this floor, whose levels and noise come from `noise`.
+    pub fn new(mut noise: Noise, make: Make, floor: Floor) -> Self {
+        let [white, black] = [floor.white, floor.tape].map(f64::from);
+        // On a floor of weak contrast everything differs less.
+        let part = (black - white) / Floor::default().contrast();
+        let mut levels =
+            |mean: f64| core::array::from_fn(|_| mean + noise.spread(LEVEL_SPREAD * part));
+        let (white, black) = (levels(white), levels(black));
+        let drifts = [0, 1].map(|_| Drift::new(&mut noise, make, DRIFT * part));
         Self {
             white,
             black,
+            drifts,
+            place: None,
             noise,
         }
     }
@@ -55,11 +124,36 @@ impl LineSensor {
         if channel >= CHANNELS {
             return 0;
         }
-        let left = ((CHANNELS - 1) as f64 / 2.0 - channel as f64) * PITCH;
-        let (x, y) = pose.point(LINE_SENSOR_AHEAD, left);
-        let covered = tape.coverage(x, y, SPOT);
-        let level = self.white[channel] + (self.black[channel] - self.white[channel]) * covered;
+        let Place {
+            middle,
+            step,
+            drift,
+            near,
+            ..
+        } = self.place_at(pose, tape);
+        let left = (CHANNELS - 1) as f64 / 2.0 - channel as f64;
+        let (x, y) = (middle.0 + left * step.0, middle.1 + left * step.1);
+        let covered = tape.coverage(near, x, y, SPOT);
+        let white = self.white[channel] + drift[0];
+        let black = self.black[channel] - drift[1];
+        let level = white + (black - white) * covered;
         (level + self.noise.bell(READING_NOISE)).clamp(0.0, 255.0) as u8
+    }
+
+    fn place_at(&mut self, pose: &Pose, tape: &Tape) -> Place {
+        if let Some(place) = self.place.filter(|place| place.pose == *pose) {
+            return place;
+        }
+        let middle = pose.point(LINE_SENSOR_AHEAD, 0.0);
+        let first = pose.point(LINE_SENSOR_AHEAD, PITCH);
+        let place = Place {
+            pose: *pose,
+            middle,
+            step: (first.0 - middle.0, first.1 - middle.1),
+            drift: self.drifts.map(|drift| drift.at(middle.0, middle.1)),
+            near: tape.near(middle.0, middle.1, REACH),
+        };
+        *self.place.insert(place)
     }
 }
 
@@ -70,7 +164,7 @@ mod tests {
 
     fn bits(x: f64, y: f64) -> u16 {
         let tape = Tape::new(&Warehouse::builtin("small").unwrap());
-        let mut sensor = LineSensor::new(Noise::new(3, 9));
+        let mut sensor = LineSensor::new(Noise::new(3, 9), Make::Nominal, Floor::default());
         let pose = Pose { x, y, heading: 0.0 };
         (0..CHANNELS as u8).fold(0, |bits, channel| {
             bits << 1 | u16::from(sensor.read(channel, &pose, &tape) > 127)
@@ -103,7 +197,36 @@ mod tests {
     fn off_the_tape_there_is_nothing() {
         assert_eq!(bits(100.0, 200.0), 0);
         let tape = Tape::new(&Warehouse::builtin("small").unwrap());
-        let mut sensor = LineSensor::new(Noise::new(3, 9));
+        let mut sensor = LineSensor::new(Noise::new(3, 9), Make::Nominal, Floor::default());
         assert_eq!(sensor.read(11, &Pose::default(), &tape), 0);
+    }
+
+    #[test]
+    fn floor_and_tape_differ_from_place_to_place_and_stay_apart() {
+        let tape = Tape::new(&Warehouse::builtin("small").unwrap());
+        let (mut floors, mut tapes) = (Vec::new(), Vec::new());
+        for seed in 0..20 {
+            let noise = Noise::new(seed, 9);
+            let mut sensor = LineSensor::new(noise, Make::Varied, Floor::default());
+            for step in 0..40 {
+                let x = f64::from(step) * 8.0 + 10.0;
+                let heading = 0.0;
+                let on = Pose { x, y: 0.0, heading };
+                tapes.push(sensor.read(5, &on, &tape));
+                let beside = Pose {
+                    x,
+                    y: 200.0,
+                    heading,
+                };
+                floors.push(sensor.read(5, &beside, &tape));
+            }
+        }
+        let span = |levels: &[u8]| (*levels.iter().min().unwrap(), *levels.iter().max().unwrap());
+        let ((floor_low, floor_high), (tape_low, tape_high)) = (span(&floors), span(&tapes));
+        assert!(floor_high - floor_low > 30 && tape_high - tape_low > 30);
+        assert!(
+            floor_high < 110 && tape_low > 145,
+            "{floor_high} {tape_low}"
+        );
     }
 }

@@ -1,28 +1,34 @@
-//! One motor driver with its wheel pair: duty in, wheel speed out.
+//! One motor driver with its wheel pair: duty and battery in, wheel speed out.
 //!
 //! ```text
 //!  speed
-//!    |            /           speed = gain * CRUISE * (duty - DEAD_BAND) / (100 - DEAD_BAND)
+//!    |            /           speed = gain * CRUISE * (duty - dead band) / (100 - dead band)
 //!    |           /            followed with a lag of 90 ms
-//!    |__________/____ duty
+//!    |__________/____ duty    where duty is that at 11.1 V, which gives the same mean voltage
 //!       dead band
 //! ```
-//! Each motor of each seed has its own gain error and a slowly wandering disturbance, so the
-//! robot does not drive straight by itself, as the real one does not (W6).
+//! Each motor of each seed has its own gain, its own dead band ([`crate::make`] has the ranges)
+//! and a slowly wandering disturbance, so the robot does not drive straight by itself, as the
+//! real one does not (W6).
 
+use crate::battery;
+use crate::make::Make;
 use crate::noise::Noise;
 
 /// Wheel speed in mm/s at the standard duty.
 pub const CRUISE: f64 = 73.3;
 /// The standard duty (W1).
 pub const STANDARD_DUTY: f64 = 100.0;
-/// Duty at which a wheel pair begins to move: a four-wheeled platform that turns by skidding and
-/// carries an arm needs about a third of the supply to break loose.
+/// Duty at which a wheel pair as drawn begins to move: a four-wheeled platform that turns by
+/// skidding and carries an arm needs about a third of the supply to break loose.
 pub const DEAD_BAND: f64 = 75.0;
 /// Time constant of the speed in s.
 pub const LAG: f64 = 0.09;
-/// Largest gain error of a motor.
-pub const GAIN_ERROR: f64 = 0.03;
+/// Largest gain error of a motor as drawn, and of any.
+const GAIN_ERROR: f64 = 0.03;
+const LARGEST_GAIN_ERROR: f64 = 0.10;
+/// Where the dead band of a motor lies.
+const DEAD_BANDS: [f64; 2] = [60.0, 90.0];
 
 /// Time constant of the wandering disturbance in s.
 const WANDER_LAG: f64 = 0.5;
@@ -33,6 +39,8 @@ const WANDER: f64 = 0.008;
 #[derive(Clone, Debug)]
 pub struct Motor {
     gain: f64,
+    dead_band: f64,
+    duty: f64,
     wander: f64,
     target: f64,
     speed: f64,
@@ -40,10 +48,17 @@ pub struct Motor {
 }
 
 impl Motor {
-    /// A motor at rest whose gain error and disturbance come from `noise`.
-    pub fn new(mut noise: Noise) -> Self {
+    /// A motor at rest whose gain, dead band and disturbance come from `noise`.
+    pub fn new(mut noise: Noise, make: Make) -> Self {
+        let error = match make {
+            Make::Nominal => GAIN_ERROR,
+            Make::Varied => LARGEST_GAIN_ERROR,
+        };
+        let gain = 1.0 + noise.spread(error);
         Self {
-            gain: 1.0 + noise.spread(GAIN_ERROR),
+            gain,
+            dead_band: make.draw(&mut noise, DEAD_BAND, DEAD_BANDS[0], DEAD_BANDS[1]),
+            duty: 0.0,
             wander: 0.0,
             target: 0.0,
             speed: 0.0,
@@ -53,9 +68,15 @@ impl Motor {
 
     /// Sets the duty, -255..=255; negative turns the wheels backwards.
     pub fn set_duty(&mut self, duty: i16) {
-        let duty = f64::from(duty.clamp(-255, 255));
-        let effective = (duty.abs() - DEAD_BAND).max(0.0) / (STANDARD_DUTY - DEAD_BAND);
-        self.target = (effective * CRUISE * self.gain).copysign(duty);
+        self.duty = f64::from(duty.clamp(-255, 255));
+        self.set_supply(battery::NOMINAL);
+    }
+
+    /// Sets the voltage that the duty is a part of.
+    pub fn set_supply(&mut self, volts: f64) {
+        let duty = self.duty.abs() * volts / battery::NOMINAL;
+        let effective = (duty - self.dead_band).max(0.0) / (STANDARD_DUTY - self.dead_band);
+        self.target = (effective * CRUISE * self.gain).copysign(self.duty);
     }
 
     /// Advances by `seconds`, which is short against the lag.
@@ -88,7 +109,7 @@ mod tests {
     use super::*;
 
     fn run(duty: i16, milliseconds: usize) -> Motor {
-        let mut motor = Motor::new(Noise::new(5, 1));
+        let mut motor = Motor::new(Noise::new(5, 1), Make::Nominal);
         motor.set_duty(duty);
         for _ in 0..milliseconds {
             motor.step(0.001);
@@ -125,5 +146,38 @@ mod tests {
             motor.step(0.001);
         }
         assert_eq!(motor.speed(), 0.0);
+    }
+
+    #[test]
+    fn each_motor_has_its_own_dead_band_and_the_same_cruise() {
+        let mut steep = f64::MAX;
+        let mut flat = 0.0_f64;
+        for seed in 0..200 {
+            let speed = |duty| {
+                let mut motor = Motor::new(Noise::new(seed, 1), Make::Varied);
+                motor.wander = 0.0;
+                motor.set_duty(duty);
+                motor.target
+            };
+            let cruise = speed(100) / CRUISE;
+            assert!((0.9..=1.1).contains(&cruise), "{cruise}");
+            assert_eq!(speed(60), 0.0);
+            assert!(speed(90) >= 0.0 && speed(91) > 0.0);
+            let half = speed(95) / speed(100);
+            steep = steep.min(half);
+            flat = flat.max(half);
+        }
+        assert!(steep < 0.55 && flat > 0.85, "{steep} {flat}");
+    }
+
+    #[test]
+    fn a_low_battery_slows_it_down_and_a_full_one_speeds_it_up() {
+        let mut motor = Motor::new(Noise::new(5, 1), Make::Nominal);
+        motor.set_duty(100);
+        let nominal = motor.target;
+        motor.set_supply(10.0);
+        assert!(motor.target < 0.7 * nominal);
+        motor.set_supply(12.6);
+        assert!(motor.target > 1.4 * nominal);
     }
 }

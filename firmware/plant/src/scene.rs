@@ -3,20 +3,26 @@
 //! It turns the numbers of a [`Warehouse`] into points and boxes on the floor, in one place, so
 //! that the tape, the ranger and the goods agree about them.
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
 
 use crate::body::Pose;
-use crate::goods::SHELF_HEIGHT;
 use crate::warehouse::{Edge, Product, Side, Warehouse};
 
 /// How far goods stand from the middle of their edge, in mm.
 pub const STAND: f64 = 250.0;
+/// Height of the middle of goods on a shelf, in mm.
+pub const SHELF_HEIGHT: f64 = 60.0;
 /// Side of the shelf under one piece of goods, in mm.
 pub const SHELF: f64 = 80.0;
 /// Extent of an obstacle along its edge, in mm.
 pub const OBSTACLE_ALONG: f64 = 80.0;
 /// Extent of an obstacle across its edge, in mm.
 pub const OBSTACLE_ACROSS: f64 = 160.0;
+
+/// How far the walls of the hall are from all tape, in mm.
+const HALL: f64 = 1_500.0;
+/// How thick they are, in mm.
+const WALL: f64 = 100.0;
 
 /// A box on the floor that the ranger sees, sides along the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +34,7 @@ pub struct Block {
 }
 
 impl Block {
-    fn around(middle: (f64, f64), width: f64, height: f64) -> Self {
+    pub(crate) fn around(middle: (f64, f64), width: f64, height: f64) -> Self {
         Self {
             low: [middle.0 - width / 2.0, middle.1 - height / 2.0],
             high: [middle.0 + width / 2.0, middle.1 + height / 2.0],
@@ -81,29 +87,56 @@ pub fn start(warehouse: &Warehouse) -> Pose {
     Pose { x, y, heading }
 }
 
+/// A robot put on a node, looking `quarters` quarter turns counter-clockwise from +x; `None` if
+/// there is no such node.
+pub fn pose_at(warehouse: &Warehouse, at: [u8; 2], quarters: u8) -> Option<Pose> {
+    let inside = at[0] <= warehouse.size[0] && at[1] <= warehouse.size[1];
+    let (x, y) = node(at, side_mm(warehouse));
+    let heading = f64::from(quarters) * FRAC_PI_2;
+    inside.then_some(Pose { x, y, heading })
+}
+
 /// Side of a square in mm.
 pub fn side_mm(warehouse: &Warehouse) -> f64 {
     f64::from(warehouse.side_length_cm) * 10.0
 }
 
+/// An obstacle across the middle of an edge.
+pub(crate) fn obstacle(edge: Edge, side: f64) -> Block {
+    let horizontal = edge.from[1] == edge.to[1];
+    let (width, height) = if horizontal {
+        (OBSTACLE_ALONG, OBSTACLE_ACROSS)
+    } else {
+        (OBSTACLE_ACROSS, OBSTACLE_ALONG)
+    };
+    Block::around(middle(edge, side), width, height)
+}
+
 /// Everything the IR ranger can see: obstacles and shelves.
 pub fn blocks(warehouse: &Warehouse) -> Vec<Block> {
     let side = side_mm(warehouse);
-    let obstacles = warehouse.obstacles.iter().filter_map(|obstacle| {
-        let edge = Edge::between(obstacle.between[0], obstacle.between[1])?;
-        let horizontal = edge.from[1] == edge.to[1];
-        let (width, height) = if horizontal {
-            (OBSTACLE_ALONG, OBSTACLE_ACROSS)
-        } else {
-            (OBSTACLE_ACROSS, OBSTACLE_ALONG)
-        };
-        Some(Block::around(middle(edge, side), width, height))
+    let obstacles = warehouse.obstacles.iter().filter_map(|stands| {
+        let edge = Edge::between(stands.between[0], stands.between[1])?;
+        Some(obstacle(edge, side))
     });
     let shelves = warehouse
         .products
         .iter()
         .map(|product| Block::around(stand(product, side), SHELF, SHELF));
     obstacles.chain(shelves).collect()
+}
+
+/// The walls of a hall around tape that lies between these corners.
+pub fn walls(low: [f64; 2], high: [f64; 2]) -> [Block; 4] {
+    let (x0, y0) = (low[0] - HALL, low[1] - HALL);
+    let (x1, y1) = (high[0] + HALL, high[1] + HALL);
+    let block = |low, high| Block { low, high };
+    [
+        block([x0 - WALL, y0], [x0, y1]),
+        block([x1, y0], [x1 + WALL, y1]),
+        block([x0 - WALL, y0 - WALL], [x1 + WALL, y0]),
+        block([x0 - WALL, y1], [x1 + WALL, y1 + WALL]),
+    ]
 }
 
 #[cfg(test)]
@@ -143,6 +176,16 @@ mod tests {
                 heading: PI
             }
         );
+    }
+
+    #[test]
+    fn a_robot_can_be_put_on_every_node_and_beside_none() {
+        let warehouse = Warehouse::builtin("small").unwrap();
+        let pose = |x, y, heading| Some(Pose { x, y, heading });
+        assert_eq!(pose_at(&warehouse, [0, 0], 0), Some(start(&warehouse)));
+        assert_eq!(pose_at(&warehouse, [2, 1], 2), pose(1000.0, 500.0, PI));
+        assert_eq!(pose_at(&warehouse, [3, 0], 0), None);
+        assert_eq!(pose_at(&warehouse, [0, 3], 0), None);
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! Everything is a signed distance: negative on the tape, positive beside it, in mm. The grid is
 //! computed, not searched (the nearest grid line and the four marks of the square at hand), so a
-//! test costs the same in any warehouse; the line sensor asks eleven times every 5 ms.
+//! test costs the same in any warehouse. The line sensor asks eleven times every 5 ms, and first
+//! which tape is [`Near`] all of its spots: what is not covers none of them.
 //!
 //! ```text
 //!   +-----+-----+   crossings at the border have only the ways that exist,
@@ -14,23 +15,28 @@
 //! ```
 
 use crate::body::Pose;
-use crate::exit::{Piece, exit};
+pub use crate::exit::{BAR, WIDTH};
+use crate::exit::{FAR, HALF, Piece, exit};
 use crate::scene::side_mm;
 use crate::warehouse::{Side, Warehouse};
 
-/// Width of the tape in mm (E1).
-pub const WIDTH: f64 = 15.0;
 /// Length of a station's mark in mm, from the middle of the edge's tape (E5).
 pub const MARK: f64 = 170.0;
-/// Length of the delivery bar in mm (E4).
-pub const BAR: f64 = 300.0;
 /// Goods that lie within this distance of the middle of the bar, in mm, count as delivered.
 pub const DELIVERY_RADIUS: f64 = 400.0;
 
-/// Half the width of the tape.
-pub(crate) const HALF: f64 = WIDTH / 2.0;
-/// Farther away than any spot is wide.
-pub(crate) const FAR: f64 = 1.0e6;
+/// Farther away than this, in mm, a robot is not beside the exit's line: its sensors lost it
+/// before.
+const BESIDE: f64 = 75.0;
+
+/// Which tape may be near a place, as [`Tape::near`] has found it.
+#[derive(Clone, Copy, Debug)]
+pub struct Near {
+    grid: bool,
+    mark: bool,
+    /// The pieces of the exit, a bit for each.
+    exit: u8,
+}
 
 /// All tape of a warehouse.
 #[derive(Clone, Debug)]
@@ -89,34 +95,113 @@ impl Tape {
     }
 
     /// The part of a round spot, 0 to 1, that is on tape; exact to a few percent where the spot
-    /// is smaller than the tape and no corner is near.
-    pub fn coverage(&self, x: f64, y: f64, spot_radius: f64) -> f64 {
-        (0.5 - self.distance(x, y) / (2.0 * spot_radius)).clamp(0.0, 1.0)
+    /// is smaller than the tape and no corner is near. Looks only at what is `near` the spot.
+    pub fn coverage(&self, near: Near, x: f64, y: f64, spot_radius: f64) -> f64 {
+        (0.5 - self.distance_to(near, x, y) / (2.0 * spot_radius)).clamp(0.0, 1.0)
     }
 
     /// Distance to the nearest edge of the tape in mm: negative on the tape. Beyond a few cm it
     /// only says that it is far.
     pub fn distance(&self, x: f64, y: f64) -> f64 {
-        let mut distance = self.grid(x, y).min(self.mark(x, y));
-        if x > self.exit_low[0]
-            && x < self.exit_high[0]
-            && y > self.exit_low[1]
-            && y < self.exit_high[1]
-        {
-            for piece in &self.exit {
-                distance = distance.min(piece.distance(x, y));
+        self.distance_to(self.near(x, y, BAR), x, y)
+    }
+
+    /// The tape that may be as near to a point as `reach`, in mm.
+    pub fn near(&self, x: f64, y: f64, reach: f64) -> Near {
+        let is_over = |low: f64, value: f64, high: f64| low < value && value < high;
+        let is_by_exit = is_over(self.exit_low[0], x, self.exit_high[0])
+            && is_over(self.exit_low[1], y, self.exit_high[1]);
+        let mut exit = 0;
+        if is_by_exit {
+            for (index, piece) in self.exit.iter().enumerate() {
+                exit |= u8::from(piece.at_least(x, y) <= reach) << index;
             }
+        }
+        Near {
+            grid: self.grid(x, y) <= reach,
+            mark: self.is_mark_near(x, y, reach),
+            exit,
+        }
+    }
+
+    fn distance_to(&self, near: Near, x: f64, y: f64) -> f64 {
+        let mut distance = FAR;
+        if near.grid {
+            distance = self.grid(x, y);
+        }
+        if near.mark {
+            distance = distance.min(self.mark(x, y));
+        }
+        let mut exit = near.exit;
+        while exit != 0 {
+            let piece = &self.exit[exit.trailing_zeros() as usize];
+            distance = distance.min(piece.distance(x, y));
+            exit &= exit - 1;
         }
         distance
     }
 
-    fn grid(&self, x: f64, y: f64) -> f64 {
-        let (width, height) = (
+    /// The corners that all tape lies between, in mm.
+    pub fn extent(&self) -> [[f64; 2]; 2] {
+        let (width, height) = self.grid_size();
+        // The exit's box has a margin of a bar's length.
+        let [low, high] = [self.exit_low, self.exit_high];
+        [
+            [(low[0] + BAR).min(0.0), (low[1] + BAR).min(0.0)],
+            [(high[0] - BAR).max(width), (high[1] - BAR).max(height)],
+        ]
+    }
+
+    /// How far a point is from the middle of the line that a robot with this heading follows, in
+    /// mm; nothing where there is none along the heading. Lines go on beyond their ends, so that
+    /// a robot that runs over one is still beside it.
+    pub fn beside(&self, x: f64, y: f64, heading: f64) -> Option<f64> {
+        let (width, height) = self.grid_size();
+        let slack = self.side / 2.0;
+        let within = |value: f64, end: f64| value > -slack && value < end + slack;
+        if within(x, width) && within(y, height) && !self.is_over_exit(x) {
+            let (sin, cos) = heading.sin_cos();
+            let off = |value: f64, most: usize| {
+                let line = (value / self.side).round().clamp(0.0, most as f64);
+                (value - line * self.side).abs()
+            };
+            return if cos.abs() > 0.9 {
+                Some(off(y, self.rows))
+            } else if sin.abs() > 0.9 {
+                Some(off(x, self.columns))
+            } else {
+                None
+            };
+        }
+        // The last piece is the bar.
+        let (_, line) = self.exit.split_last()?;
+        line.iter()
+            .filter_map(|piece| piece.beside(x, y, heading))
+            .min_by(f64::total_cmp)
+            // Farther away it is beside another line, or none.
+            .filter(|off| *off < BESIDE)
+    }
+
+    /// Whether a point is out of the grid on the side of the exit.
+    fn is_over_exit(&self, x: f64) -> bool {
+        match self.bar.x < 0.0 {
+            true => x < -HALF,
+            false => x > self.grid_size().0 + HALF,
+        }
+    }
+
+    fn grid_size(&self) -> (f64, f64) {
+        (
             self.columns as f64 * self.side,
             self.rows as f64 * self.side,
-        );
+        )
+    }
+
+    fn grid(&self, x: f64, y: f64) -> f64 {
+        let (width, height) = self.grid_size();
+        // Cut off, which is quicker than rounding.
         let nearest = |value: f64, most: usize| {
-            (value / self.side).round().clamp(0.0, most as f64) * self.side
+            ((value / self.side + 0.5).max(0.0) as usize).min(most) as f64 * self.side
         };
         let beside = |value: f64, end: f64| (-value).max(value - end) - HALF;
         let upright = ((x - nearest(x, self.columns)).abs() - HALF).max(beside(y, height));
@@ -124,11 +209,28 @@ impl Tape {
         upright.min(level)
     }
 
+    /// The column or row of squares that is nearest to `value`, of so many.
+    fn square(&self, value: f64, count: usize) -> usize {
+        // Cut off below 0.
+        ((value / self.side) as usize).min(count - 1)
+    }
+
     fn mark(&self, x: f64, y: f64) -> f64 {
-        let square = |value: f64, count: usize| {
-            ((value / self.side).floor().max(0.0) as usize).min(count - 1)
+        let (column, row) = (self.square(x, self.columns), self.square(y, self.rows));
+        self.mark_of(column, row, x, y)
+    }
+
+    fn is_mark_near(&self, x: f64, y: f64, reach: f64) -> bool {
+        let squares = |value: f64, count: usize| {
+            self.square(value - reach, count)..=self.square(value + reach, count)
         };
-        let (column, row) = (square(x, self.columns), square(y, self.rows));
+        squares(y, self.rows).any(|row| {
+            squares(x, self.columns).any(|column| self.mark_of(column, row, x, y) <= reach)
+        })
+    }
+
+    /// How far a point is from the marks in a square.
+    fn mark_of(&self, column: usize, row: usize, x: f64, y: f64) -> f64 {
         let marks = self.marks[row * self.columns + column];
         if marks == 0 {
             return FAR;
@@ -154,6 +256,8 @@ impl Tape {
 
 #[cfg(test)]
 mod tests {
+    use core::f64::consts::PI;
+
     use super::*;
     use crate::warehouse::Product;
 
@@ -198,11 +302,36 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_near_a_place_covers_no_spot_around_it() {
+        let mut noise = crate::noise::Noise::new(1, 1);
+        for name in ["small", "curved", "large"] {
+            let tape = Tape::new(&Warehouse::builtin(name).unwrap());
+            let [low, high] = tape.extent();
+            let mut covered = 0;
+            for _ in 0..20_000 {
+                let [x, y] = [0, 1].map(|axis| {
+                    let middle = (low[axis] + high[axis]) / 2.0;
+                    middle + noise.spread(high[axis] - middle + 50.0)
+                });
+                let near = tape.near(x, y, 37.5);
+                let (dx, dy) = noise.spread(PI).sin_cos();
+                let (x, y) = (x + 35.0 * dx, y + 35.0 * dy);
+                let everything = tape.near(x, y, 1.0e5);
+                let seen = tape.coverage(near, x, y, 2.5);
+                assert_eq!(seen, tape.coverage(everything, x, y, 2.5), "{name} {x} {y}");
+                covered += u32::from(seen > 0.0);
+            }
+            assert!(covered > 200, "{covered}");
+        }
+    }
+
+    #[test]
     fn a_spot_on_the_tapes_edge_is_half_covered() {
         let tape = small();
-        assert_eq!(tape.coverage(250.0, 0.0, 2.0), 1.0);
-        assert_eq!(tape.coverage(250.0, 7.5, 2.0), 0.5);
-        assert_eq!(tape.coverage(250.0, 20.0, 2.0), 0.0);
+        let covered = |x, y, radius| tape.coverage(tape.near(x, y, radius), x, y, radius);
+        assert_eq!(covered(250.0, 0.0, 2.0), 1.0);
+        assert_eq!(covered(250.0, 7.5, 2.0), 0.5);
+        assert_eq!(covered(250.0, 20.0, 2.0), 0.0);
     }
 
     #[test]
@@ -234,5 +363,26 @@ mod tests {
             let tape = Tape::new(&warehouse);
             assert!(tape.distance(x, y) < -7.0, "{side:?}");
         }
+    }
+
+    #[test]
+    fn a_robot_is_beside_the_line_that_it_follows() {
+        let tape = small();
+        let beside = |x, y, heading| tape.beside(x, y, heading).map(f64::round);
+        assert_eq!(beside(250.0, 12.0, 0.0), Some(12.0));
+        // On a crossing, the line across does not count.
+        assert_eq!(beside(500.0, 20.0, PI), Some(20.0));
+        assert_eq!(beside(490.0, 250.0, -PI / 2.0), Some(10.0));
+        // The sensors have run over the end of a line.
+        assert_eq!(beside(1_120.0, 507.0, 0.0), Some(7.0));
+        assert_eq!(beside(250.0, 0.0, PI / 4.0), None);
+        assert_eq!(beside(-400.0, 9.0, PI), Some(9.0));
+        assert_eq!(beside(-950.0, 9.0, PI), None);
+        assert_eq!(beside(-100.0, 507.0, PI), None);
+        // They run over the corner from which the exit leads away across.
+        assert_eq!(beside(-9.0, -70.0, -PI / 2.0), None);
+        // The exit's strip overlaps its bar by 5 mm.
+        let corners = tape.extent().map(|corner| corner.map(f64::round));
+        assert_eq!(corners, [[-805.0, -150.0], [1_000.0, 1_000.0]]);
     }
 }

@@ -2,9 +2,10 @@
 
 use thiserror::Error;
 
+use crate::obstacles::MOST_OBSTACLES;
 use crate::warehouse::{
-    Edge, Exit, MAX_EXIT_CM, MAX_PRODUCTS, MAX_SIDE_CM, MAX_SQUARES, MIN_RADIUS_CM, MIN_SIDE_CM,
-    Product, Warehouse,
+    Edge, Exit, Floor, LEAST_CONTRAST, MAX_EXIT_CM, MAX_PRODUCTS, MAX_SIDE_CM, MAX_SQUARES,
+    MIN_RADIUS_CM, MIN_SIDE_CM, Product, Warehouse,
 };
 
 /// Why a warehouse cannot be built.
@@ -36,6 +37,16 @@ pub enum WarehouseError {
         width: u8,
         /// The largest y of a node.
         height: u8,
+    },
+    /// The tape is not darker than the floor.
+    #[error(
+        "floor reads {white} and its tape {tape}; black tape reads more than the floor, by 20 at least"
+    )]
+    Contrast {
+        /// As given.
+        white: u8,
+        /// As given.
+        tape: u8,
     },
     /// The exit's curves are too tight (E3).
     #[error("the exit's radius_cm is {0}; it must be from {MIN_RADIUS_CM} to 200 cm")]
@@ -97,6 +108,9 @@ pub enum WarehouseError {
         /// Distance of their middles.
         gap_mm: u32,
     },
+    /// More obstacles than may stand.
+    #[error("{0} obstacles; at most {most} can stand in a warehouse", most = MOST_OBSTACLES)]
+    TooManyObstacles(usize),
     /// An obstacle that is not on an edge.
     #[error(
         "an obstacle stands between [{}, {}] and [{}, {}], which are not neighbouring nodes of the warehouse", .between[0][0], .between[0][1], .between[1][0], .between[1][1]
@@ -132,8 +146,15 @@ impl Warehouse {
                 height,
             });
         }
+        let Floor { white, tape } = self.floor;
+        if self.floor.contrast() < LEAST_CONTRAST {
+            return Err(WarehouseError::Contrast { white, tape });
+        }
         self.exit.validate()?;
         self.validate_products()?;
+        if self.obstacles.len() > MOST_OBSTACLES {
+            return Err(WarehouseError::TooManyObstacles(self.obstacles.len()));
+        }
         for obstacle in &self.obstacles {
             let [a, b] = obstacle.between;
             let inside = |node: [u8; 2]| node[0] <= width && node[1] <= height;
@@ -232,10 +253,11 @@ mod tests {
 
     #[test]
     fn what_cannot_be_built_is_refused_with_a_sentence() {
-        let cases: [(WarehouseError, &str); 10] = [
+        let cases: [(WarehouseError, &str); 11] = [
             (error(|w| w.size = [0, 2]), "size is 0 x 2"),
             (error(|w| w.side_length_cm = 39), "side must be from 40"),
             (error(|w| w.delivery = [1, 0]), "corner of the warehouse"),
+            (error(|w| w.floor.tape = 50), "floor reads 45"),
             (error(|w| w.exit.radius_cm = 24), "from 25 to 200 cm"),
             (
                 error(|w| w.exit.curve = Curve::Left),

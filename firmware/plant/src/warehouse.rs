@@ -11,7 +11,7 @@
 //!  =----+  exit, ends at the delivery bar
 //! ```
 //! A file is only data: [`Warehouse::validate`] says in a sentence what cannot be built. This
-//! module knows nothing of tape widths or coordinates in mm; see [`crate::scene`].
+//! module knows nothing of tape widths or coordinates in mm; `scene.rs` does.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,8 @@ pub const MAX_SIDE_CM: u16 = 500;
 pub const MIN_RADIUS_CM: u16 = 25;
 /// Straight part in cm before the first and after the last curve of the exit line.
 pub const STRAIGHT_CM: u16 = 20;
+/// Least contrast between floor and tape, in steps of the sensors' 8 bits.
+pub const LEAST_CONTRAST: f64 = 20.0;
 /// Longest exit line in cm.
 pub const MAX_EXIT_CM: u16 = 1_000;
 
@@ -47,6 +49,9 @@ pub struct Warehouse {
     /// Products and their stations (M3).
     #[serde(default, rename = "product", skip_serializing_if = "Vec::is_empty")]
     pub products: Vec<Product>,
+    /// How light floor and tape look to the line sensors.
+    #[serde(default, skip_serializing_if = "Floor::is_usual")]
+    pub floor: Floor,
     /// Things that stand on an edge (E6).
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<Obstacle>,
@@ -71,6 +76,37 @@ impl Default for Exit {
             curve: Curve::Straight,
             radius_cm: 30,
         }
+    }
+}
+
+/// What the line sensors read over the floor and over the tape, 8 bits, the middle of all
+/// sensors. A dark floor or a worn tape has a weak contrast.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Floor {
+    /// Over the bare floor.
+    pub white: u8,
+    /// Over tape; it must be more (S6).
+    pub tape: u8,
+}
+
+impl Default for Floor {
+    fn default() -> Self {
+        Self {
+            white: 45,
+            tape: 205,
+        }
+    }
+}
+
+impl Floor {
+    /// Tape less floor.
+    pub fn contrast(self) -> f64 {
+        f64::from(self.tape) - f64::from(self.white)
+    }
+
+    fn is_usual(&self) -> bool {
+        *self == Self::default()
     }
 }
 

@@ -7,18 +7,26 @@
 use core::time::Duration;
 
 use crate::arm::{self, SERVOS};
+use crate::battery::Battery;
 use crate::body::Pose;
+use crate::contact::Contact;
 use crate::goods::{Good, Goods};
 use crate::ir::IrRanger;
 use crate::line::LineSensor;
+use crate::make::Make;
 use crate::motor::Motor;
 use crate::noise::Noise;
+use crate::obstacles::{HandsOff, Obstacles, Standing};
 use crate::scene::{self, Block};
 use crate::servo::ServoBus;
 use crate::tape::Tape;
 use crate::validate::WarehouseError;
-use crate::warehouse::Warehouse;
+use crate::warehouse::{Edge, Warehouse};
+use crate::weave::Weave;
 
+/// In how many steps the body is once compared with what it may touch, and the battery with what
+/// is drawn from it.
+const SELDOM: u64 = 5;
 /// How inexactly people put the robot down, in mm and rad.
 const PLACING: f64 = 3.0;
 const PLACING_ANGLE: f64 = 0.015;
@@ -30,6 +38,9 @@ mod stream {
     pub(super) const LINE: u64 = 3;
     pub(super) const IR: u64 = 4;
     pub(super) const PLACING: u64 = 5;
+    pub(super) const BATTERY: u64 = 6;
+    pub(super) const GRIP: u64 = 7;
+    pub(super) const SERVOS: u64 = 8;
 }
 
 /// What is worth keeping of a world, to go on with it elsewhere.
@@ -45,6 +56,12 @@ pub struct WorldState {
     pub servo_positions: [u16; SERVOS],
     /// The goods.
     pub goods: Vec<Good>,
+    /// The part of the battery's charge that is left, 0 to 1.
+    pub battery_charge: f64,
+    /// How often the body has run into something.
+    pub collisions: u32,
+    /// What stands on edges.
+    pub obstacles: Vec<Standing>,
 }
 
 /// A warehouse with a robot in it.
@@ -52,14 +69,20 @@ pub struct WorldState {
 pub struct World {
     tape: Tape,
     blocks: Vec<Block>,
+    obstacles: Obstacles,
     goods: Goods,
     pose: Pose,
+    contact: Contact,
+    weave: Weave,
     left: Motor,
     right: Motor,
     duties: [i16; 2],
+    battery: Battery,
     line: LineSensor,
     ir: IrRanger,
     servos: ServoBus,
+    /// Where the servos stand, and with them the claw.
+    arm: ([f64; SERVOS], arm::Claw),
     now_ns: u64,
 }
 
@@ -69,33 +92,47 @@ impl World {
     const STEP_NS: u64 = 1_000_000;
 
     /// The warehouse at its start, the robot at the delivery node, the arm at
-    /// `servo_positions`. `seed` chooses all imperfections.
+    /// `servo_positions`. `seed` chooses all imperfections, as far as `make` has any.
     ///
     /// # Errors
     /// The warehouse cannot be built.
     pub fn new(
         warehouse: &Warehouse,
         seed: u64,
+        make: Make,
         servo_positions: [u16; SERVOS],
     ) -> Result<Self, WarehouseError> {
         warehouse.validate()?;
-        let mut hand = Noise::new(seed, stream::PLACING);
+        let noise = |stream| Noise::new(seed, stream);
+        let mut hand = noise(stream::PLACING);
         let start = scene::start(warehouse);
+        let pose = Pose {
+            x: start.x + hand.spread(PLACING),
+            y: start.y + hand.spread(PLACING),
+            heading: start.heading + hand.spread(PLACING_ANGLE),
+        };
+        let tape = Tape::new(warehouse);
+        let [low, high] = tape.extent();
+        let mut blocks = scene::blocks(warehouse);
+        blocks.extend(scene::walls(low, high));
+        let servos = ServoBus::sagging(servo_positions, noise(stream::SERVOS), make);
+        let positions = servos.positions();
         Ok(Self {
-            tape: Tape::new(warehouse),
-            blocks: scene::blocks(warehouse),
-            goods: Goods::new(warehouse),
-            pose: Pose {
-                x: start.x + hand.spread(PLACING),
-                y: start.y + hand.spread(PLACING),
-                heading: start.heading + hand.spread(PLACING_ANGLE),
-            },
-            left: Motor::new(Noise::new(seed, stream::LEFT_MOTOR)),
-            right: Motor::new(Noise::new(seed, stream::RIGHT_MOTOR)),
+            tape,
+            blocks,
+            obstacles: Obstacles::new(warehouse),
+            goods: Goods::new(warehouse, noise(stream::GRIP), make),
+            contact: Contact::new(pose),
+            weave: Weave::default(),
+            pose,
+            left: Motor::new(noise(stream::LEFT_MOTOR), make),
+            right: Motor::new(noise(stream::RIGHT_MOTOR), make),
             duties: [0; 2],
-            line: LineSensor::new(Noise::new(seed, stream::LINE)),
-            ir: IrRanger::new(Noise::new(seed, stream::IR)),
-            servos: ServoBus::new(servo_positions),
+            battery: Battery::new(noise(stream::BATTERY), make),
+            line: LineSensor::new(noise(stream::LINE), make, warehouse.floor),
+            ir: IrRanger::new(noise(stream::IR), make),
+            servos,
+            arm: (positions, arm::claw(&positions)),
             now_ns: 0,
         })
     }
@@ -119,6 +156,54 @@ impl World {
         self.duties = [left, right];
         self.left.set_duty(left);
         self.right.set_duty(right);
+        self.feed(0.0);
+    }
+
+    /// The battery's voltage now.
+    pub fn battery_volts(&self) -> f64 {
+        self.battery.volts()
+    }
+
+    /// Puts another charge in the battery's place, 0 to 1. One of a robot as drawn has no charge.
+    pub fn set_battery_charge(&mut self, charge: f64) {
+        self.battery.set_charge(charge);
+        self.feed(0.0);
+    }
+
+    /// How often the body has run into something.
+    pub fn collisions(&self) -> u32 {
+        self.contact.collisions()
+    }
+
+    /// The largest lateral error after the first metre, in mm ([`crate::weave`]).
+    pub fn worst_lateral_mm(&self) -> f64 {
+        self.weave.worst()
+    }
+
+    /// From now on so many things stand on edges of the warehouse, at random, and come and go.
+    pub fn scatter_obstacles(&mut self, count: u32, seed: u64) {
+        self.obstacles.scatter(count, seed);
+    }
+
+    /// Puts a thing on an edge; one that stands there already stays.
+    ///
+    /// # Errors
+    /// The warehouse has no such edge, the robot is there, or too many things stand already.
+    pub fn put_obstacle(&mut self, edge: Edge) -> Result<(), HandsOff> {
+        self.obstacles.put(edge, &self.pose, &mut self.blocks)
+    }
+
+    /// Takes the thing on an edge away.
+    ///
+    /// # Errors
+    /// The warehouse has no such edge, or nothing stands there.
+    pub fn take_obstacle(&mut self, edge: Edge) -> Result<(), HandsOff> {
+        self.obstacles.take(edge, &mut self.blocks)
+    }
+
+    /// Counts changes of goods and obstacles: what a picture of the world must not miss.
+    pub fn changes(&self) -> u64 {
+        self.goods.changes() + self.obstacles.changes()
     }
 
     /// The duties at the left and the right motor.
@@ -154,6 +239,7 @@ impl World {
     /// Puts the robot somewhere, at rest.
     pub fn place(&mut self, pose: Pose) {
         self.pose = pose;
+        self.contact.place(pose);
         self.left.set_speed(0.0);
         self.right.set_speed(0.0);
     }
@@ -170,7 +256,7 @@ impl World {
 
     /// The claw in the robot's coordinates.
     pub fn claw(&self) -> arm::Claw {
-        arm::claw(&self.servos.positions())
+        self.arm.1
     }
 
     /// What is worth keeping.
@@ -184,33 +270,82 @@ impl World {
                 .positions()
                 .map(|position| position.round() as u16),
             goods: self.goods.list().to_vec(),
+            battery_charge: self.battery.charge(),
+            collisions: self.contact.collisions(),
+            obstacles: self.obstacles.standing().to_vec(),
         }
     }
 
-    /// Goes on from a kept state: time, pose, servos and goods; the motors are off.
+    /// Goes on from a kept state: time, pose, servos, goods, obstacles and
+    /// battery; the motors are off.
     pub fn restore(&mut self, state: &WorldState) {
         self.now_ns = state.time.as_nanos() as u64 / Self::STEP_NS * Self::STEP_NS;
         self.pose = state.pose;
+        self.contact.place(state.pose);
+        self.contact.set_collisions(state.collisions);
+        self.battery.set_charge(state.battery_charge);
         self.set_motors(0, 0);
         self.left.set_speed(state.wheel_speeds[0]);
         self.right.set_speed(state.wheel_speeds[1]);
         self.servos.set_positions(state.servo_positions);
+        self.move_claw();
         self.goods.restore(&state.goods);
+        self.obstacles
+            .restore(&state.obstacles, self.now_ns, &mut self.blocks);
     }
 
     fn step(&mut self) {
         let seconds = Self::STEP_NS as f64 / 1e9;
+        let seldom = self.now_ns.is_multiple_of(SELDOM * Self::STEP_NS);
+        if seldom {
+            self.feed(seconds * SELDOM as f64);
+        }
         self.left.step(seconds);
         self.right.step(seconds);
         let (left, right) = (self.left.speed(), self.right.speed());
         if left != 0.0 || right != 0.0 {
             self.pose = self.pose.moved(left, right, seconds);
+            if seldom {
+                self.touch(seconds * SELDOM as f64);
+            }
         }
         self.servos
             .step(seconds, arm::claw_position(self.goods.narrowest()));
+        self.move_claw();
         let claw = self.claw();
-        self.goods.step(&self.pose, &claw, &self.tape);
+        self.goods.step(seconds, &self.pose, &claw, &self.tape);
+        self.obstacles
+            .step(self.now_ns, &self.pose, &mut self.blocks);
         self.ir.step(self.now_ns, &self.pose, &self.blocks);
+    }
+
+    /// The claw follows the servos; most of the time they stand.
+    fn move_claw(&mut self) {
+        let positions = self.servos.positions();
+        if positions != self.arm.0 {
+            self.arm = (positions, arm::claw(&positions));
+        }
+    }
+
+    /// The battery feeds the motors.
+    fn feed(&mut self, seconds: f64) {
+        self.battery.step(seconds, self.duties);
+        self.left.set_supply(self.battery.volts());
+        self.right.set_supply(self.battery.volts());
+    }
+
+    /// The body stops at what it cannot pass and pushes what it can.
+    fn touch(&mut self, seconds: f64) {
+        let goods = self.goods.list_mut();
+        let (pose, pushed) = self
+            .contact
+            .resolve(self.pose, &self.blocks, goods, self.now_ns);
+        self.pose = pose;
+        if pushed {
+            self.goods.pushed(&self.tape);
+        }
+        let way = f64::midpoint(self.left.speed(), self.right.speed()) * seconds;
+        self.weave.step(&self.pose, self.duties, way, &self.tape);
     }
 }
 
@@ -221,7 +356,13 @@ mod tests {
     const ARM: [u16; SERVOS] = [512, 600, 423, 400, 623, 512, 512, 512];
 
     fn world(seed: u64) -> World {
-        World::new(&Warehouse::builtin("small").unwrap(), seed, ARM).unwrap()
+        World::new(
+            &Warehouse::builtin("small").unwrap(),
+            seed,
+            Make::Nominal,
+            ARM,
+        )
+        .unwrap()
     }
 
     fn drive(world: &mut World, step: Duration, end: Duration) -> Pose {
@@ -256,6 +397,30 @@ mod tests {
         let (from, to) = (first.pose(), second.pose());
         let rolled = (to.x - from.x).hypot(to.y - from.y);
         assert!((1.0..15.0).contains(&rolled), "it rolls out: {rolled} mm");
+    }
+
+    #[test]
+    fn a_thing_on_an_edge_stops_the_body_and_is_a_collision() {
+        let mut world = world(1);
+        world.scatter_obstacles(40, 1);
+        let pose = drive_on(&mut world);
+        assert_eq!(world.state().collisions, 1);
+        // On the second edge: before the robot nobody puts anything.
+        assert!((520.0..560.0).contains(&pose.x), "{pose:?}");
+    }
+
+    /// Ten seconds straight ahead at the standard duty.
+    fn drive_on(world: &mut World) -> Pose {
+        world.set_motors(100, 100);
+        world.advance_to(Duration::from_secs(10));
+        world.pose()
+    }
+
+    #[test]
+    fn without_things_nothing_is_touched() {
+        let mut world = world(1);
+        assert!(drive_on(&mut world).x > 600.0);
+        assert_eq!(world.state().collisions, 0);
     }
 
     #[test]

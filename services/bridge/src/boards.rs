@@ -8,7 +8,8 @@ use std::sync::atomic::Ordering;
 use lager_topics::{BoardHealth, Health};
 use lager_wire::{BoardStatus, Callsign, Version};
 
-use crate::reader::{BoardUp, Shared};
+use crate::counts::{Counts, index};
+use crate::events::BoardUp;
 
 /// One board.
 #[derive(Clone, Copy, Debug)]
@@ -24,22 +25,11 @@ pub(crate) struct Boards {
     boards: [Board; 2],
 }
 
-/// The place of a callsign in tables of two; `None` for what is no board.
-pub(crate) fn index(callsign: Callsign) -> Option<usize> {
-    match callsign {
-        Callsign::Sensor => Some(0),
-        Callsign::Steering => Some(1),
-        Callsign::Error | Callsign::Raspi => None,
-    }
-}
-
 impl Boards {
     /// Boards that have not been found, with the counts of an earlier life of the bridge.
-    pub(crate) fn new(kept: Option<&Health>, shared: &Shared) -> Self {
-        let board = |earlier: Option<&BoardHealth>, index: usize| {
+    pub(crate) fn new(kept: Option<&Health>) -> Self {
+        let board = |earlier: Option<&BoardHealth>| {
             let earlier = earlier.copied().unwrap_or_default();
-            shared.epochs[index].store(earlier.epoch, Ordering::Relaxed);
-            shared.lost[index].store(earlier.lost_total, Ordering::Relaxed);
             Board {
                 health: BoardHealth {
                     epoch: earlier.epoch,
@@ -52,8 +42,8 @@ impl Boards {
         };
         Self {
             boards: [
-                board(kept.map(|kept| &kept.sensor), 0),
-                board(kept.map(|kept| &kept.steering), 1),
+                board(kept.map(|kept| &kept.sensor)),
+                board(kept.map(|kept| &kept.steering)),
             ],
         }
     }
@@ -148,13 +138,13 @@ impl Boards {
     }
 
     /// Takes over what the readers have counted.
-    pub(crate) fn measure(&mut self, shared: &Shared) {
-        for (board, lost) in self.boards.iter_mut().zip(&shared.lost) {
+    pub(crate) fn measure(&mut self, counts: &Counts) {
+        for (board, lost) in self.boards.iter_mut().zip(&counts.lost) {
             board.health.lost_total = lost.load(Ordering::Relaxed);
             let Some(place) = board.place else {
                 continue;
             };
-            let meter = &shared.meters[place];
+            let meter = &counts.meters[place];
             board.health.packets = meter.packets.load(Ordering::Relaxed);
             board.health.lost = meter.lost.load(Ordering::Relaxed);
             board.health.bad_crc = meter.refused.load(Ordering::Relaxed);

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use lager_ports::Policy;
+use lager_wire::ArmProfile;
 
 /// What the bridge is told at start.
 #[derive(Clone, Debug)]
@@ -18,6 +19,11 @@ pub struct BridgeConfig {
     /// Ask the sensor board for its raw readings besides the line's state. They cost the sensor
     /// line one packet in three.
     pub raw_line: bool,
+    /// Drive an original steering board, whose commands have no age limit: if this process dies,
+    /// it goes on with what it was told last. Else such a board is told standby only.
+    pub original_boards: bool,
+    /// What the arm may do, as the steering board is told. Its owner has validated it.
+    pub arm: ArmProfile,
     /// How to wait for orders and reports.
     pub waiting: Policy,
 }
@@ -32,6 +38,8 @@ impl Default for BridgeConfig {
             baud: 500_000,
             resume: false,
             raw_line: false,
+            original_boards: false,
+            arm: ArmProfile::default(),
             waiting: Policy::default(),
         }
     }

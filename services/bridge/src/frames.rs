@@ -63,10 +63,11 @@ impl ServoTable {
     }
 }
 
-/// The sample a report of the steering board makes.
+/// The sample a report of the steering board makes that came `age_ms` ago, in robot time.
 pub fn steering_report(
     link_epoch: u32,
     data: &SteerData,
+    age_ms: u16,
     servos: &ServoTable,
     arbiter: &Arbiter,
 ) -> SteeringReport {
@@ -79,6 +80,7 @@ pub fn steering_report(
         line_error: data.line_error,
         servo_errors: data.servo_errors,
         battery_decivolts: data.battery_decivolts,
+        age_ms,
         servo_position: servos.position,
         servo_load: servos.load,
         ..SteeringReport::default()

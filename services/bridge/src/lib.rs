@@ -5,17 +5,18 @@
 //!  sensor board ==UART==> reader thread --> sensor/line, sensor/distance
 //!                            | handshakes
 //!                            v
-//!  steering/command ---> main loop (Arbiter) --> steering/state, link/health
+//!  steering/command ---> main loop (BridgeCore) -> steering/state, link/health
 //!  operator/input          ^        |
 //!  bridge/request          | reports| commands, ACKs
 //!                       reader thread
 //!  steering board ==UART====+<======+
 //! ```
 //!
-//! * [`arbiter`]: whose word counts, as a pure state machine. The simulation in one process runs
-//!   it too.
+//! * [`arbiter`]: whose word counts, as a pure state machine.
+//! * [`machine`]: all that the bridge decides, around the arbiter, and just as pure.
+//! * [`listener`]: the receiving end of one port, pure too. `lager simulate` runs both.
 //! * [`serial`]: a port, and what to do when it cannot be opened.
-//! * [`frames`], [`settings`]: pure helpers between packets and samples.
+//! * [`frames`], [`settings`], [`profile`]: pure helpers between packets and samples.
 //! * `path`: how long sensor frames take to become commands, for `latency/path`.
 //! * [`run`]: the shell with its three threads.
 //!
@@ -25,13 +26,23 @@
 
 pub mod arbiter;
 mod boards;
+mod calibration;
 mod config;
+mod counts;
+mod events;
 pub mod frames;
+pub mod listener;
+pub mod machine;
 mod path;
+mod presses;
+pub mod profile;
 mod reader;
+mod resets;
 pub mod serial;
 mod service;
 pub mod settings;
 
 pub use config::BridgeConfig;
+pub use counts::Counts;
+pub use events::{BoardUp, Moment, PortEvent};
 pub use service::run;

@@ -78,10 +78,10 @@ impl Default for Settings {
 }
 
 /// The board a setting belongs to.
-pub fn home(key: SettingKey) -> Callsign {
+fn home(key: SettingKey) -> Callsign {
     match key {
-        SettingKey::GainP | SettingKey::GainD => Callsign::Steering,
         SettingKey::RawLine | SettingKey::Calibrate => Callsign::Sensor,
+        _ => Callsign::Steering,
     }
 }
 
@@ -100,7 +100,8 @@ impl Settings {
 
     /// Writes the settings' part of `link/health`: all that [`Settings::resume`] needs.
     pub fn fill(&self, health: &mut Health) {
-        let gain = |key| self.find(key).kept.unwrap_or(Health::NEVER_SET);
+        let kept = |key| self.find(key).and_then(|slot| slot.kept);
+        let gain = |key| kept(key).unwrap_or(Health::NEVER_SET);
         health.gain_p = gain(SettingKey::GainP);
         health.gain_d = gain(SettingKey::GainD);
     }
@@ -112,7 +113,9 @@ impl Settings {
 
     /// Makes a value one that a board is told whenever it comes up, from its next coming on.
     pub fn keep(&mut self, key: SettingKey, value: i16) {
-        self.slot(key).kept = Some(value);
+        if let Some(slot) = self.slot(key) {
+            slot.kept = Some(value);
+        }
     }
 
     /// A board has come up: it is told again what it had taken. What was under way is over.
@@ -167,7 +170,9 @@ impl Settings {
     /// changes nothing: it comes twice, or tells how a calibration ended that had been answered
     /// when it began.
     pub fn answer(&mut self, reply: &SettingReply) -> bool {
-        let slot = self.slot(reply.key);
+        let Some(slot) = self.slot(reply.key) else {
+            return false;
+        };
         if slot.next_try.is_none() || slot.seq != reply.seq {
             return false;
         }
@@ -187,18 +192,21 @@ impl Settings {
 
     /// How far the last wish for a key has come.
     pub fn progress(&self, key: SettingKey) -> Progress {
-        self.find(key).progress
+        self.find(key)
+            .map_or(Progress::Unanswered, |slot| slot.progress)
     }
 
     /// The value a board last said is in force.
     pub fn in_force(&self, key: SettingKey) -> Option<i16> {
-        self.find(key).in_force
+        self.find(key)?.in_force
     }
 
     fn start(&mut self, now: Duration, key: SettingKey, value: i16) {
         self.last_seq = self.last_seq.wrapping_add(1);
         let seq = self.last_seq;
-        let slot = self.slot(key);
+        let Some(slot) = self.slot(key) else {
+            return;
+        };
         slot.wanted = value;
         slot.seq = seq;
         slot.tries = 0;
@@ -206,22 +214,12 @@ impl Settings {
         slot.progress = Progress::Pending;
     }
 
-    fn find(&self, key: SettingKey) -> &Slot {
-        &self.slots[index(key)]
+    fn find(&self, key: SettingKey) -> Option<&Slot> {
+        self.slots.iter().find(|slot| slot.key == key)
     }
 
-    fn slot(&mut self, key: SettingKey) -> &mut Slot {
-        &mut self.slots[index(key)]
-    }
-}
-
-/// Place of a key's slot.
-fn index(key: SettingKey) -> usize {
-    match key {
-        SettingKey::GainP => 0,
-        SettingKey::GainD => 1,
-        SettingKey::RawLine => 2,
-        SettingKey::Calibrate => 3,
+    fn slot(&mut self, key: SettingKey) -> Option<&mut Slot> {
+        self.slots.iter_mut().find(|slot| slot.key == key)
     }
 }
 

@@ -1,5 +1,5 @@
 //! The bridge killed with SIGKILL again and again while the robot turns and drives: every turn is
-//! carried out once, and the robot halts by itself meanwhile.
+//! carried out once, and the robot halts by itself meanwhile. And frozen, stopped, and let go on.
 //!
 //! It is a program without the test harness because it starts itself again as the bridge: only a
 //! process can be killed like a process.
@@ -13,10 +13,11 @@ use std::time::{Duration, Instant};
 use lager_bridge::BridgeConfig;
 use lager_ports::{Bus, Keeper, Shutdown};
 use lager_topics::{Finish, LinkHealth, Mode, Role, SteeringOrder};
+use rustix::process::{Pid, Signal, kill_process};
 
 use harness::{
-    Board, FOLLOW, Hands, Isolation, LEFT_PERP, PATIENCE, SensorBoard, SteeringBoard, logic,
-    wait_until,
+    Board, FOLLOW, Hands, Isolation, LEFT_PERP, PATIENCE, STANDBY, SensorBoard, SteeringBoard,
+    logic, wait_until,
 };
 
 const AS_BRIDGE: &str = "as-bridge";
@@ -24,22 +25,24 @@ const AS_BRIDGE: &str = "as-bridge";
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     match arguments.get(1).map(String::as_str) {
-        Some(AS_BRIDGE) => be_the_bridge(&arguments[2]),
+        Some(AS_BRIDGE) => be_the_bridge(&arguments[2], arguments.len() > 3),
         Some("--list") => (),
         _ => {
             a_turn_is_carried_out_once_however_often_the_bridge_is_killed();
             println!("test a_turn_is_carried_out_once_however_often_the_bridge_is_killed ... ok");
+            a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older();
+            println!("test a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older ... ok");
         }
     }
 }
 
-fn be_the_bridge(name: &str) {
+fn be_the_bridge(name: &str, resume: bool) {
     let config = harness::bus_config(name);
-    let folder = config.root.clone().expect("an isolated bus has a root");
+    let folder = harness::folder(name);
     let bus = Bus::open(&config, Role::Bridge).unwrap();
     let config = BridgeConfig {
         ports: [folder.join("sensor"), folder.join("steering")],
-        resume: true,
+        resume,
         ..BridgeConfig::default()
     };
     lager_bridge::run(&bus, &config, &Shutdown::new()).unwrap();
@@ -49,11 +52,12 @@ fn be_the_bridge(name: &str) {
 struct Running(Child);
 
 impl Running {
-    fn start(isolation: &Isolation) -> Self {
+    fn start(isolation: &Isolation, resume: Option<&str>) -> Self {
         let program = std::env::current_exe().unwrap();
         Self(
             Process::new(program)
                 .args([AS_BRIDGE, isolation.name()])
+                .args(resume)
                 .spawn()
                 .unwrap(),
         )
@@ -88,7 +92,7 @@ impl Scene {
         let steering = Board::plugged(SteeringBoard::new(), isolation.folder().join("steering"));
         let supervisor = isolation.open(Role::Supervisor);
         Self {
-            bridge: Running::start(&isolation),
+            bridge: Running::start(&isolation, None),
             keeper: supervisor.keeper().unwrap(),
             hands: Hands::new(&isolation.open(Role::Operator)),
             supervisor,
@@ -104,7 +108,7 @@ impl Scene {
         self.keeper.remember().unwrap();
         self.supervisor.sweep();
         self.keeper.hand_over().unwrap();
-        self.bridge = Running::start(&self.isolation);
+        self.bridge = Running::start(&self.isolation, Some("resume"));
     }
 
     /// Renews `order` until `condition` holds, and does the supervisor's work beside it.
@@ -185,4 +189,49 @@ fn a_turn_is_carried_out_once_however_often_the_bridge_is_killed() {
         "some turns were cut short by the board's limit"
     );
     assert_eq!(scene.steering.with(|board| board.restarts), 0);
+}
+
+/// Orders wait on the bus for the bridge, and the stop is set, while it is frozen; the lease of
+/// none of them has ended when it goes on.
+fn a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older() {
+    let mut scene = Scene::new();
+    scene.hands.wait_for_health("both boards are up", |health| {
+        health.sensor.up == 1 && health.steering.up == 1
+    });
+    scene.hands.set_mode(Mode::Autonomous);
+    let process = Pid::from_raw(i32::try_from(scene.bridge.0.id()).unwrap()).unwrap();
+    let mut id = 100;
+    for round in 0..20 {
+        id += 1;
+        scene.renew_until(logic(id, FOLLOW), "it drives", |scene| {
+            scene.steering.with(|board| board.moves())
+        });
+        kill_process(process, Signal::STOP).unwrap();
+        wait_until("the bridge is frozen", || {
+            let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
+            stat.unwrap().rsplit(") ").next().unwrap().starts_with('T')
+        });
+        // What came before is with the board by now.
+        std::thread::sleep(Duration::from_millis(5));
+        let before = scene.steering.with(|board| board.executed.len());
+        let stop = scene.hands.stop();
+        for _ in 0..10 {
+            id += 1;
+            scene.hands.give(logic(id, FOLLOW));
+        }
+        kill_process(process, Signal::CONT).unwrap();
+        wait_until("the board reports wheels at rest after the stop", || {
+            let rested = scene.hands.stop_told().rested();
+            rested.is_some_and(|(of, _)| of == stop)
+        });
+        let after = scene
+            .steering
+            .with(|board| board.executed[before..].to_vec());
+        assert!(
+            after.iter().all(|code| *code == STANDBY.code()),
+            "round {round}: {after:?}"
+        );
+        let answer = scene.hands.resume();
+        assert_eq!(answer.stopped, 0);
+    }
 }

@@ -2,12 +2,15 @@
 //!
 //! Nothing is measured here; the same code runs under criterion and in the guard.
 
+mod stop;
+
 use anyhow::{Context, Result, ensure};
 use lager_benches::chip::{self, ChipReport, Programs};
 use lager_benches::{Mode, Options, Regime, fanout, hop, path};
 
 use crate::cli::{BenchArgs, Scenario};
 use crate::config::ChipSection;
+use crate::exit::Usage;
 
 /// Measures and returns what is to be printed.
 pub fn run(args: &BenchArgs) -> Result<String> {
@@ -17,6 +20,7 @@ pub fn run(args: &BenchArgs) -> Result<String> {
         Scenario::Path => ("path", path::measure(&options)),
         Scenario::Fanout => ("fanout", fanout::measure(&options)),
         Scenario::Chip => return run_chip(args),
+        Scenario::Stop => return run_stop(args),
     };
     let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
     Ok(if args.json {
@@ -32,7 +36,10 @@ fn run_chip(args: &BenchArgs) -> Result<String> {
     let chosen = args.quick || args.runs.is_some();
     ensure!(
         !chosen && args.mode.is_empty() && args.regime.is_empty(),
-        "`lager bench chip` counts cycles, and every run counts the same: it takes --json and nothing else"
+        Usage(
+            "`lager bench chip` counts cycles, and every run counts the same: it takes --json and nothing else"
+                .into()
+        )
     );
     let [fast, slow] = chip::BAUDS.map(|baud| {
         ChipSection::default().parts(baud).map(|parts| {
@@ -51,6 +58,23 @@ fn run_chip(args: &BenchArgs) -> Result<String> {
         report.to_json()
     } else {
         report.to_string().trim_end().to_owned()
+    })
+}
+
+/// How often a robot is stopped: for a first look, and in full.
+const STOPS: [usize; 2] = [20, 200];
+
+/// The processes that people run, on a robot of the measurement's own.
+fn run_stop(args: &BenchArgs) -> Result<String> {
+    ensure!(
+        args.mode.is_empty() && args.regime.is_empty(),
+        "`lager bench stop` runs the robot as `lager up` does: it takes --runs, --quick and --json"
+    );
+    let stops = args.runs.unwrap_or(STOPS[usize::from(!args.quick)]);
+    let report = stop::measure(stops).context("`lager bench stop` has no result")?;
+    Ok(match args.json {
+        true => serde_json::to_string(&report)?,
+        false => report.to_string().trim_end().to_owned(),
     })
 }
 
@@ -126,7 +150,7 @@ mod tests {
     #[test]
     fn wrong_choices_say_what_there_is() {
         for (flags, words) in [
-            (&["leap"][..], "hop, path, fanout, chip"),
+            (&["leap"][..], "hop, path, fanout, chip, stop"),
             (&["hop", "--mode", "busy"], "spin, adaptive or block"),
             (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
             (&["hop", "--runs", "0"], "the least"),

@@ -1,15 +1,22 @@
 //! The command line: every subcommand, flag and example. No behaviour lives here.
 
+pub mod help;
 mod realtime;
+mod values;
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use lager_benches::{Mode, Regime};
+use lager_wire::OperatorCommand;
 
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
 
+pub use values::Fetch;
+
 use crate::config::Body;
+use crate::steer::Place;
 
 /// The software of a small warehouse robot around a zero-copy shared-memory bus.
 #[derive(Debug, Parser)]
@@ -22,14 +29,14 @@ use crate::config::Body;
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1
   lager up --body chip                         the boards' real images in an emulator
   lager up --realtime 20 --lock-memory --core bridge=0 --core logic=1
-  lager simulate --seeds 1..20 --warehouse large --mission 1,2
-  lager topic hz sensor/line
+  lager simulate --seeds 1..20 --warehouse large --mission 1,2 --obstacles 4
+  lager topic echo link/health
   lager bench hop --quick
   lager drive follow-forward
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 the mission was not delivered,
 4 a robot of this name is already up, 5 real time, locked memory or cores are
-not granted as asked for."
+not granted as asked for, 130 interrupted before it was done."
 )]
 pub struct Cli {
     /// What every subcommand takes.
@@ -40,21 +47,64 @@ pub struct Cli {
     pub command: Command,
 }
 
+/// What a person does to a way of the simulated floor.
+#[derive(Debug, Subcommand)]
+pub enum ObstacleChange {
+    /// Put a thing on a way, where the robot is not
+    Put {
+        /// A crossing, and up, down, left or right from it
+        #[arg(value_name = "X,Y,SIDE")]
+        way: Place,
+    },
+    /// Take the thing on a way away
+    Take {
+        /// A crossing, and up, down, left or right from it
+        #[arg(value_name = "X,Y,SIDE")]
+        way: Place,
+    },
+}
+
+/// What a person changes about the orders that wait.
+#[derive(Debug, Subcommand)]
+pub enum QueueChange {
+    /// Add an order for a product at the end
+    Add {
+        /// The product's number
+        #[arg(allow_negative_numbers = true, value_parser = values::product)]
+        product: i32,
+    },
+    /// Take a waiting order back
+    Cancel {
+        /// The order's number
+        #[arg(value_name = "ORDER")]
+        id: u32,
+    },
+    /// Let a waiting order change places with the one before it
+    Up {
+        /// The order's number
+        #[arg(value_name = "ORDER")]
+        id: u32,
+    },
+    /// Take all waiting orders back
+    Clear,
+}
+
 /// Flags of every subcommand.
 #[derive(Debug, Args)]
 pub struct GlobalArgs {
-    /// Configuration file [default: ./lager.toml if there is one]
-    #[arg(long, global = true, value_name = "FILE")]
+    /// Configuration file, - for standard input [default: ./lager.toml if there is one]
+    #[arg(long, global = true, value_name = "FILE", help_heading = "Robot")]
     pub config: Option<PathBuf>,
     /// The robot's name [default: r1]
-    #[arg(long, global = true, value_name = "ROBOT")]
+    #[arg(long, global = true, value_name = "ROBOT", help_heading = "Robot", value_parser = values::robot)]
     pub name: Option<String>,
-    /// Prefix of the bus's shared-memory files, to keep a bus apart
-    #[arg(long, global = true, value_name = "PREFIX")]
-    pub bus_prefix: Option<String>,
-    /// Folder of the bus's bookkeeping files, to keep a bus apart
-    #[arg(long, global = true, value_name = "FOLDER")]
-    pub bus_root: Option<PathBuf>,
+    /// Folder in which the bus lives [default: /run/lager if it is this user's, else
+    /// /dev/shm/lager-UID]
+    #[arg(long, global = true, value_name = "FOLDER", help_heading = "Bus")]
+    pub bus: Option<PathBuf>,
+    /// Append traces to this file: those RUST_LOG asks for, or `info`
+    #[arg(long, global = true, value_name = "FILE", help_heading = "Output")]
+    pub log: Option<PathBuf>,
 }
 
 /// The subcommands.
@@ -74,9 +124,10 @@ pub enum Command {
     )]
     Drive {
         /// Name or code of the command
-        command: String,
+        #[arg(allow_negative_numbers = true, value_parser = values::wheel_command)]
+        command: OperatorCommand,
         /// Let go after this many seconds instead of at Ctrl-C
-        #[arg(long, value_name = "SECONDS")]
+        #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::seconds)]
         seconds: Option<f64>,
     },
     /// Move the arm one step
@@ -85,7 +136,8 @@ pub enum Command {
     )]
     Arm {
         /// Name or code of the command
-        command: String,
+        #[arg(allow_negative_numbers = true, value_parser = values::arm_command)]
+        command: OperatorCommand,
     },
     /// Stop the robot, in any mode; it stays stopped until `lager resume`
     Stop,
@@ -99,17 +151,61 @@ pub enum Command {
     /// Order a product to be fetched and delivered
     Fetch {
         /// The product's number
+        #[arg(allow_negative_numbers = true, value_parser = values::product)]
         product: i32,
     },
+    /// Show the orders, add one, take one back, or have one carried out earlier
+    #[command(after_help = "Examples:
+  lager queue                 the orders with their numbers, the next one first
+  lager queue add 3           fetch product 3 after all the others, once the robot is autonomous
+  lager queue up 4711         carry order 4711 out before the one that stands before it
+  lager queue cancel 4711     take it back
+
+The order that is under way is not in the queue any more.")]
+    Queue {
+        /// What to change [default: nothing, show it]
+        #[command(subcommand)]
+        change: Option<QueueChange>,
+    },
     /// Tell the robot that the product has been picked up
-    Picked,
+    Picked {
+        /// Believe it even if the claw does not feel the product and the arm is not where it is carried
+        #[arg(long)]
+        force: bool,
+    },
     /// Tell the robot that it has been put on the delivery node, looking into the warehouse
     Reset,
+    /// Show what stands on the ways of the simulated floor, put a thing there, or take it away
+    #[command(after_help = "Examples:
+  lager obstacle                  what stands where
+  lager obstacle put 1,0,right    a thing on the way from crossing 1,0 to 2,0
+  lager obstacle take 2,0,left    the same one is gone
+
+What stands there outlives a restart of the simulator.")]
+    Obstacle {
+        /// What to change [default: nothing, show them]
+        #[command(subcommand)]
+        change: Option<ObstacleChange>,
+    },
+    /// Put a simulated robot on a crossing and tell logic; a real one you have put there yourself
+    #[command(after_help = "Examples:
+  lager place                 a simulated robot, on the delivery node, looking into the warehouse
+  lager place 2,1,up          on column 2, row 1, looking towards greater rows
+
+The robot must stand: take the manual mode, or stop it. `lager reset` is the reset button of a
+real robot that has been put on the delivery node.")]
+    Place {
+        /// Column, row and heading (left, up, right, down) [default: the delivery node of a simulated robot]
+        #[arg(value_name = "X,Y,HEADING", allow_hyphen_values = true)]
+        place: Option<Place>,
+    },
     /// Set the gains of the line following (PD)
     Gains {
         /// Proportional gain, 2 unless set
+        #[arg(allow_negative_numbers = true, value_parser = values::gain)]
         p: u8,
         /// Derivative gain over 10 ms, 2 unless set
+        #[arg(allow_negative_numbers = true, value_parser = values::gain)]
         d: u8,
     },
     /// Calibrate the line sensors: move the robot over tape and floor by hand for five seconds
@@ -119,12 +215,41 @@ pub enum Command {
         /// Remove what dead processes left on the bus
         #[arg(long)]
         fix: bool,
+        /// Print one line of JSON
+        #[arg(long, help_heading = "Output")]
+        json: bool,
         /// What `lager up` is to be started with
         #[command(flatten)]
         realtime: UpRealtimeArgs,
     },
     /// Print the configuration in force, with every key
-    Config,
+    Config {
+        /// Print an iceoryx2.toml instead, with which other iceoryx2 programs join the bus
+        #[arg(long)]
+        iceoryx2: bool,
+    },
+    /// The service that talks to the external computer, and the only one with a socket to the network
+    #[command(after_help = "Examples:
+  lager comm --station 192.168.1.5:7420
+
+It connects to a station for ever. In manual mode the robot carries out what the
+station answers, and stands when the link is lost; in autonomous mode it fetches what
+the station answers, and goes on without the link.")]
+    Comm(CommArgs),
+    /// The external computer: answers robots by TCP, and lets a GaG answer them
+    #[command(after_help = "Examples:
+  lager station --warehouse warehouse.toml             robots of this machine
+  lager station --listen 192.168.1.5:7420 --warehouse warehouse.toml
+  socat READLINE UNIX-CONNECT:/run/lager/gag           be the GaG: answer what it asks
+
+It answers a robot from the warehouse file and by itself. While a GaG is connected to
+its socket, that answers instead, in the words of the document's grammar, for the robot
+that has been connected for longest; what it says of the warehouse is saved. Robots and
+GaG are not asked who they are: let only those reach --listen who may drive.")]
+    Station(StationArgs),
+    /// What `up` needs done on the bus; only `up` starts it
+    #[command(hide = true)]
+    Attend(ServiceArgs),
     /// The service that owns the serial ports and decides who steers
     Bridge(ServiceArgs),
     /// The service that navigates
@@ -149,8 +274,11 @@ pub enum ModeName {
 #[command(after_help = "Examples:
   lager up                                                the simulated robot
   lager up --headless --mission 1,2 --speed 5 --exit-when-done --json
-  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards
+  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards, driven by a person
+  lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1 --script --mission 1
+                                                          the boards, driven by the script
   lager up --body chip                                    their images in an emulator
+  lager up --station 192.168.1.5:7420                     another machine is the external computer
   lager up --realtime 20 --lock-memory --core bridge=2 --core logic=3
 
 Real time is for bridge and logic, the services between sensor and steering, and
@@ -160,66 +288,129 @@ processors of their own. What is not granted is an error (5) that says how to ge
 it; `lager doctor` with the same flags tries it beforehand.")]
 pub struct UpArgs {
     /// What to drive [default: sim]
-    #[arg(long)]
+    #[arg(long, help_heading = "Body")]
     pub body: Option<Body>,
     /// Serial port of the sensor board (implies --body serial)
-    #[arg(long, value_name = "PORT", conflicts_with_all = ["images", "emulator"])]
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["images", "emulator"], help_heading = "Body")]
     pub sensor: Option<PathBuf>,
     /// Serial port of the steering board (implies --body serial)
-    #[arg(long, value_name = "PORT", conflicts_with_all = ["images", "emulator"])]
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["images", "emulator"], help_heading = "Body")]
     pub steering: Option<PathBuf>,
     /// Baud rate of both ports, which the boards' images are built for [default: 500000]
-    #[arg(long, value_name = "BAUD")]
+    #[arg(long, value_name = "BAUD", allow_negative_numbers = true, value_parser = values::baud, help_heading = "Body")]
     pub baud: Option<u32>,
     /// Folder of sensor.elf and steering.elf, what emulated boards run (implies --body chip)
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", help_heading = "Body")]
     pub images: Option<PathBuf>,
     /// Program that emulates the boards (implies --body chip)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Body")]
     pub emulator: Option<PathBuf>,
     /// Built-in warehouse or warehouse file [default: small]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Mission")]
     pub warehouse: Option<String>,
     /// Seed of the simulated robot's noise [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::seed, help_heading = "Body")]
     pub seed: Option<u64>,
+    /// So many things come and go on the ways of a simulated floor, at random [default: 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::obstacles, help_heading = "Body")]
+    pub obstacles: Option<u32>,
     /// Run the clock of a simulated robot this many times as fast, that of an emulated one at most [default: 1]
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = values::speed, help_heading = "Body")]
     pub speed: Option<f64>,
-    /// Do without a person: a script orders, picks and signals
-    #[arg(long)]
+    /// The external computer that runs at this address, instead of one that `up` starts
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::address, conflicts_with = "no_station", help_heading = "Station")]
+    pub station: Option<String>,
+    /// Do without an external computer; `up` tells the robot its warehouse
+    #[arg(long, help_heading = "Station")]
+    pub no_station: bool,
+    /// Do without a panel
+    #[arg(long, help_heading = "Mission")]
     pub headless: bool,
-    /// The products to fetch, in this order [default: the first of the warehouse]
-    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    /// Let a script be the operator: it orders, picks and signals. A simulated or emulated robot has
+    /// it anyway; real boards need --mission beside it, and nobody in the robot's way
+    #[arg(long, help_heading = "Mission")]
+    pub script: bool,
+    /// The products that the script has fetched, in this order [default: the first of the warehouse]
+    #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<i32>,
-    /// End when the mission is delivered (0) or has failed (3)
-    #[arg(long)]
+    /// End when the script's mission is delivered (0) or has failed (3)
+    #[arg(long, help_heading = "Mission")]
     pub exit_when_done: bool,
     /// Print one line of JSON at the end; progress goes to standard error
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
     /// What bridge and logic want of the machine
     #[command(flatten)]
     pub realtime: UpRealtimeArgs,
 }
 
+/// `lager comm`.
+#[derive(Debug, Args)]
+pub struct CommArgs {
+    /// Where the external computer listens [default: as configured, or 127.0.0.1:7420]
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::address, help_heading = "Station")]
+    pub station: Option<String>,
+    /// What every service is told
+    #[command(flatten)]
+    pub service: ServiceArgs,
+}
+
+/// `lager station`.
+#[derive(Debug, Args)]
+pub struct StationArgs {
+    /// Where robots connect
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        default_value = "127.0.0.1:7420",
+        help_heading = "Station"
+    )]
+    pub listen: std::net::SocketAddr,
+    /// Where a GaG connects: the path of a unix socket [default: gag in the folder of the bus]
+    #[arg(long, value_name = "SOCKET", help_heading = "Station")]
+    pub gag: Option<PathBuf>,
+    /// The warehouse's file, in which changes are saved; it need not be there yet [default: none,
+    /// and nothing is saved]
+    #[arg(long, value_name = "FILE", help_heading = "Station")]
+    pub warehouse: Option<PathBuf>,
+    /// Products that a robot is to fetch after what waits for it already, such as r1=3,1; may be
+    /// given several times
+    #[arg(long, value_name = "ROBOT=ID,ID", value_parser = values::fetch, help_heading = "Station")]
+    pub fetch: Vec<Fetch>,
+    /// Go on where the station before this one was; with --parent alone
+    #[arg(long, hide = true)]
+    pub resume: bool,
+    /// End when this process, the supervisor, ends; standard output is then the socket for robots
+    #[arg(long, value_name = "PID", hide = true)]
+    pub parent: Option<u32>,
+}
+
 /// `lager simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
     /// Seeds to run, one run each: `7` or `1..20` (both ends run)
-    #[arg(long, value_name = "A..B", default_value = "1")]
-    pub seeds: String,
+    #[arg(long, value_name = "A..B", default_value = "1", allow_negative_numbers = true, value_parser = values::seeds, help_heading = "Body")]
+    pub seeds: RangeInclusive<u64>,
     /// Built-in warehouse or warehouse file; may be given several times
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Mission")]
     pub warehouse: Vec<String>,
     /// The products to fetch, in this order [default: the first of the warehouse]
-    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<i32>,
+    /// What is left of the battery's charge at the start [default: what the seed says]
+    #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(0..=100), help_heading = "Body")]
+    pub battery: Option<u8>,
+    /// Calibrate the line sensors first, as a person does who moves the robot over the tape
+    #[arg(long, help_heading = "Body")]
+    pub calibrate: bool,
     /// Give up after this much virtual time
-    #[arg(long, value_name = "SECONDS", default_value_t = 3600)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600, allow_negative_numbers = true, value_parser = values::limit, help_heading = "Mission")]
     pub limit: u64,
+    /// So many things stand on edges at random, and come and go
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = values::obstacles, help_heading = "Body")]
+    pub obstacles: u32,
     /// One line of JSON a run
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
 }
 
@@ -230,35 +421,44 @@ pub struct TopicArgs {
     #[command(subcommand)]
     pub command: TopicCommand,
     /// Print JSON, one value a line
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
 }
 
 /// The topic tools.
 #[derive(Debug, Subcommand)]
 pub enum TopicCommand {
-    /// Every topic on the bus, of every robot
+    /// Every topic on the bus: of every robot, or with --name of that one
     List,
     /// One topic: what it carries, its limits, who writes and reads it
     Info {
         /// The topic's name, such as sensor/line
+        #[arg(value_parser = values::topic)]
         topic: String,
     },
     /// Print each sample with its stamp
     Echo {
         /// The topic's name, such as sensor/line
+        #[arg(value_parser = values::topic)]
         topic: String,
         /// End after this many samples
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count)]
         count: Option<u64>,
+        /// Wait for the robot if it is not up
+        #[arg(long)]
+        wait: bool,
     },
     /// Measure rate, age and loss, once a second
     Hz {
         /// The topic's name, such as sensor/line
+        #[arg(value_parser = values::topic)]
         topic: String,
         /// End after this many seconds
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count)]
         count: Option<u64>,
+        /// Wait for the robot if it is not up
+        #[arg(long)]
+        wait: bool,
     },
 }
 
@@ -270,6 +470,7 @@ pub enum TopicCommand {
   lager bench path --runs 9 --json > path.json     what a plot is drawn from
   lager bench fanout                               what observers cost the writer
   lager bench chip                                 the boards' images, in cycles: exact
+  lager bench stop                                 200 stops at full speed; --runs N for N
 
 Times are medians over the runs: of each run's median (p50) and of what 99 % and
 99.9 % of its samples kept. Ratios compare with a baseline of the same run and
@@ -281,10 +482,10 @@ pub struct BenchArgs {
     /// What to measure
     pub scenario: Scenario,
     /// Print one line of JSON instead of a table
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
     /// How often to measure everything; every figure is the median over the runs (not `chip`) [default: 5]
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::runs)]
     pub runs: Option<usize>,
     /// Take few samples, for a first look (not `chip`)
     #[arg(long)]
@@ -308,14 +509,8 @@ pub enum Scenario {
     Fanout,
     /// Cycles of the boards' real images, from tape to duty and to UART; `.ci/firmware` builds what it runs
     Chip,
-}
-
-fn at_least_one(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(0) => Err("one run is the least".to_owned()),
-        Ok(runs) => Ok(runs),
-        Err(error) => Err(error.to_string()),
-    }
+    /// From the start of `lager stop` until a robot at full speed reports wheels at rest
+    Stop,
 }
 
 #[cfg(test)]

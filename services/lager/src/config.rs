@@ -1,30 +1,50 @@
 //! The configuration: one TOML file, every key with a default, command-line flags on top.
 //!
-//! It is apart from the command line because the services read it too: the supervisor writes the
-//! effective configuration beside its lock and every child process starts from that one file, so
-//! a flag reaches all of them or none. An unknown key is an error, never ignored.
+//! It is apart from the command line because the services read it too: the supervisor gives every
+//! child process the effective configuration on its standard input, so a flag reaches all of them
+//! or none. An unknown key is an error, never ignored.
 
 mod chip;
 mod documented;
 mod realtime;
+mod station;
 
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use lager_plant::Warehouse;
+use lager_plant::{MOST_OBSTACLES, Warehouse};
 use lager_ports::{BusConfig, Policy, RobotName};
+use lager_wire::ArmProfile;
 use serde::{Deserialize, Serialize};
 
 pub use chip::ChipSection;
 pub use realtime::RealtimeSection;
+pub use station::StationSection;
 
 use crate::realtime::HIGHEST_PRIORITY;
+use crate::services::Service;
 
 /// A service waits at most this long before it looks at its clock, so a longer spin never comes
 /// to its end.
 const LONGEST_SPIN_US: u64 = 20_000;
+
+/// The rates that boards are built for, in baud: that of today and the original's UBRR 103.
+pub const BAUD_RATES: [u32; 2] = [500_000, 9_600];
+
+/// How many times as fast as real time a robot's clock may run.
+pub const SPEEDS: RangeInclusive<f64> = 0.01..=20.0;
+
+/// Robots that dead reckoning can follow, in mm/s: slower ones are overtaken by its time-outs,
+/// faster ones pass a mark between two frames.
+const CRUISES_MM_PER_S: RangeInclusive<f32> = 10.0..=1_000.0;
+
+/// Where line sensors can be, in mm ahead of the axle: nearer than the tape's width the axle is on
+/// a node as soon as they see it, and farther than the smallest square's side they are past the
+/// next one.
+const SENSORS_AHEAD_MM: RangeInclusive<f32> = 20.0..=400.0;
 
 /// Everything a process of the robot needs to know at start.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -39,18 +59,24 @@ pub struct Config {
     pub body: Body,
     /// A built-in warehouse (`small`, `curved`, `large`) or the path of a warehouse file.
     pub warehouse: String,
+    /// Where the traces go.
+    pub log: LogSection,
     /// Where the bus lives.
     pub bus: BusSection,
     /// What the services on the path from sensor to steering want of the machine.
     pub realtime: RealtimeSection,
     /// The two serial ports.
     pub serial: SerialSection,
+    /// What the arm may do, as the steering board is told.
+    pub arm: ArmProfile,
     /// What logic knows of the robot's measures.
     pub logic: LogicSection,
     /// The simulated robot and the emulated boards' world.
     pub simulator: SimulatorSection,
     /// The emulated boards.
     pub chip: ChipSection,
+    /// The external computer.
+    pub station: StationSection,
 }
 
 /// What stands at the other end of the two UARTs.
@@ -66,26 +92,32 @@ pub enum Body {
 }
 
 impl Body {
-    /// The service that stands for the boards where there are none, a subcommand's name.
-    pub fn service(self) -> Option<&'static str> {
+    /// The service that stands for the boards where there are none.
+    pub fn service(self) -> Option<Service> {
         match self {
-            Self::Sim => Some("simulator"),
-            Self::Chip => Some("emulator"),
+            Self::Sim => Some(Service::Simulator),
+            Self::Chip => Some(Service::Emulator),
             Self::Serial => None,
         }
     }
 }
 
-/// `[bus]`: prefix and root are unset on a robot; tests give every bus its own.
+/// `[log]`: what happened, for whoever debugs.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogSection {
+    /// The file that traces are appended to, instead of none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+}
+
+/// `[bus]`: where it lives, and how it is waited for.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BusSection {
-    /// Prefix of the shared-memory files.
+    /// Its folder; unset, it is the system's or the user's own.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub prefix: Option<String>,
-    /// Folder of the bus's bookkeeping files.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub root: Option<PathBuf>,
+    pub folder: Option<PathBuf>,
     /// How bridge and logic wait for samples.
     pub waiting: Waiting,
     /// The longest that `waiting = "adaptive"` looks without pause for one sample, in µs.
@@ -131,6 +163,8 @@ pub struct SerialSection {
     pub baud: u32,
     /// Whether the sensor board sends the raw reading of all eleven sensors as well.
     pub raw_line: bool,
+    /// Whether an original steering board is driven, whose commands have no age limit.
+    pub original_boards: bool,
 }
 
 /// `[logic]`: the measures dead reckoning needs.
@@ -141,6 +175,34 @@ pub struct LogicSection {
     pub cruise_mm_per_s: f32,
     /// How far the line sensors are ahead of the wheels' axle, in mm.
     pub sensor_ahead_mm: f32,
+    /// Battery, in tenths of a volt, below which the robot stands at the next crossing; 0 = none.
+    pub low_battery_decivolts: u8,
+    /// How far the ranger sees, in cm; 0 = there is none, and no way is looked at.
+    pub ranger_cm: u8,
+    /// After how many seconds ways that were found blocked are tried again.
+    pub try_again_s: u32,
+    /// Who picks the goods up.
+    pub pick: PickBy,
+}
+
+/// Who picks the goods up: `lager_logic::Pick` as a word of the configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PickBy {
+    /// A person moves the arm and says when it is done.
+    #[default]
+    Manual,
+    /// The robot, by itself.
+    Auto,
+}
+
+impl From<PickBy> for lager_logic::Pick {
+    fn from(pick: PickBy) -> Self {
+        match pick {
+            PickBy::Manual => Self::Manual,
+            PickBy::Auto => Self::Auto,
+        }
+    }
 }
 
 /// `[simulator]`: the simulated robot and the emulated boards' world.
@@ -149,6 +211,8 @@ pub struct LogicSection {
 pub struct SimulatorSection {
     /// Seed of all noise: the same seed is the same robot.
     pub seed: u64,
+    /// So many things come and go on the ways, at random.
+    pub obstacles: u32,
 }
 
 impl Default for Config {
@@ -158,12 +222,15 @@ impl Default for Config {
             speed: 1.0,
             body: Body::Sim,
             warehouse: "small".into(),
+            log: LogSection::default(),
             bus: BusSection::default(),
             realtime: RealtimeSection::default(),
             serial: SerialSection::default(),
+            arm: ArmProfile::default(),
             logic: LogicSection::default(),
             simulator: SimulatorSection::default(),
             chip: ChipSection::default(),
+            station: StationSection::default(),
         }
     }
 }
@@ -175,8 +242,7 @@ impl Default for BusSection {
             Policy::Block | Policy::Spin => Duration::ZERO,
         };
         Self {
-            prefix: None,
-            root: None,
+            folder: None,
             waiting: Waiting::default(),
             longest_spin_us: longest_spin.as_micros() as u64,
         }
@@ -190,6 +256,7 @@ impl Default for SerialSection {
             steering: "/dev/lager-steering".into(),
             baud: 500_000,
             raw_line: false,
+            original_boards: false,
         }
     }
 }
@@ -200,26 +267,38 @@ impl Default for LogicSection {
         Self {
             cruise_mm_per_s: config.cruise_mm_per_s,
             sensor_ahead_mm: config.sensor_ahead_mm,
+            low_battery_decivolts: config.low_battery_decivolts,
+            ranger_cm: 80,
+            try_again_s: config.try_again.as_secs() as u32,
+            pick: PickBy::default(),
         }
     }
 }
 
 impl Default for SimulatorSection {
     fn default() -> Self {
-        Self { seed: 1 }
+        Self {
+            seed: 1,
+            obstacles: 0,
+        }
     }
 }
 
 impl Config {
-    /// Reads `path`, or `lager.toml` in the current folder where there is one, or the defaults.
+    /// Reads `path`, where `-` is standard input, or `lager.toml` in the current folder where there
+    /// is one, or the defaults.
     pub fn load(path: Option<&Path>) -> Result<Self> {
         let path = match path {
             Some(path) => path,
             None if Path::new("lager.toml").is_file() => Path::new("lager.toml"),
             None => return Ok(Self::default()),
         };
-        let text = fs::read_to_string(path)
-            .with_context(|| format!("cannot read the configuration {}", path.display()))?;
+        let text = match path == Path::new("-") {
+            true => std::io::read_to_string(std::io::stdin()),
+            false => fs::read_to_string(path),
+        };
+        let text =
+            text.with_context(|| format!("cannot read the configuration {}", path.display()))?;
         toml::from_str(&text).with_context(|| {
             format!(
                 "the configuration {} is not valid; `lager config` prints one with every key",
@@ -231,16 +310,61 @@ impl Config {
     /// Refuses values no process could work with, each with a sentence.
     pub fn validate(&self) -> Result<()> {
         self.name.parse::<RobotName>()?;
-        if !(0.01..=20.0).contains(&self.speed) {
+        if !SPEEDS.contains(&self.speed) {
             bail!(
-                "speed is {}; it must be from 0.01 to 20 (`lager simulate` runs faster)",
-                self.speed
+                "speed is {}; it must be from {} to {} (`lager simulate` runs faster)",
+                self.speed,
+                SPEEDS.start(),
+                SPEEDS.end()
             );
         }
         if self.body == Body::Serial && self.speed != 1.0 {
             bail!(
                 "speed {} needs a simulated or emulated body; real boards run at 1",
                 self.speed
+            );
+        }
+        if !BAUD_RATES.contains(&self.serial.baud) {
+            let [usual, slow] = BAUD_RATES;
+            bail!(
+                "[serial] baud is {}; boards are built for {usual}, or for {slow} as the original ones",
+                self.serial.baud
+            );
+        }
+        if self.simulator.obstacles as usize > MOST_OBSTACLES {
+            bail!(
+                "[simulator] obstacles is {}; at most {MOST_OBSTACLES} things can stand in a warehouse",
+                self.simulator.obstacles
+            );
+        }
+        // Not a number is in no range.
+        for (key, value, range) in [
+            (
+                "cruise_mm_per_s",
+                self.logic.cruise_mm_per_s,
+                CRUISES_MM_PER_S,
+            ),
+            (
+                "sensor_ahead_mm",
+                self.logic.sensor_ahead_mm,
+                SENSORS_AHEAD_MM,
+            ),
+        ] {
+            if !range.contains(&value) {
+                bail!(
+                    "[logic] {key} is {value}; it must be from {} to {}: measure it on the robot, or leave the key out",
+                    range.start(),
+                    range.end()
+                );
+            }
+        }
+        let margin = self.navigator().ranger_margin_cm;
+        if (1..=margin).contains(&self.logic.ranger_cm) {
+            bail!(
+                "[logic] ranger_cm is {}; it must be from {} to {}, since the last {margin} cm of what it sees block no way, or 0 where there is no ranger",
+                self.logic.ranger_cm,
+                margin + 1,
+                u8::MAX
             );
         }
         if self.bus.longest_spin_us > LONGEST_SPIN_US {
@@ -255,6 +379,7 @@ impl Config {
                 self.realtime.priority
             );
         }
+        self.arm.validate()?;
         Ok(())
     }
 
@@ -264,8 +389,7 @@ impl Config {
             robot: self.name.parse()?,
             speed: self.speed,
             clock: self.chip.clock.clone(),
-            prefix: self.bus.prefix.clone(),
-            root: self.bus.root.clone(),
+            folder: self.bus.folder.clone(),
         })
     }
 
@@ -279,6 +403,11 @@ impl Config {
         lager_logic::LogicConfig {
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
             sensor_ahead_mm: self.logic.sensor_ahead_mm,
+            low_battery_decivolts: self.logic.low_battery_decivolts,
+            ranger_cm: self.logic.ranger_cm,
+            try_again: Duration::from_secs(self.logic.try_again_s.into()),
+            pick: self.logic.pick.into(),
+            arm: self.arm,
             waiting: self.bus.policy(),
             ..lager_logic::LogicConfig::default()
         }
@@ -359,9 +488,46 @@ mod tests {
                 },
                 "1 to 99",
             ),
+            (
+                Config {
+                    arm: ArmProfile {
+                        gripper_open: 210,
+                        ..ArmProfile::default()
+                    },
+                    ..Config::default()
+                },
+                "gripper_closed",
+            ),
         ] {
             let error = config.validate().expect_err("impossible");
             assert!(error.to_string().contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn measures_that_no_robot_has_are_refused_by_their_keys() {
+        for (text, word) in [
+            ("[serial]\nbaud = 0", "baud is 0"),
+            ("[serial]\nbaud = 115200", "500000"),
+            ("[logic]\ncruise_mm_per_s = 0.0", "cruise_mm_per_s is 0"),
+            ("[logic]\ncruise_mm_per_s = nan", "cruise_mm_per_s is NaN"),
+            ("[logic]\ncruise_mm_per_s = -73.3", "10 to 1000"),
+            ("[logic]\ncruise_mm_per_s = 1.0", "cruise_mm_per_s is 1"),
+            ("[logic]\nsensor_ahead_mm = 0.0", "20 to 400"),
+            ("[logic]\nsensor_ahead_mm = inf", "sensor_ahead_mm is inf"),
+            ("[logic]\nsensor_ahead_mm = 160000.0", "sensor_ahead_mm"),
+            ("[logic]\nranger_cm = 1", "ranger_cm is 1;"),
+            ("[logic]\nranger_cm = 10", "11 to 255"),
+        ] {
+            let config: Config = toml::from_str(text).expect("valid TOML");
+            let error = config.validate().expect_err("impossible").to_string();
+            assert!(error.contains(word), "{error}");
+        }
+        let rates = BAUD_RATES.map(|baud| format!("[serial]\nbaud = {baud}"));
+        let rangers = [0, 11].map(|reach| format!("[logic]\nranger_cm = {reach}"));
+        for text in rates.iter().chain(&rangers) {
+            let config: Config = toml::from_str(text).expect("valid TOML");
+            config.validate().expect("a robot that there is");
         }
     }
 

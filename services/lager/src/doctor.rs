@@ -1,26 +1,32 @@
 //! `lager doctor`: what is wrong with this machine, and how to mend it.
 //!
 //! Each check looks at one thing and returns a finding; nothing is changed but what `--fix` is
-//! for: what dead processes left on the bus.
+//! for: what dead processes left on the bus. This process opens nothing of the bus that it could be
+//! kept waiting by.
 
 mod realtime;
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use lager_ports::NodeState;
 use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
-use crate::exit;
+use crate::{diagnose, exit};
 
 /// Shared memory that a robot needs: 1 MiB when it runs alone, more with every observer.
 const SHARED_MEMORY_MIB: u64 = 16;
 /// Open files that one process of the bus may need: each port and connection holds some.
 const OPEN_FILES: u64 = 4096;
+
+/// The longest first clause that stands in a line of its own.
+const LONGEST_CLAUSE: usize = 76;
 
 /// How a thing stands.
 enum Finding {
@@ -33,35 +39,135 @@ enum Finding {
 
 use Finding::{Bad, Good, Hint};
 
+/// One check: what it looks at and how that stands.
+type Check = (&'static str, Finding);
+
+/// How long the bus may take to be looked at, and to be mended.
+const LOOK: Duration = Duration::from_millis(2_500);
+const MEND: Duration = Duration::from_secs(60);
+
 /// Checks everything; fails when anything is bad.
-pub fn run(config: &Config, fix: bool) -> Result<ExitCode> {
-    let findings = [
-        ("versions", versions()),
+pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
+    // What a robot cannot do without, then what this one's body needs, then what makes it faster.
+    let mut checks = vec![
+        ("bus", bus_in_time(config, fix)),
         ("shared memory", shared_memory()),
         ("open files", open_files()),
-        ("session clean-up", remove_ipc()),
         ("serial rights", serial(config)),
+        ("original boards", original_boards(config)),
         ("emulated boards", emulated(config)),
-        ("bus", bus(config, fix)),
+        ("session clean-up", remove_ipc()),
+        ("versions", versions()),
     ];
-    let findings = findings.into_iter().chain(realtime::findings(config));
-    let mut bad = 0;
-    for (what, finding) in findings {
-        let (mark, text) = match finding {
-            Good(text) => ("ok  ", text),
-            Hint(text) => ("hint", text),
-            Bad(text) => {
-                bad += 1;
-                ("BAD ", text)
-            }
-        };
-        crate::say(&format!("{mark}  {what:16}  {text}"))?;
-    }
-    Ok(if bad == 0 {
-        ExitCode::SUCCESS
-    } else {
-        exit::FAILED
+    checks.extend(realtime::findings(config));
+    // Whatever keeps the robot from running comes first.
+    checks.sort_by_key(|(_, finding)| !matches!(finding, Bad(_)));
+    let told = match as_json {
+        true => json(&checks),
+        false => text(&checks),
+    };
+    crate::say(told.trim_end())?;
+    Ok(match count(&checks, "BAD") {
+        0 => ExitCode::SUCCESS,
+        _ => exit::FAILED,
     })
+}
+
+impl Finding {
+    fn mark(&self) -> &'static str {
+        match self {
+            Good(_) => "ok",
+            Hint(_) => "hint",
+            Bad(_) => "BAD",
+        }
+    }
+
+    fn said(&self) -> &str {
+        let (Good(said) | Hint(said) | Bad(said)) = self;
+        said
+    }
+}
+
+fn count(checks: &[Check], mark: &str) -> usize {
+    let of_that_mark = checks.iter().filter(|(_, finding)| finding.mark() == mark);
+    of_that_mark.count()
+}
+
+/// A line for each check, then what to do about those that are not well, then how it stands.
+fn text(checks: &[Check]) -> String {
+    let mut lines = Vec::new();
+    let mut advice = Vec::new();
+    for (what, finding) in checks {
+        // The first clause says how it stands, the others why and what to do.
+        let (stands, rest) = finding
+            .said()
+            .split_once("; ")
+            .unwrap_or((finding.said(), ""));
+        let long = stands.chars().count() > LONGEST_CLAUSE;
+        let mark = finding.mark();
+        match finding {
+            Good(_) => lines.push(format!("{mark:4}  {what:16}  {}", finding.said())),
+            _ if long => {
+                let clause: String = stands.chars().take(LONGEST_CLAUSE).collect();
+                let cut = clause.rfind(' ').unwrap_or(clause.len());
+                lines.push(format!("{mark:4}  {what:16}  {} ...", &clause[..cut]));
+                advice.push(format!("{what}: {}", finding.said()));
+            }
+            _ => {
+                lines.push(format!("{mark:4}  {what:16}  {stands}"));
+                if !rest.is_empty() {
+                    advice.push(format!("{what}: {rest}"));
+                }
+            }
+        }
+    }
+    if !advice.is_empty() {
+        lines.push("\nWhat to do:".into());
+        lines.extend(advice.iter().map(|advice| format!("  - {advice}")));
+    }
+    let hints = match count(checks, "hint") {
+        0 => String::new(),
+        1 => "; one hint".into(),
+        hints => format!("; {hints} hints"),
+    };
+    lines.push(match count(checks, "BAD") {
+        0 => format!("\nA robot can run here{hints}."),
+        1 => format!("\nOne thing keeps a robot from running here{hints}."),
+        bad => format!("\n{bad} things keep a robot from running here{hints}."),
+    });
+    lines.join("\n")
+}
+
+/// The same for programs, in one line.
+fn json(checks: &[Check]) -> String {
+    let findings: Vec<_> = checks
+        .iter()
+        .map(|(what, finding)| {
+            let state = finding.mark().to_lowercase();
+            serde_json::json!({"check": what, "state": state, "text": finding.said()})
+        })
+        .collect();
+    let is_well = count(checks, "BAD") == 0;
+    serde_json::json!({"ok": is_well, "findings": findings}).to_string()
+}
+
+/// A look at the bus, in a thread of its own: it may hang, and then that is the finding.
+fn bus_in_time(config: &Config, fix: bool) -> Finding {
+    let (send, found) = mpsc::channel();
+    let looked_at = config.clone();
+    std::thread::spawn(move || {
+        let _ = send.send(bus(&looked_at, fix));
+    });
+    found
+        .recv_timeout(if fix { MEND } else { LOOK })
+        .unwrap_or_else(|_| {
+            let causes = diagnose::causes(config);
+            let why = match causes.is_empty() {
+                true => "a process that was killed while it made a shared file leaves such a bus, and `lager doctor --fix` mends it".into(),
+                false => causes.join("; "),
+            };
+            Bad(format!("it does not answer; {why}"))
+        })
 }
 
 fn versions() -> Finding {
@@ -157,6 +263,16 @@ fn serial(config: &Config) -> Finding {
     ))
 }
 
+fn original_boards(config: &Config) -> Finding {
+    if config.body != Body::Serial || !config.serial.original_boards {
+        return Good("none is driven: whatever dies, the wheels stop within 200 ms".into());
+    }
+    Hint(
+        "[serial] original_boards = true: an original steering board has no age limit on commands and drives on if this machine dies, so the wheels do not stop within 200 ms; keep its power switch at hand"
+            .into(),
+    )
+}
+
 fn emulated(config: &Config) -> Finding {
     match config.chip.parts(config.serial.baud) {
         Ok(parts) => Good(format!(
@@ -179,27 +295,118 @@ fn bus(config: &Config, fix: bool) -> Finding {
 
 fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
     let bus = config.bus()?;
-    let swept = if fix {
-        lager_ports::remove_stale_nodes(&bus)?
-    } else {
-        0
+    let count = |state| {
+        let nodes = lager_ports::nodes(&bus)?;
+        let those = nodes.iter().filter(|node| node.state == state);
+        Ok::<usize, lager_ports::IntrospectError>(those.count())
     };
-    let nodes = lager_ports::nodes(&bus)?;
-    let count = |state| nodes.iter().filter(|node| node.state == state).count();
-    let alive = count(NodeState::Alive);
-    let unknown = count(NodeState::Unknown);
-    Ok(match count(NodeState::Stale) {
+    let mut removed = 0;
+    if fix {
+        // What the dead have registered with the living is for somebody who joins the bus.
+        if count(NodeState::Alive)? > 0 && count(NodeState::Stale)? > 0 {
+            sweep_beside(&bus)?;
+        }
+        removed = lager_ports::mend(&bus)?.removed;
+    }
+    if let Some(segment) = lager_ports::damaged(&bus)?.first() {
+        return Ok(Bad(match users_of(segment).as_slice() {
+            [] => format!(
+                "{} is damaged and nobody uses it; `lager doctor --fix` removes it",
+                segment.display()
+            ),
+            users => format!(
+                "{} is damaged (emptied, or another user's) and still used; end {}, then run `lager doctor --fix`",
+                segment.display(),
+                users.join(", ")
+            ),
+        }));
+    }
+    let alive = count(NodeState::Alive)?;
+    let unknown = count(NodeState::Unknown)?;
+    let folder = bus.place()?.folder().display().to_string();
+    Ok(match count(NodeState::Stale)? {
         0 if unknown > 0 => Hint(format!(
-            "{alive} processes are on the bus, and {unknown} that belong to another user; one user should run all of a robot's services"
+            "{alive} processes are on the bus in {folder}, and {unknown} that belong to another user; one user should run all of a robot's services"
+        )),
+        0 if alive == 0 && !lager_ports::other_places().is_empty() => Hint(format!(
+            "nobody is on the bus in {folder}; {removed} files were removed; {}",
+            lager_ports::other_places()[0]
         )),
         0 => Good(format!(
-            "{alive} processes are on it, {swept} dead ones were removed"
+            "{alive} processes are on the bus in {folder}; {removed} files of dead ones were removed"
         )),
         stale if fix => Bad(format!(
-            "{stale} dead processes cannot be removed; run this as the user they belonged to"
+            "{stale} dead processes cannot be removed from the bus in {folder}; stop every process on it, then run this again"
         )),
         stale => Hint(format!(
-            "{stale} dead processes left something; `lager doctor --fix` removes it (a starting robot does so too)"
+            "{stale} dead processes left something in {folder}; `lager doctor --fix` removes it (a starting robot does so too)"
         )),
     })
+}
+
+/// Lets another process join the bus, which sweeps, and gives it three seconds: it opens what may
+/// be damaged, and this one must go on.
+fn sweep_beside(bus: &lager_ports::BusConfig) -> Result<()> {
+    const PATIENCE: Duration = Duration::from_secs(3);
+    let mut child = Command::new(std::env::current_exe()?)
+        .arg("--bus")
+        .arg(bus.place()?.folder())
+        .args(["--name", bus.robot.as_str(), "topic", "list"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()?;
+    let start = Instant::now();
+    while child.try_wait()?.is_none() {
+        if start.elapsed() > PATIENCE {
+            child.kill()?;
+            child.wait()?;
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    Ok(())
+}
+
+/// The processes that have a file mapped, each as a text.
+fn users_of(file: &Path) -> Vec<String> {
+    let file = file.to_string_lossy();
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes
+        .filter_map(|process| {
+            let pid: u32 = process.file_name().to_str()?.parse().ok()?;
+            let maps = fs::read_to_string(process.path().join("maps")).ok()?;
+            let name = fs::read_to_string(process.path().join("comm")).ok()?;
+            maps.contains(&*file)
+                .then(|| format!("process {pid} ({})", name.trim()))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_bad_stands_first_and_long_texts_below() {
+        let checks = [
+            ("bus", Good("nobody is on it; all is swept".into())),
+            ("serial rights", Bad("no port; plug it in".into())),
+            ("real time", Hint(format!("slow {}", "word ".repeat(40)))),
+        ];
+        let told = text(&checks);
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(
+            lines[0],
+            "ok    bus               nobody is on it; all is swept"
+        );
+        assert_eq!(lines[1], "BAD   serial rights     no port");
+        assert!(lines[2].ends_with(" word ..."), "{told}");
+        assert!(lines[..3].iter().all(|line| line.chars().count() <= 104));
+        assert!(told.contains("  - serial rights: plug it in"), "{told}");
+        assert!(told.ends_with("One thing keeps a robot from running here; one hint."));
+        let read: serde_json::Value = serde_json::from_str(&json(&checks)).expect("JSON");
+        assert_eq!(read["ok"], false);
+        assert_eq!(read["findings"][1]["state"], "bad");
+    }
 }

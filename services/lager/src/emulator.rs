@@ -4,7 +4,8 @@
 //! ```text
 //!   lager emulator --[chip], [serial], [simulator]--> lager-emulator <==two ptys==> bridge
 //!         |  ^--------- lines of truth, a pipe ------------'   '--> clock page --> all services
-//!         '--> truth/pose
+//!         |--> truth/pose                 ^
+//!         '<-- world/request -- what hands do, a line each on its standard input, and answered
 //! ```
 //! The emulator is GPL-3 and a program of its own: it and this process share a command line, two
 //! pipes and a file. It dies with this process, and this process ends with it; the supervisor
@@ -13,21 +14,27 @@
 //! **Safe state**: no emulator. Its steering board starts with motors off.
 
 use std::io::{Read, Write};
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::time::Duration;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use lager_plant::{Edge, HandsOff, Pose, Warehouse};
 use lager_ports::{Bus, Cause, Publisher, Shutdown};
-use lager_topics::{Truth, TruthPose};
+use lager_simulator::{Wish, answer, wish};
+use lager_topics::{Outcome, Truth, TruthPose, WorldAnswer, WorldAsk, WorldRequest};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
+use serde::Deserialize;
+use serde_json::json;
 
 use crate::config::Config;
 use crate::supervisor::{PATIENCE, ends_within};
 
 /// How long a restarted emulator's last truth is waited for.
 const KEPT_WAIT: Duration = Duration::from_millis(500);
+/// How long the emulator may take to do what hands do.
+const HANDS_WAIT: Duration = Duration::from_millis(500);
 /// How long to wait for a line before looking at the shutdown flag.
 const LOOK: Timespec = Timespec {
     tv_sec: 0,
@@ -41,8 +48,17 @@ pub fn run(bus: &Bus, config: &Config, resume: bool, shutdown: &Shutdown) -> Res
         false => None,
     };
     let truth = bus.publisher::<TruthPose>()?;
+    let hands = bus.server::<WorldRequest>()?;
+    let warehouse = config.warehouse()?;
     let mut emulator = Emulator::start(config, kept.as_ref())?;
     while !shutdown.is_requested() {
+        let mut heard = Ok(true);
+        hands.serve(|ask| {
+            let (told, answer) = emulator.obey(&warehouse, ask, &truth);
+            heard = told;
+            answer
+        })?;
+        heard?;
         if !emulator.pass_on(&truth)? {
             let status = emulator.child.wait().context("the emulator is lost")?;
             bail!("the emulator ended ({status})");
@@ -54,8 +70,29 @@ pub fn run(bus: &Bus, config: &Config, resume: bool, shutdown: &Shutdown) -> Res
 /// The child, ended when dropped.
 struct Emulator {
     child: Child,
+    input: ChildStdin,
     output: ChildStdout,
     lines: Lines,
+    /// What became of the last thing that hands did.
+    answered: Option<Hands>,
+}
+
+/// A line of the emulator.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Line {
+    Hand { hand: Hands },
+    Truth(Box<Truth>),
+}
+
+/// What became of what hands did.
+#[derive(Clone, Copy, Deserialize)]
+enum Hands {
+    Done,
+    NoEdge,
+    RobotThere,
+    NothingThere,
+    Full,
 }
 
 impl Emulator {
@@ -73,6 +110,7 @@ impl Emulator {
             .arg(&config.serial.steering)
             .args(["--warehouse", &config.warehouse])
             .args(["--seed", &config.simulator.seed.to_string()])
+            .args(["--obstacles", &config.simulator.obstacles.to_string()])
             .args(["--baud", &config.serial.baud.to_string()])
             .args(["--speed", &config.speed.to_string()])
             .args(["--parent", &std::process::id().to_string()])
@@ -92,17 +130,62 @@ impl Emulator {
             .spawn()
             .with_context(|| format!("cannot start the emulator {}", parts.emulator.display()))?;
         let output = child.stdout.take().context("the emulator has no output")?;
-        let mut input = child.stdin.take().context("the emulator has no input")?;
-        let emulator = Self {
+        let input = child.stdin.take().context("the emulator has no input")?;
+        let mut emulator = Self {
             child,
+            input,
             output,
             lines: Lines::default(),
+            answered: None,
         };
         if let Some(kept) = kept {
-            serde_json::to_writer(&mut input, kept).context("the emulator takes no world")?;
-            input.write_all(b"\n")?;
+            let world = serde_json::to_string(kept)?;
+            writeln!(emulator.input, "{world}").context("the emulator takes no world")?;
         }
         Ok(emulator)
+    }
+
+    /// Lets the emulator do what a person's hands would do; whether it still runs, and the answer.
+    fn obey(
+        &mut self,
+        warehouse: &Warehouse,
+        ask: &WorldAsk,
+        truth: &Publisher<TruthPose>,
+    ) -> (Result<bool>, WorldAnswer) {
+        let between = |Edge { from, to }: Edge| json!({ "between": [from, to] });
+        let hand = match wish(warehouse, ask) {
+            Ok(Wish::Place(Pose { x, y, heading })) => {
+                json!({ "place": { "x_mm": x, "y_mm": y, "heading_rad": heading } })
+            }
+            Ok(Wish::Put(edge)) => json!({ "put": between(edge) }),
+            Ok(Wish::Take(edge)) => json!({ "take": between(edge) }),
+            Err(refused) => return (Ok(true), refused),
+        };
+        let unanswered = WorldAnswer {
+            outcome: Outcome::NoBoard.into(),
+            ..WorldAnswer::default()
+        };
+        self.answered = None;
+        // Where it has ended, the next line that does not come will tell.
+        if writeln!(self.input, "{hand}").is_err() {
+            return (Ok(true), unanswered);
+        }
+        let start = Instant::now();
+        while self.answered.is_none() && start.elapsed() < HANDS_WAIT {
+            match self.pass_on(truth) {
+                Ok(true) => {}
+                ended => return (ended, unanswered),
+            }
+        }
+        let tried = match self.answered {
+            Some(Hands::Done) => Ok(()),
+            Some(Hands::NoEdge) => Err(HandsOff::NoEdge),
+            Some(Hands::RobotThere) => Err(HandsOff::RobotThere),
+            Some(Hands::NothingThere) => Err(HandsOff::NothingThere),
+            Some(Hands::Full) => Err(HandsOff::Full),
+            None => return (Ok(true), unanswered),
+        };
+        (Ok(true), answer(tried))
     }
 
     /// Publishes what the emulator tells, waiting for it a moment; whether it still runs.
@@ -123,7 +206,10 @@ impl Emulator {
                     String::from_utf8_lossy(&line)
                 )
             })?;
-            truth.send(Cause::OWN, line)?;
+            match line {
+                Line::Hand { hand } => self.answered = Some(hand),
+                Line::Truth(world) => truth.send(Cause::OWN, *world)?,
+            }
         }
         Ok(count > 0)
     }
@@ -132,7 +218,7 @@ impl Emulator {
 impl Drop for Emulator {
     fn drop(&mut self) {
         let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
-        if !ends_within(&mut self.child, PATIENCE / 2) {
+        if !ends_within(&mut self.child, None, PATIENCE / 2, None) {
             let _ = self.child.kill();
             let _ = self.child.wait();
         }

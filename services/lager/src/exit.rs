@@ -1,22 +1,50 @@
 //! The exit codes of `lager`, as `lager --help` documents them. Wrong usage (2) is the command
-//! line parser's.
+//! line parser's, and that of whatever reads an argument's meaning after it: [`Usage`].
 
 use std::process::ExitCode;
+
+use lager_ports::LockError;
 
 /// The failure's reason is on standard error.
 pub const FAILED: ExitCode = ExitCode::FAILURE;
 
+/// What was asked for makes no sense, whatever the robot does.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Usage(pub String);
+
+/// Somebody wished for the end before the work was done.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted")]
+pub struct Interrupted;
+
+/// The exit code after [`Interrupted`], as shells have it for Ctrl-C.
+pub const INTERRUPTED: i32 = 130;
+
+/// The exit code of an error that ends the program.
+pub fn code(error: &anyhow::Error) -> ExitCode {
+    if error.is::<Usage>() {
+        ExitCode::from(2)
+    } else if matches!(
+        error.downcast_ref(),
+        Some(LockError::Up { .. } | LockError::Service { .. })
+    ) {
+        ExitCode::from(4)
+    } else if error.is::<crate::realtime::RealtimeError>() {
+        ExitCode::from(5)
+    } else if error.is::<Interrupted>() {
+        ExitCode::from(INTERRUPTED as u8)
+    } else {
+        FAILED
+    }
+}
+
+/// Whether the machine may be the cause of an error, and not who asked.
+pub fn may_have_a_cause(error: &anyhow::Error) -> bool {
+    !error.is::<Usage>() && !error.is::<Interrupted>() && !error.is::<LockError>()
+}
+
 /// The mission ended without every product delivered.
 pub fn not_delivered() -> ExitCode {
     ExitCode::from(3)
-}
-
-/// A robot of this name is already up.
-pub fn name_taken() -> ExitCode {
-    ExitCode::from(4)
-}
-
-/// Real time, locked memory or cores are not granted as asked for.
-pub fn not_granted() -> ExitCode {
-    ExitCode::from(5)
 }

@@ -3,13 +3,14 @@
 //! One set of ports for `up` and for the one-shot commands, so that both act the same way. It
 //! decides nothing.
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
 use lager_ports::{Bus, Cause, Client, Clock, Publisher};
 use lager_topics::{
-    Answer, Ask, BridgeRequest, Input, MissionOrder, NavMap, OperatorInput, Order, SteeringCommand,
-    SteeringOrder, WarehouseMap,
+    Answer, Ask, BridgeRequest, Input, MissionOrder, OperatorInput, Order, SteeringCommand,
+    SteeringOrder,
 };
 
 use crate::operator::Act;
@@ -17,24 +18,28 @@ use crate::operator::Act;
 /// How long the bridge may take to answer, in real time.
 const ANSWER: Duration = Duration::from_millis(500);
 
+/// How long the script waits for an answer before it looks at the robot again, in real time.
+const GLANCE: Duration = Duration::from_millis(100);
+
 /// Publishers and the client of one operator.
 pub struct Hands {
-    map: Publisher<NavMap>,
     order: Publisher<MissionOrder>,
     press: Publisher<OperatorInput>,
     steer: Publisher<SteeringCommand>,
     ask: Client<BridgeRequest>,
+    /// The steering order given last and when it was first given.
+    given: Cell<(u32, u64)>,
 }
 
 impl Hands {
     /// Opens every port an operator writes to.
     pub fn new(bus: &Bus) -> Result<Self> {
         Ok(Self {
-            map: bus.publisher()?,
             order: bus.publisher()?,
             press: bus.publisher()?,
             steer: bus.publisher()?,
             ask: bus.client()?,
+            given: Cell::default(),
         })
     }
 
@@ -42,18 +47,9 @@ impl Hands {
     /// milliseconds of the machine's clock.
     pub fn fresh_id() -> u32 {
         let milliseconds = Clock::monotonic_ns() / 1_000_000;
-        u32::try_from(milliseconds & u64::from(u32::MAX)).unwrap_or(1)
-    }
-
-    /// Tells the robot its warehouse; late joiners get it too.
-    pub fn publish_map(&self, map: &WarehouseMap) -> Result<()> {
-        self.map.send(Cause::OWN, *map)?;
-        Ok(())
-    }
-
-    /// Lets late joiners have the map.
-    pub fn tick(&self) {
-        self.map.tick();
+        u32::try_from(milliseconds & u64::from(u32::MAX))
+            .unwrap_or_default()
+            .max(1)
     }
 
     /// Does one thing of the script. A bridge that does not answer is no error: the script asks
@@ -61,13 +57,11 @@ impl Hands {
     pub fn carry_out(&self, act: Act) -> Result<()> {
         match act {
             Act::Ask(ask) => {
-                if let Err(silence) = self.ask.call(ask, Duration::from_millis(20)) {
+                if let Err(silence) = self.ask.call(ask, GLANCE) {
                     tracing::debug!(%silence, "the bridge does not answer yet");
                 }
             }
             Act::Order(order) => self.fetch(order)?,
-            Act::Steer(order) => self.steer(order)?,
-            Act::Press(input) => self.press(input)?,
         }
         Ok(())
     }
@@ -85,9 +79,15 @@ impl Hands {
         Ok(())
     }
 
-    /// Gives or renews a steering order.
+    /// Gives or renews a steering order; which of the two, its id says.
     pub fn steer(&self, order: SteeringOrder) -> Result<()> {
-        self.steer.send(Cause::OWN, order)?;
+        let (id, mut given_ns) = self.given.get();
+        if id != order.id || given_ns == 0 {
+            given_ns = Clock::monotonic_ns();
+            self.given.set((order.id, given_ns));
+        }
+        self.steer
+            .send(Cause::OWN, SteeringOrder { given_ns, ..order })?;
         Ok(())
     }
 

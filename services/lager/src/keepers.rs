@@ -1,18 +1,26 @@
-//! What the supervisor remembers for its services: the last state each one published, handed to
-//! its successor when it has to be restarted.
+//! What the attendant remembers for the services: the last state each one published, handed to its
+//! successor when it has to be restarted.
 //!
 //! A service restarted with `--resume` reads the last value of its own topic; this is where that
-//! value comes from once the process that published it is gone.
+//! value comes from once the process that published it is gone. Each topic is served by itself: what
+//! is wrong with one is no reason for another service to stand there without its state.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use lager_ports::{Bus, Keeper};
-use lager_topics::{LinkHealth, NavStatus, TruthPose};
+use lager_topics::{LinkHealth, MissionQueue, NavBlocks, NavMap, NavStatus, Topic, TruthPose};
 
-/// One keeper for each service that has a state to go on with.
+use crate::services::Service;
+
+/// A keeper for each state that a service goes on with.
 pub struct Keepers {
     bridge: Keeper<LinkHealth>,
     logic: Keeper<NavStatus>,
-    simulator: Keeper<TruthPose>,
+    blocks: Keeper<NavBlocks>,
+    queue: Keeper<MissionQueue>,
+    body: Keeper<TruthPose>,
+    map: Keeper<NavMap>,
+    /// The services whose successors have not been served yet.
+    owed: Vec<Service>,
 }
 
 impl Keepers {
@@ -21,30 +29,76 @@ impl Keepers {
         Ok(Self {
             bridge: bus.keeper()?,
             logic: bus.keeper()?,
-            simulator: bus.keeper()?,
+            blocks: bus.keeper()?,
+            queue: bus.keeper()?,
+            body: bus.keeper()?,
+            map: bus.keeper()?,
+            owed: Vec::new(),
         })
     }
 
-    /// Remembers the newest value of every service. A killed service's last value is still
-    /// there until its node is swept, so this runs before each sweep. Successors that have just
-    /// started are served too.
-    pub fn remember(&mut self) -> Result<()> {
-        self.bridge.remember()?;
-        self.logic.remember()?;
-        self.simulator.remember()?;
-        Ok(())
+    /// Remembers the newest value of every service, and serves successors that have just started.
+    /// A killed service's last value is still there until its node is swept, so this runs before
+    /// each sweep. Returns what went wrong.
+    pub fn remember(&mut self) -> Vec<Result<()>> {
+        vec![
+            remember(&mut self.bridge),
+            remember(&mut self.logic),
+            remember(&mut self.blocks),
+            remember(&mut self.queue),
+            remember(&mut self.body),
+            remember(&mut self.map),
+        ]
     }
 
-    /// Offers what `service` was doing to its successor.
-    pub fn hand_over(&mut self, service: &str) -> Result<()> {
-        // Its last word may have come since the last look.
-        self.remember()?;
-        match service {
-            "bridge" => self.bridge.hand_over()?,
-            "logic" => self.logic.hand_over()?,
-            "simulator" | "emulator" => self.simulator.hand_over()?,
-            _ => {}
-        }
-        Ok(())
+    /// A service has ended: what it was doing is owed to its successor.
+    pub fn owe(&mut self, service: Service) {
+        self.owed.retain(|owed| *owed != service);
+        self.owed.push(service);
     }
+
+    /// Offers what is owed; a service that could not be served is owed it still. Returns who has
+    /// been served.
+    pub fn hand_over(&mut self) -> Vec<Result<Service>> {
+        let mut results = Vec::new();
+        for service in core::mem::take(&mut self.owed) {
+            // Its last word may have come since the last look.
+            let served = match service {
+                Service::Bridge => hand_over(&mut self.bridge),
+                Service::Logic => {
+                    let blocks = hand_over(&mut self.blocks);
+                    let queue = hand_over(&mut self.queue);
+                    hand_over(&mut self.logic).and(blocks).and(queue)
+                }
+                Service::Simulator | Service::Emulator => hand_over(&mut self.body),
+                Service::Comm => hand_over(&mut self.map),
+                Service::Attendant | Service::Station => Ok(()),
+            };
+            if served.is_err() {
+                self.owed.push(service);
+            }
+            results.push(served.map(|()| service));
+        }
+        results
+    }
+}
+
+fn remember<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
+    let name = T::NAME;
+    keeper
+        .remember()
+        .with_context(|| format!("cannot keep the last of {name}"))
+}
+
+fn hand_over<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
+    // A value that was kept before is better than none.
+    let remembered = remember(keeper);
+    let name = T::NAME;
+    let served = keeper
+        .hand_over()
+        .with_context(|| format!("cannot hand {name} over"));
+    served.and(remembered.or_else(|error| match keeper.value() {
+        Some(_) => Ok(()),
+        None => Err(error),
+    }))
 }

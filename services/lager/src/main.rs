@@ -6,9 +6,13 @@
     reason = "in a binary, `pub` says what a module offers to the others"
 )]
 
+mod attend;
 mod bench;
 mod cli;
+mod comm;
 mod config;
+mod cut_short;
+mod diagnose;
 mod doctor;
 mod emulator;
 mod exit;
@@ -16,70 +20,122 @@ mod hands;
 mod keepers;
 mod map;
 mod operator;
+mod outcome;
+mod patience;
 mod realtime;
 mod report;
 mod runtime;
+mod services;
+mod signals;
 mod simulate;
+mod station;
 mod steer;
+mod stop;
 mod supervisor;
+mod terminal;
 mod up;
+mod voice;
+mod words;
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
-use clap::Parser;
+use clap::FromArgMatches;
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
 use lager_ports::{Bus, Shutdown};
 use lager_simulator::SimulatorConfig;
 use lager_topics::{Mode, Role};
+use lager_wire::OperatorCommand;
 
-use crate::cli::{Cli, Command, GlobalArgs, ModeName, ServiceArgs, TopicArgs, TopicCommand};
+use crate::cli::{
+    Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs, TopicArgs,
+    TopicCommand,
+};
 use crate::config::{ChipSection, Config};
-use crate::steer::Operator;
+use crate::patience::Patience;
+use crate::steer::{Obstacle, Operator};
+use crate::voice::Speaker;
 
 fn main() -> ExitCode {
-    lager_benches::parts::play_if_asked();
-    let cli = Cli::parse();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn")),
-        )
-        .init();
-    match run(cli) {
+    lager_benches::cast::play_if_asked();
+    let cli = Cli::from_arg_matches(&cli::help::command().get_matches())
+        .unwrap_or_else(|error| error.exit());
+    let mut speaker = Speaker::Tool;
+    let mut looked_at = None;
+    let ended = configure(&cli.global).and_then(|config| {
+        looked_at = Some(config.clone());
+        let own = own_voice(&cli.command, &config);
+        voice::begin(own, config.log.file.as_deref())?;
+        // `up` has no robot to speak for as long as it can end with an error.
+        if !matches!(cli.command, Command::Up(_)) {
+            speaker = own;
+        }
+        run(cli, config)
+    });
+    match ended {
         Ok(code) => code,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "lager: {error:#}");
-            if error.is::<runtime::NameTaken>() {
-                exit::name_taken()
-            } else if error.is::<realtime::RealtimeError>() {
-                exit::not_granted()
-            } else {
-                exit::FAILED
+            voice::say(&speaker.line(&format!("{error:#}")));
+            if exit::may_have_a_cause(&error) {
+                for cause in looked_at.iter().flat_map(diagnose::causes) {
+                    voice::say(&speaker.line(&cause));
+                }
             }
+            exit::code(&error)
         }
     }
 }
 
-fn run(cli: Cli) -> Result<ExitCode> {
-    let mut config = configure(&cli.global)?;
+/// As whom this process speaks on the terminal.
+fn own_voice(command: &Command, config: &Config) -> Speaker {
+    let (who, parent) = match command {
+        Command::Up(_) => ("up", None),
+        Command::Attend(args) => ("up", args.parent),
+        Command::Bridge(args) => ("bridge", args.parent),
+        Command::Logic(args) => ("logic", args.parent),
+        Command::Simulator(args) => ("simulator", args.parent),
+        Command::Emulator(args) => ("emulator", args.parent),
+        Command::Comm(args) => ("comm", args.service.parent),
+        Command::Station(args) => ("station", args.parent),
+        _ => return Speaker::Tool,
+    };
+    Speaker::service(who, parent, config)
+}
+
+fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
+    if let Command::Up(args) = cli.command {
+        return up::run(config, &args);
+    }
     let shutdown = Shutdown::new();
     stop_on_signals(&shutdown)?;
+    // Whatever follows is a tool, and ends at the first Ctrl-C.
+    let patience = || Patience::new(&config, &shutdown);
+    let operator = || {
+        diagnose::must_be_up(&config)?;
+        Operator::new(&config, patience()?)
+    };
     let said = match cli.command {
-        Command::Up(args) => return up::run(config, &args, &shutdown),
-        Command::Simulate(args) => return simulate::run(&config, &args),
+        Command::Up(_) => unreachable!("it listens to signals in its own way"),
+        Command::Simulate(args) => {
+            patience()?;
+            return simulate::run(&config, &args);
+        }
+        Command::Attend(args) => {
+            attend::run(&config, args.parent, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         Command::Bridge(args) => {
             service(&config, Role::Bridge, &args, &shutdown, |bus, resume| {
                 let bridge = BridgeConfig {
                     ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
                     baud: config.serial.baud,
                     raw_line: config.serial.raw_line,
+                    original_boards: config.serial.original_boards,
+                    arm: config.arm,
                     waiting: config.bus.policy(),
                     resume,
                 };
@@ -102,6 +158,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
                 let simulator = SimulatorConfig {
                     warehouse: config.warehouse()?,
                     seed: config.simulator.seed,
+                    obstacles: config.simulator.obstacles,
                     baud: config.serial.baud,
                     sensor_link: config.serial.sensor.clone(),
                     steering_link: config.serial.steering.clone(),
@@ -129,31 +186,81 @@ fn run(cli: Cli) -> Result<ExitCode> {
             )?;
             return Ok(ExitCode::SUCCESS);
         }
-        Command::Topic(args) => {
-            topic(&config, args, &shutdown)?;
+        Command::Comm(args) => {
+            let (running, wanted) = comm::prepare(&config, &args)?;
+            service(&running, Role::Comm, &args.service, &shutdown, |bus, _| {
+                Ok(lager_comm::run(bus, &wanted, &shutdown)?)
+            })?;
             return Ok(ExitCode::SUCCESS);
         }
-        Command::Bench(args) => bench::run(&args)?,
-        Command::Doctor { fix, realtime } => {
+        Command::Station(args) => {
+            station::run(&config, &args, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Topic(args) => {
+            topic(&config, args, cli.global.name.is_none(), &patience()?)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Bench(args) => {
+            // It has a bus of its own and gives up by itself; on Ctrl-C it takes the time to sweep.
+            cut_short::say_so()?;
+            bench::run(&args)?
+        }
+        Command::Doctor {
+            fix,
+            json,
+            realtime,
+        } => {
             realtime.apply(&mut config.realtime);
-            return doctor::run(&config, fix);
+            Patience::new(&config, &shutdown)?;
+            return doctor::run(&config, fix, json);
         }
-        Command::Config => config.documented().trim_end().to_owned(),
-        Command::Drive { command, seconds } => {
-            Operator::new(&config)?.drive(&command, seconds, &shutdown)?
+        Command::Config { iceoryx2: true } => config.bus()?.iceoryx2_toml()?.trim_end().to_owned(),
+        Command::Config { iceoryx2: false } => {
+            // What `up` would refuse is no configuration to go by.
+            config.warehouse()?;
+            config.documented().trim_end().to_owned()
         }
-        Command::Arm { command } => Operator::new(&config)?.arm(&command, &shutdown)?,
-        Command::Stop => Operator::new(&config)?.stop()?,
-        Command::Resume => Operator::new(&config)?.resume()?,
-        Command::Mode { mode } => Operator::new(&config)?.mode(match mode {
+        // Before anything is asked of the bus, which need not be there.
+        Command::Stop
+        | Command::Drive {
+            command: OperatorCommand::Stop,
+            ..
+        } => {
+            patience()?;
+            stop::run(&config)?
+        }
+        Command::Drive { command, seconds } => operator()?.drive(command, seconds)?,
+        Command::Arm { command } => operator()?.arm(command)?,
+        Command::Resume => operator()?.resume(&config)?,
+        Command::Mode { mode } => operator()?.mode(match mode {
             ModeName::Manual => Mode::Manual,
             ModeName::Autonomous => Mode::Autonomous,
         })?,
-        Command::Fetch { product } => Operator::new(&config)?.fetch(product)?,
-        Command::Picked => Operator::new(&config)?.picked()?,
-        Command::Reset => Operator::new(&config)?.reset()?,
-        Command::Gains { p, d } => Operator::new(&config)?.gains(p, d)?,
-        Command::Calibrate => Operator::new(&config)?.calibrate()?,
+        Command::Fetch { product } => operator()?.fetch(product)?,
+        Command::Queue { change } => {
+            let operator = operator()?;
+            match change {
+                None => operator.orders()?,
+                Some(QueueChange::Add { product }) => operator.order(product)?,
+                Some(QueueChange::Cancel { id }) => operator.cancel(id)?,
+                Some(QueueChange::Up { id }) => operator.move_up(id)?,
+                Some(QueueChange::Clear) => operator.clear_queue()?,
+            }
+        }
+        Command::Picked { force } => operator()?.picked(force)?,
+        Command::Reset => operator()?.reset()?,
+        Command::Place { place } => operator()?.place(place)?,
+        Command::Obstacle { change } => {
+            let operator = operator()?;
+            match change {
+                None => operator.obstacles()?,
+                Some(ObstacleChange::Put { way }) => operator.obstacle(Obstacle::Put(way))?,
+                Some(ObstacleChange::Take { way }) => operator.obstacle(Obstacle::Take(way))?,
+            }
+        }
+        Command::Gains { p, d } => operator()?.gains(p, d)?,
+        Command::Calibrate => operator()?.calibrate()?,
     };
     say(&said)?;
     Ok(ExitCode::SUCCESS)
@@ -173,11 +280,11 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
     if let Some(name) = &global.name {
         config.name.clone_from(name);
     }
-    if global.bus_prefix.is_some() {
-        config.bus.prefix.clone_from(&global.bus_prefix);
+    if global.bus.is_some() {
+        config.bus.folder.clone_from(&global.bus);
     }
-    if global.bus_root.is_some() {
-        config.bus.root.clone_from(&global.bus_root);
+    if global.log.is_some() {
+        config.log.file.clone_from(&global.log);
     }
     config.validate()?;
     Ok(config)
@@ -188,7 +295,7 @@ fn stop_on_signals(shutdown: &Shutdown) -> Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let flag: Arc<AtomicBool> = shutdown.flag();
     // A second Ctrl-C ends the process at once, should the orderly end hang.
-    signal_hook::flag::register_conditional_shutdown(SIGINT, 130, Arc::clone(&flag))
+    signal_hook::flag::register_conditional_shutdown(SIGINT, exit::INTERRUPTED, Arc::clone(&flag))
         .context("cannot listen to signals")?;
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         signal_hook::flag::register(signal, Arc::clone(&flag))
@@ -213,7 +320,10 @@ fn service(
     if let Some(parent) = args.parent {
         supervisor::adopt(parent, shutdown)?;
     }
-    let bus = Bus::open(&config.bus()?, role)?;
+    let bus = config.bus()?;
+    // Two of a kind would both steer; a supervised successor may meet its predecessor's end.
+    let _lock = bus.place()?.lock(&bus.robot, role)?;
+    let bus = Bus::open(&bus, role)?;
     let result = run(&bus, args.resume);
     // A supervisor that was killed left its node behind; the last to go sweeps it.
     bus.sweep();
@@ -221,21 +331,28 @@ fn service(
 }
 
 /// The topic tools, on standard output.
-fn topic(config: &Config, args: TopicArgs, shutdown: &Shutdown) -> Result<()> {
-    let bus = Bus::open(&config.bus()?, Role::Observer)?;
-    let out = &mut std::io::BufWriter::new(std::io::stdout().lock());
-    let json = args.json;
-    let shown = match args.command {
-        TopicCommand::List => lager_monitor::list(&bus, json, out),
-        TopicCommand::Info { topic } => lager_monitor::info(&bus, &topic, json, out),
-        TopicCommand::Echo { topic, count } => {
-            lager_monitor::echo(&bus, &topic, count, json, shutdown, out)
-        }
-        TopicCommand::Hz { topic, count } => {
-            lager_monitor::hz(&bus, &topic, count, json, shutdown, out)
-        }
+fn topic(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patience) -> Result<()> {
+    if let TopicCommand::Echo { wait: false, .. } | TopicCommand::Hz { wait: false, .. } =
+        args.command
+    {
+        diagnose::must_be_up(config)?;
+    }
+    let join = || Bus::open(&config.bus()?, Role::Observer).map_err(anyhow::Error::from);
+    let bus = patience.watchdog.over("joining the bus", join)?;
+    let mut tools = lager_monitor::Tools {
+        bus: &bus,
+        watchdog: &patience.watchdog,
+        shutdown: &patience.shutdown,
+        as_json: args.json,
+        out: &mut std::io::BufWriter::new(std::io::stdout().lock()),
     };
-    match shown.and_then(|()| Ok(out.flush()?)) {
+    let shown = match args.command {
+        TopicCommand::List => tools.list(every_robot),
+        TopicCommand::Info { topic } => tools.info(&topic),
+        TopicCommand::Echo { topic, count, .. } => tools.echo(&topic, count),
+        TopicCommand::Hz { topic, count, .. } => tools.hz(&topic, count),
+    };
+    match shown.and_then(|()| Ok(tools.out.flush()?)) {
         Err(error) if error.is_closed_output() => Ok(()),
         shown => Ok(shown?),
     }

@@ -1,7 +1,7 @@
 //! A warehouse as the bus carries it.
 //!
 //! The plant knows no topics and logic knows no plant; this is the one place where a warehouse
-//! file becomes the map that the operator's side sends the robot.
+//! file becomes the map that the robot is told where there is no external computer.
 
 use lager_plant::Warehouse;
 use lager_topics::{MapProduct, Side, WarehouseMap};

@@ -1,96 +1,32 @@
 //! The scripted operator: what a person would do at the panel, as a pure state machine.
 //!
-//! It sees only what a person sees (link health, what logic is doing, what the steering board
-//! reports) and acts only through the commands and signals a person has: mode, order, arm
-//! commands, "picked". It is apart from `up` because `simulate` plays the same script in virtual
-//! time.
+//! It sees only what a person sees (link health and what logic is doing) and acts only through what
+//! a person has: the mode and orders. The robot picks by itself. It is apart from `up` because
+//! `simulate` plays the same script in virtual time.
 //!
 //! ```text
 //!  TakeOver --mode is autonomous--> Ordering --logic took the order--> Underway
-//!     ^                                ^                                  | logic waits at the station
-//!     |                                |                                  v
-//!   start                              |          +-- nothing in the claw -- Picking
-//!                                      |          +--> (aim elsewhere) --------^  | held
-//!                                      |                                          v
-//!                                      +---- delivered ---- Carried <-------- Signalling
+//!                                      ^                                  |
+//!                                      +------------ delivered -----------+
 //! ```
+//! A process that takes the script over from one that was killed starts from its [`Script`] and
+//! finds its place by what logic says of the order (`Joining`).
 
 use core::time::Duration;
 
 use lager_topics::{
-    Ask, AskKind, Finish, Health, Input, InputKind, Mode, NavigatorStatus, Order, OrderKind,
-    Origin, Phase, SERVO_UNKNOWN, SteeringOrder, SteeringReport,
+    Ask, AskKind, Failure, FailureKind, Health, Mode, NavigatorStatus, Order, Phase, Remedy,
 };
-use lager_wire::{ArmCommand, Command};
+use serde::{Deserialize, Serialize};
 
 /// How often a wish that shows no effect is repeated.
 const REPEAT: Duration = Duration::from_millis(500);
-/// How often a running arm command is renewed; its lease is 120 ms.
-const RENEW: Duration = Duration::from_millis(40);
-/// How long logic may be stuck before the operator gives the mission up.
+/// How long logic may wait for a person before the operator gives the mission up.
 const STUCK: Duration = Duration::from_secs(10);
-/// The position of the claw's servo when it is closed on nothing.
-const CLAW_CLOSED: u16 = 210;
-/// How far the claw must stay from closed to be holding something, in servo units.
-const HELD_MARGIN: u16 = 40;
-/// A joint is where it should be when no further step would bring it nearer.
-const NEAR: i32 = 2;
-/// Steps for one joint after which something must be wrong with the arm.
-const MOST_STEPS: u16 = 400;
-
-/// The arm's joints and the claw, by their place in the reports.
-const BASE: Joint = Joint {
-    servo: 0,
-    raise: ArmCommand::Left,
-    lower: ArmCommand::Right,
-};
-const SHOULDER: Joint = Joint {
-    servo: 1,
-    raise: ArmCommand::Up,
-    lower: ArmCommand::Down,
-};
-const ELBOW: Joint = Joint {
-    servo: 3,
-    raise: ArmCommand::Out,
-    lower: ArmCommand::In,
-};
-const CLAW: usize = 7;
-
-/// One joint, and the commands that step it.
-#[derive(Clone, Copy, Debug)]
-struct Joint {
-    servo: usize,
-    raise: ArmCommand,
-    lower: ArmCommand,
-}
-
-/// One move of the routine.
-#[derive(Clone, Copy, Debug)]
-enum Move {
-    /// Give a command once.
-    Once(ArmCommand),
-    /// Step a joint until it stands at a position.
-    Bring(Joint, u16),
-}
-
-/// Opens the claw and brings it around goods that stand as they should, 250 mm ahead of the axle.
-/// The base comes first; where to, the attempt says.
-const REACH: [Move; 4] = [
-    Move::Once(ArmCommand::Release),
-    Move::Bring(ELBOW, 488),
-    Move::Bring(SHOULDER, 311),
-    Move::Once(ArmCommand::Squeeze),
-];
-/// Lifts the claw to where it is carried while the robot drives.
-const LIFT: [Move; 3] = [
-    Move::Bring(SHOULDER, 600),
-    Move::Bring(ELBOW, 400),
-    Move::Bring(BASE, 512),
-];
-/// Where to aim at each attempt: straight ahead first, then 20 and 40 mm to either side.
-const AIMS: [u16; 5] = [512, 533, 491, 554, 470];
-/// How often the operator tries before giving up.
-const ATTEMPTS: usize = AIMS.len();
+/// The same where it waits for a way, which may open by itself.
+const NO_WAY: Duration = Duration::from_secs(300);
+/// How often logic may have tried all blocked ways again.
+const TRIES: i32 = 5;
 
 /// What the operator sees: the last of each, nothing before the first.
 #[derive(Clone, Debug, Default)]
@@ -99,12 +35,8 @@ pub struct Seen {
     pub health: Option<Health>,
     /// What logic is doing.
     pub status: Option<NavigatorStatus>,
-    /// The steering board's last report.
-    pub report: Option<SteeringReport>,
-    /// The order that logic refused last.
-    pub refused: Option<u32>,
-    /// What was last said in words.
-    pub thought: String,
+    /// The order that logic refused last, and why.
+    pub refused: Option<(u32, Failure)>,
 }
 
 /// One thing the operator does.
@@ -114,17 +46,65 @@ pub enum Act {
     Ask(Ask),
     /// Orders a product.
     Order(Order),
-    /// Gives an arm command.
-    Steer(SteeringOrder),
-    /// Presses a button.
-    Press(Input),
+}
+
+/// A mission and how far it has come: all that whoever takes the script over needs.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Script {
+    /// The products to fetch, in this order.
+    pub mission: Vec<i32>,
+    /// Those that have been delivered, the first of the mission.
+    pub delivered: Vec<i32>,
+    /// The order for the next one, once it has been given.
+    pub order: Option<Given>,
+    /// Why it has been given up.
+    pub failure: Option<String>,
+}
+
+impl Script {
+    /// A mission that nobody has begun.
+    pub fn new(mission: Vec<i32>) -> Self {
+        Self {
+            mission,
+            ..Self::default()
+        }
+    }
+
+    /// `Some` once the mission has ended: delivered, or failed with the reason.
+    pub fn outcome(&self) -> Option<Result<(), &str>> {
+        match &self.failure {
+            Some(why) => Some(Err(why)),
+            None => (self.delivered.len() == self.mission.len()).then_some(Ok(())),
+        }
+    }
+
+    /// Whether logic has delivered what it was ordered.
+    fn has_come(&self, order: u32, status: &NavigatorStatus) -> bool {
+        let before = self.order.map(|given| given.delivered_before);
+        before != Some(status.delivered) && status.order_id == order
+    }
+
+    /// Gives the mission up, unless it has ended already.
+    pub fn give_up(&mut self, why: &str) {
+        if self.outcome().is_none() {
+            self.failure = Some(why.to_owned());
+        }
+    }
+}
+
+/// An order of the script that has not come to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Given {
+    /// Its number.
+    pub id: u32,
+    /// What logic had counted as delivered before it.
+    pub delivered_before: u32,
 }
 
 /// The script and where it stands.
 #[derive(Debug)]
 pub struct ScriptedOperator {
-    mission: Vec<i32>,
-    delivered: Vec<i32>,
+    script: Script,
     step: Step,
     acted: Option<Duration>,
     stuck_since: Option<Duration>,
@@ -134,82 +114,64 @@ pub struct ScriptedOperator {
 #[derive(Debug)]
 enum Step {
     TakeOver,
+    Joining { order: u32 },
     Ordering { order: u32 },
     Underway { order: u32 },
-    Picking { order: u32, picking: Picking },
-    Signalling { order: u32 },
-    Carried { order: u32, delivered_before: u32 },
     Finished,
     Failed(String),
 }
 
-/// The arm routine under way.
-#[derive(Debug)]
-struct Picking {
-    attempt: usize,
-    stage: Stage,
-    /// What is still to be done, the next last.
-    moves: Vec<Move>,
-    /// Steps given for the move at hand.
-    steps: u16,
-    current: Option<SteeringOrder>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    Reaching,
-    Lifting,
-}
-
 impl ScriptedOperator {
-    /// A script that has `mission` fetched in its order. Ids start at `first_id`.
-    pub fn new(mission: Vec<i32>, first_id: u32) -> Self {
+    /// A script that has its mission fetched, from where it stands. Ids start at `first_id`, which
+    /// is beyond those of whoever had the script before.
+    pub fn new(script: Script, first_id: u32) -> Self {
+        let step = match (script.outcome(), script.order) {
+            (Some(Ok(())), _) => Step::Finished,
+            (Some(Err(why)), _) => Step::Failed(why.to_owned()),
+            (None, Some(given)) => Step::Joining { order: given.id },
+            (None, None) => Step::TakeOver,
+        };
         Self {
-            mission,
-            delivered: Vec::new(),
-            step: Step::TakeOver,
+            script,
+            step,
             acted: None,
             stuck_since: None,
             next_id: first_id,
         }
     }
 
+    /// How far the mission has come.
+    pub fn script(&self) -> &Script {
+        &self.script
+    }
+
     /// The products delivered so far, in order.
     pub fn delivered(&self) -> &[i32] {
-        &self.delivered
+        &self.script.delivered
     }
 
     /// `Some` once the mission has ended: delivered, or failed with the reason.
     pub fn outcome(&self) -> Option<Result<(), &str>> {
-        match &self.step {
-            Step::Finished => Some(Ok(())),
-            Step::Failed(why) => Some(Err(why)),
-            _ => None,
-        }
+        self.script.outcome()
     }
 
     /// Looks, and does at most one thing.
     pub fn step(&mut self, now: Duration, seen: &Seen) -> Option<Act> {
         let (health, status) = (seen.health?, seen.status?);
         if self.is_stuck(now, &status) && self.outcome().is_none() {
-            self.step = Step::Failed(format!(
-                "logic is stuck and waits for a person: {}",
-                seen.thought
-            ));
+            self.step = Step::Failed(format!("logic waits for a person: {}", status.failure));
         }
         if let Some(next) = self.advance(&health, &status, seen) {
             self.step = next;
             self.acted = None;
         }
-        let pause = match &self.step {
-            Step::Picking { picking, .. } if picking.current.is_none() => Duration::ZERO,
-            Step::Picking { .. } => RENEW,
-            _ => REPEAT,
-        };
-        if self.acted.is_some_and(|acted| now < acted + pause) {
+        if let Step::Failed(why) = &self.step {
+            self.script.give_up(why);
+        }
+        if self.acted.is_some_and(|acted| now < acted + REPEAT) {
             return None;
         }
-        let act = self.act(&health, seen)?;
+        let act = self.act(&health)?;
         self.acted = Some(now);
         Some(act)
     }
@@ -217,217 +179,97 @@ impl ScriptedOperator {
     /// The step that what is seen leads to, if it is another one.
     fn advance(&mut self, health: &Health, status: &NavigatorStatus, seen: &Seen) -> Option<Step> {
         let phase = status.phase.get()?;
-        match &mut self.step {
+        match self.step {
             Step::TakeOver => {
                 let ready = health.mode.get() == Some(Mode::Autonomous)
                     && health.sensor.up != 0
                     && health.steering.up != 0;
-                ready.then(|| self.next_order())
+                ready.then(|| self.next_order(status))
             }
-            Step::Ordering { order } => (status.order_id == *order && accepted(phase))
-                .then_some(Step::Underway { order: *order }),
-            Step::Underway { .. } if phase == Phase::WaitingForOrder => Some(given_up(seen)),
-            Step::Underway { order } if phase == Phase::Picking => Some(Step::Picking {
-                order: *order,
-                picking: Picking::new(),
-            }),
-            Step::Picking { order, picking } => match picking.advance(seen.report.as_ref()?) {
-                Grip::Trying => None,
-                Grip::Held => Some(Step::Signalling { order: *order }),
-                Grip::Jammed => Some(Step::Failed(
-                    "a joint of the arm does not get where it should".into(),
-                )),
-                Grip::Empty => Some(Step::Failed(format!(
-                    "the claw closed on nothing {ATTEMPTS} times at the station of product {}",
-                    status.product
-                ))),
-            },
-            Step::Signalling { order } if phase != Phase::Picking => Some(Step::Carried {
-                order: *order,
-                delivered_before: status.delivered,
-            }),
-            Step::Carried {
-                order,
-                delivered_before,
-            } if status.delivered != *delivered_before && status.order_id == *order => {
-                self.delivered.push(self.mission[self.delivered.len()]);
-                Some(self.next_order())
+            // Logic may not have heard of it; it takes an order that it has for a repeat.
+            Step::Joining { order } if status.order_id != order => Some(Step::Ordering { order }),
+            Step::Joining { order } => Some(Step::Underway { order }),
+            Step::Ordering { order } if status.order_id == order && accepted(phase) => {
+                self.note(order, status);
+                Some(Step::Underway { order })
             }
-            Step::Carried { .. } if phase == Phase::WaitingForOrder => Some(given_up(seen)),
+            Step::Underway { order } if self.script.has_come(order, status) => {
+                Some(self.next_order_after_delivery(status))
+            }
+            Step::Underway { order } if !accepted(phase) => Some(given_up(order, seen)),
             _ => None,
         }
     }
 
+    /// Whether logic has waited for a person for too long.
     fn is_stuck(&mut self, now: Duration, status: &NavigatorStatus) -> bool {
-        if status.phase.get() != Some(Phase::Stuck) {
+        if status.failure.is_none() {
             self.stuck_since = None;
             return false;
         }
-        now - *self.stuck_since.get_or_insert(now) >= STUCK
+        let failure = &status.failure;
+        let patience = match failure.remedy.get() {
+            Some(Remedy::Way) => NO_WAY,
+            _ => STUCK,
+        };
+        if failure.kind == FailureKind::Unreachable && failure.seen >= TRIES {
+            return true;
+        }
+        now - *self.stuck_since.get_or_insert(now) >= patience
     }
 
-    fn next_order(&mut self) -> Step {
-        if self.delivered.len() == self.mission.len() {
+    /// Takes down what a successor would want to know of the order under way.
+    fn note(&mut self, id: u32, status: &NavigatorStatus) {
+        self.script.order = Some(Given {
+            id,
+            delivered_before: status.delivered,
+        });
+    }
+
+    fn next_order_after_delivery(&mut self, status: &NavigatorStatus) -> Step {
+        let product = self.script.mission[self.script.delivered.len()];
+        self.script.delivered.push(product);
+        self.next_order(status)
+    }
+
+    fn next_order(&mut self, status: &NavigatorStatus) -> Step {
+        self.script.order = None;
+        if self.script.outcome().is_some() {
             return Step::Finished;
         }
-        Step::Ordering { order: self.id() }
+        self.next_id += 1;
+        let order = self.next_id;
+        self.note(order, status);
+        Step::Ordering { order }
     }
 
     /// What the step wants done now.
-    fn act(&mut self, health: &Health, seen: &Seen) -> Option<Act> {
-        match &mut self.step {
+    fn act(&self, health: &Health) -> Option<Act> {
+        match self.step {
             Step::TakeOver if health.mode.get() != Some(Mode::Autonomous) => Some(Act::Ask(Ask {
                 kind: AskKind::SetMode.into(),
                 mode: Mode::Autonomous.into(),
                 ..Ask::default()
             })),
             Step::Ordering { order } => Some(Act::Order(Order {
-                id: *order,
-                product: self.mission[self.delivered.len()],
-            })),
-            Step::Picking { picking, .. } => {
-                let id = self.next_id;
-                let (order, fresh) = picking.order(id, seen.report.as_ref()?)?;
-                self.next_id += u32::from(fresh);
-                Some(Act::Steer(order))
-            }
-            Step::Signalling { order } => Some(Act::Press(Input {
-                kind: InputKind::PickupDone.into(),
-                order_id: *order,
-                ..Input::default()
+                id: order,
+                product: self.script.mission[self.script.delivered.len()],
             })),
             _ => None,
         }
     }
-
-    fn id(&mut self) -> u32 {
-        self.next_id += 1;
-        self.next_id
-    }
 }
 
-fn given_up(seen: &Seen) -> Step {
-    Step::Failed(format!("logic has given the order up: {}", seen.thought))
+/// Logic waits for an order and has not delivered this one.
+fn given_up(order: u32, seen: &Seen) -> Step {
+    let why = match seen.refused {
+        Some((refused, failure)) if refused == order => failure.to_string(),
+        _ => "it does not say why".into(),
+    };
+    Step::Failed(format!("logic has given the order up: {why}"))
 }
 
 /// Whether logic is at work on the order it shows.
 fn accepted(phase: Phase) -> bool {
     !matches!(phase, Phase::WaitingForMap | Phase::WaitingForOrder)
-}
-
-/// What the claw has come to.
-enum Grip {
-    Trying,
-    Held,
-    Empty,
-    Jammed,
-}
-
-impl Picking {
-    fn new() -> Self {
-        Self {
-            attempt: 0,
-            stage: Stage::Reaching,
-            moves: reach(AIMS[0]),
-            steps: 0,
-            current: None,
-        }
-    }
-
-    /// Takes note of the steering board's report and goes on when a move has ended.
-    fn advance(&mut self, report: &SteeringReport) -> Grip {
-        if let Some(order) = &self.current {
-            let finished = report.finished_origin.get() == Some(Origin::Operator)
-                && report.finished_id == order.id;
-            if !finished {
-                return Grip::Trying;
-            }
-            // A move that was cut short or refused (the robot was not standing yet) is given
-            // again, as a new order.
-            let done = report.finish.get() == Some(Finish::Done);
-            if done && matches!(self.moves.last(), Some(Move::Once(_))) {
-                self.moves.pop();
-            }
-            self.current = None;
-        }
-        while let Some(Move::Bring(joint, to)) = self.moves.last()
-            && step_towards(joint, *to, report).is_none()
-        {
-            self.moves.pop();
-            self.steps = 0;
-        }
-        if self.steps > MOST_STEPS {
-            return Grip::Jammed;
-        }
-        if !self.moves.is_empty() {
-            return Grip::Trying;
-        }
-        match self.stage {
-            Stage::Reaching => {
-                self.stage = Stage::Lifting;
-                self.moves = reversed(&LIFT);
-            }
-            Stage::Lifting if holds(report) => return Grip::Held,
-            Stage::Lifting => {
-                self.attempt += 1;
-                let Some(aim) = AIMS.get(self.attempt) else {
-                    return Grip::Empty;
-                };
-                self.stage = Stage::Reaching;
-                self.moves = reach(*aim);
-            }
-        }
-        Grip::Trying
-    }
-
-    /// The order to give now; `true` when it is a new one and took `id`.
-    fn order(&mut self, id: u32, report: &SteeringReport) -> Option<(SteeringOrder, bool)> {
-        if let Some(order) = self.current {
-            return Some((order, false));
-        }
-        let command = match self.moves.last()? {
-            Move::Once(command) => *command,
-            Move::Bring(joint, to) => step_towards(joint, *to, report)?,
-        };
-        let order = SteeringOrder {
-            id,
-            origin: Origin::Operator.into(),
-            kind: OrderKind::Drive.into(),
-            code: Command::Arm(command).code(),
-            arm_granted: 0,
-        };
-        self.steps += 1;
-        self.current = Some(order);
-        Some((order, true))
-    }
-}
-
-/// The command that brings a joint nearer, `None` when it is there. A servo nobody has heard of
-/// yet is not waited for: the first step makes it report.
-fn step_towards(joint: &Joint, to: u16, report: &SteeringReport) -> Option<ArmCommand> {
-    let position = report.servo_position[joint.servo];
-    if position == SERVO_UNKNOWN {
-        return Some(joint.raise);
-    }
-    match i32::from(to) - i32::from(position) {
-        missing if missing > NEAR => Some(joint.raise),
-        missing if missing < -NEAR => Some(joint.lower),
-        _ => None,
-    }
-}
-
-fn reach(aim: u16) -> Vec<Move> {
-    let mut moves = reversed(&REACH);
-    moves.push(Move::Bring(BASE, aim));
-    moves
-}
-
-fn reversed(moves: &[Move]) -> Vec<Move> {
-    moves.iter().rev().copied().collect()
-}
-
-/// Whether the claw was kept from closing all the way.
-fn holds(report: &SteeringReport) -> bool {
-    let position = report.servo_position[CLAW];
-    position != SERVO_UNKNOWN && position > CLAW_CLOSED + HELD_MARGIN
 }

@@ -1,38 +1,18 @@
-//! What `up` tells: a line on the terminal whenever the robot begins something new, and the one
-//! JSON line at the end. It reads the bus as an observer and never writes to it.
+//! What the attendant tells of the robot: a line whenever it begins something new. It reads the bus
+//! as an observer and never writes to it; `terminal.rs` shows the lines.
 
-use std::io::Write;
 use std::time::Duration;
 
 use anyhow::Result;
 use lager_ports::{Bus, Subscriber};
 use lager_topics::{
     Event, EventKind, GoodState, Health, LinkHealth, LogThought, MissionEvent, Mode, NavStatus,
-    NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, TruthPose,
+    NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, StopCause, TruthPose,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::operator::Seen;
-
-/// How a mission ended.
-#[derive(Clone, Debug, Serialize)]
-pub struct Outcome {
-    /// The products delivered, in order.
-    pub delivered: Vec<i32>,
-    /// Robot time from start to end.
-    pub sim_seconds: f64,
-    /// Real time from start to end.
-    pub wall_seconds: f64,
-    /// Sensor and steering frames seen on the bus.
-    pub frames: u64,
-    /// Frames lost on any way there: on the wires, and in any subscriber of the bus.
-    pub lost: u64,
-    /// Restarts of services.
-    pub restarts: u32,
-    /// Why the mission was not delivered.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub failure: Option<String>,
-}
+use crate::stop::describe;
 
 /// The observer behind the terminal's lines.
 pub struct Narrator {
@@ -48,13 +28,25 @@ pub struct Narrator {
     goods: Vec<(i32, GoodState)>,
     doing: String,
     now: Duration,
-    to_stderr: bool,
+    notes: Vec<Note>,
+    heard: Vec<u32>,
+    joins_late: bool,
+}
+
+/// A line for the terminal.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Note {
+    /// Robot time since the robot's start.
+    pub at: Duration,
+    /// Who speaks: a service, or the robot itself.
+    pub who: String,
+    /// What happened.
+    pub text: String,
 }
 
 impl Narrator {
-    /// Subscribes to everything it tells of. With `to_stderr` standard output stays free for
-    /// the JSON line.
-    pub fn new(bus: &Bus, to_stderr: bool) -> Result<Self> {
+    /// Subscribes to everything it tells of. One that joins late takes what it sees first for told.
+    pub fn new(bus: &Bus, joins_late: bool) -> Result<Self> {
         Ok(Self {
             line: bus.subscriber()?,
             distance: bus.subscriber()?,
@@ -68,7 +60,9 @@ impl Narrator {
             goods: Vec::new(),
             doing: String::new(),
             now: Duration::ZERO,
-            to_stderr,
+            notes: Vec::new(),
+            heard: Vec::new(),
+            joins_late,
         })
     }
 
@@ -77,14 +71,18 @@ impl Narrator {
         self.now = now;
         while self.line.receive()?.is_some() {}
         while self.distance.receive()?.is_some() {}
-        if let Some(report) = self.state.latest()? {
-            self.seen.report = Some(*report);
-        }
-        if let Some(health) = self.health.latest()?.map(|health| *health) {
+        while self.state.receive()?.is_some() {}
+        if let Some(health) = self.health.latest()? {
+            self.heard.push(health.stamp().writer);
+            let health = *health;
             let before = self.seen.health.replace(health);
-            self.tell_links(before.as_ref(), &health);
+            if before.is_some() || !self.joins_late {
+                self.tell_links(before.as_ref(), &health);
+            }
         }
-        if let Some(status) = self.status.latest()?.map(|status| *status) {
+        if let Some(status) = self.status.latest()? {
+            self.heard.push(status.stamp().writer);
+            let status = *status;
             self.seen.status = Some(status);
             self.tell_status(&status);
         }
@@ -93,10 +91,10 @@ impl Narrator {
         }
         while let Some(thought) = self.thought.receive()?.map(|thought| *thought) {
             let from = thought.from.to_string().to_lowercase();
-            self.note(&format!("{from}: \"{}\"", thought.text));
-            thought.text.as_str().clone_into(&mut self.seen.thought);
+            self.note(&from, &format!("\"{thought}\""));
         }
         if let Some(truth) = self.truth.latest()? {
+            self.heard.push(truth.stamp().writer);
             let goods: Vec<_> = truth
                 .goods()
                 .iter()
@@ -124,24 +122,36 @@ impl Narrator {
         self.line.received() + self.distance.received() + self.state.received()
     }
 
-    /// Frames lost so far: by this observer, by the services, and on the wires.
-    pub fn lost(&self) -> u64 {
-        let own = self.line.lost() + self.distance.lost() + self.state.lost();
+    /// Frames this observer has lost so far.
+    pub fn lost_here(&self) -> u64 {
+        self.line.lost() + self.distance.lost() + self.state.lost()
+    }
+
+    /// Frames lost so far by the services and on the wires.
+    pub fn lost_elsewhere(&self) -> u64 {
         let health = self.seen.health.unwrap_or_default();
         let wires = u64::from(health.sensor.lost_total) + u64::from(health.steering.lost_total);
         let logic = self.seen.status.map_or(0, |status| status.frames_lost);
-        own + wires + health.bus_lost + logic
+        wires + health.bus_lost + logic
     }
 
-    /// Says a line of this process's own.
-    pub fn note(&self, text: &str) {
-        let line = format!("{:8.2} s  {text}", self.now.as_secs_f64());
-        // A closed terminal is no reason to stop a robot.
-        let _ = if self.to_stderr {
-            writeln!(std::io::stderr(), "{line}")
-        } else {
-            writeln!(std::io::stdout(), "{line}")
-        };
+    /// Adds a line.
+    pub fn note(&mut self, who: &str, text: &str) {
+        self.notes.push(Note {
+            at: self.now,
+            who: who.to_owned(),
+            text: text.to_owned(),
+        });
+    }
+
+    /// The processes that have published the state of a service since the last call.
+    pub fn take_heard(&mut self) -> Vec<u32> {
+        core::mem::take(&mut self.heard)
+    }
+
+    /// What there is to be told since the last call.
+    pub fn take_notes(&mut self) -> Vec<Note> {
+        core::mem::take(&mut self.notes)
     }
 }
 
@@ -155,29 +165,33 @@ impl Narrator {
         for (name, before, now) in boards {
             let was_up = before.is_some_and(|before| before.up != 0);
             if now.up != 0 && !was_up {
-                self.note(&format!("the {name} board is connected"));
+                self.note("bridge", &format!("the {name} board is connected"));
             } else if now.up == 0 && was_up {
-                self.note(&format!("the {name} board is silent"));
+                self.note("bridge", &format!("the {name} board is silent"));
             } else if before.is_some_and(|before| before.reboots < now.reboots) {
-                self.note(&format!(
-                    "the {name} board has restarted ({})",
-                    now.reset_cause
-                ));
+                self.note(
+                    "bridge",
+                    &format!("the {name} board has restarted ({})", now.reset_cause),
+                );
             }
         }
         if before.map(|before| before.mode) != Some(now.mode) {
             match now.mode.get() {
-                Some(Mode::Autonomous) => self.note("logic steers"),
-                _ => self.note("the operator steers"),
+                Some(Mode::Autonomous) => self.note("bridge", "logic steers"),
+                _ => self.note("bridge", "the operator steers"),
             }
         }
-        let was_stopped = before.is_some_and(|before| before.stopped != 0);
-        if (now.stopped != 0) != was_stopped {
-            self.note(if was_stopped {
-                "the stop is released"
-            } else {
-                "STOPPED; `lager resume` lets the robot go on"
-            });
+        let stop = |health: &Health| (health.stopped != 0).then_some(health.stopped_at_ns);
+        let (was, is) = (before.and_then(stop), stop(now));
+        if is.is_some() && is != was {
+            let cause = now.stop_cause.get().unwrap_or(StopCause::WordDamaged);
+            let said = describe(now.stop_origin.get(), cause, now.stopped_at_ns);
+            self.note(
+                "bridge",
+                &format!("STOPPED {said}; `lager resume` lets the robot go on"),
+            );
+        } else if is.is_none() && was.is_some() {
+            self.note("bridge", "the stop is released");
         }
     }
 
@@ -203,10 +217,16 @@ impl Narrator {
             Some(Phase::TurningRound) => "turns round".into(),
             Some(Phase::Returning) => "returns to the warehouse".into(),
             Some(Phase::Stuck) => format!("is STUCK at {place}"),
-            None => return,
+            Some(Phase::Halted) => format!("stands before something behind {place}"),
+            Some(Phase::TurningBack) => format!("turns back to ({},{})", status.x, status.y),
+            Some(Phase::Lost) => "is LOST: it was restarted and nobody kept where it was".into(),
+            // That is over at once.
+            Some(Phase::Looking) | None => return,
         };
         if self.doing != line {
-            self.note(&line);
+            if !(self.doing.is_empty() && self.joins_late) {
+                self.note("robot", &line);
+            }
             self.doing = line;
         }
     }
@@ -214,33 +234,38 @@ impl Narrator {
     fn tell_event(&mut self, event: &Event) {
         let product = event.product;
         match event.kind.get() {
-            Some(EventKind::GettingItem) => self.note(&format!("fetches product {product}")),
-            Some(EventKind::ItemDelivered) => self.note(&format!("DELIVERED product {product}")),
+            Some(EventKind::GettingItem) => {
+                self.note("robot", &format!("fetches product {product}"));
+            }
+            Some(EventKind::ItemDelivered) => {
+                self.note("robot", &format!("DELIVERED product {product}"));
+            }
             Some(EventKind::Refused) => {
-                self.seen.refused = Some(event.order_id);
-                self.note(&format!("refuses to fetch product {product}"));
+                let why = event.failure;
+                self.seen.refused = Some((event.order_id, why));
+                self.note(
+                    "robot",
+                    &format!("refuses to fetch product {product}: {why}"),
+                );
+            }
+            Some(EventKind::PickupRefused) => {
+                let why = event.failure;
+                self.note("robot", &format!("does not have product {product}: {why}"));
+            }
+            Some(EventKind::WayBlocked) => {
+                let heading = event.heading.to_string().to_lowercase();
+                let (x, y) = (event.x, event.y);
+                self.note(
+                    "robot",
+                    &format!("finds the way from ({x},{y}) heading {heading} blocked"),
+                );
+            }
+            Some(EventKind::Failed) => {
+                let why = event.failure;
+                self.note("robot", &format!("cannot go on: {why}"));
             }
             // What logic is doing tells these already.
             Some(EventKind::InPosition | EventKind::NextNode) | None => {}
         }
-    }
-
-    /// The last words: a sentence, or the one line of JSON.
-    pub fn finish(&self, outcome: &Outcome, as_json: bool) -> Result<()> {
-        if as_json {
-            return crate::say(&serde_json::to_string(outcome)?);
-        }
-        let said = match &outcome.failure {
-            Some(why) => format!("the mission failed: {why}"),
-            None => format!(
-                "{} delivered in {:.1} s of robot time; {} frames, {} lost",
-                outcome.delivered.len(),
-                outcome.sim_seconds,
-                outcome.frames,
-                outcome.lost
-            ),
-        };
-        self.note(&said);
-        Ok(())
     }
 }

@@ -1,62 +1,77 @@
-//! Where a running robot keeps its few files: the lock of its `up`, the effective configuration
-//! the links to the simulated or emulated ports, and an emulated body's clock and EEPROMs.
+//! What a running robot keeps in its folder of the bus ([`Place`]): the lock of its `up`, the
+//! effective configuration, the links to the simulated or emulated ports, an emulated body's clock
+//! and EEPROMs, and what a station of its own keeps.
 //!
-//! The folder is the user's own, one for each bus and robot. The lock is an flock, so that a
-//! killed supervisor leaves nothing to clean up.
+//! The folder lies with the bus, so that nobody can take a robot's name without meeting the robot.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{Read, Seek, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
-use rustix::fs::{FlockOperation, flock};
+use anyhow::{Context, Result};
+use lager_ports::{Lock, Place, RobotName, StopPage, StopWord};
+use lager_station::Queues;
 
 use crate::config::Config;
 
 /// The effective configuration's file.
 const CONFIG: &str = "lager.toml";
+/// The links to the ports of a body that is none.
+const SENSOR: &str = "sensor.tty";
+const STEERING: &str = "steering.tty";
+/// An emulated body's page of time, and the folder of its boards' EEPROMs.
+const CLOCK: &str = "clock";
+const EEPROM: &str = "eeprom";
+/// The socket for a GaG of the robot's own station, and its warehouse.
+const GAG: &str = "gag";
+const WAREHOUSE: &str = "warehouse.toml";
 
 /// The folder of one robot on one bus.
 #[derive(Clone, Debug)]
-pub struct RuntimeFolder(PathBuf);
+pub struct RuntimeFolder {
+    place: Place,
+    robot: RobotName,
+    path: PathBuf,
+}
 
 impl RuntimeFolder {
     /// Makes the folder, readable by this user alone.
-    ///
-    /// It is below `$XDG_RUNTIME_DIR`, or below `/tmp/lager-<uid>` where that is not set.
     pub fn create(config: &Config) -> Result<Self> {
-        let uid = rustix::process::getuid().as_raw();
-        let base = base();
-        let folder = below(&base, config);
-        fs::DirBuilder::new()
-            .recursive(true)
-            .mode(0o700)
-            .create(&folder)
-            .with_context(|| format!("cannot make the runtime folder {}", folder.display()))?;
-        if fs::symlink_metadata(&base)?.uid() != uid {
-            bail!(
-                "{} belongs to another user; remove it or set XDG_RUNTIME_DIR",
-                base.display()
-            );
-        }
-        Ok(Self(folder))
+        let bus = config.bus()?;
+        let place = bus.place()?;
+        Ok(Self {
+            path: place.robot(&bus.robot),
+            robot: bus.robot,
+            place,
+        })
     }
 
     /// The configuration that the running robot of `config`'s name was started with, `None` if
     /// none was started here.
     pub fn running(config: &Config) -> Result<Option<Config>> {
-        let file = below(&base(), config).join(CONFIG);
+        let bus = config.bus()?;
+        let file = bus.place()?.folder_of(&bus.robot).join(CONFIG);
         if !file.is_file() {
             return Ok(None);
         }
         Config::load(Some(&file)).map(Some)
     }
 
+    /// Where the own station of `config`'s robot listens for a GaG.
+    pub fn gag(config: &Config) -> Result<PathBuf> {
+        let bus = config.bus()?;
+        Ok(bus.place()?.folder_of(&bus.robot).join(GAG))
+    }
+
+    /// Where the own station of `config`'s robot keeps its warehouse.
+    pub fn warehouse(config: &Config) -> Result<PathBuf> {
+        let bus = config.bus()?;
+        Ok(bus.place()?.folder_of(&bus.robot).join(WAREHOUSE))
+    }
+
     /// The page for an emulated body's time. One that a killed robot has left is gone, so that
     /// nobody takes it for the new one.
     pub fn fresh_clock(&self) -> Result<PathBuf> {
-        let path = self.0.join("clock");
+        let path = self.path.join(CLOCK);
         match fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error)
                 .with_context(|| format!("cannot remove the old clock page {}", path.display())),
@@ -64,28 +79,30 @@ impl RuntimeFolder {
         }
     }
 
-    /// The folder for the EEPROMs of emulated boards.
+    /// The folder for the EEPROMs of emulated boards. It outlives the robot, as a board's EEPROM
+    /// outlives its power, and lies with the bus: until the machine restarts. A longer life is
+    /// `[chip] eeprom`'s.
     pub fn eeprom(&self) -> Result<PathBuf> {
-        let path = self.0.join("eeprom");
+        let path = self.path.join(EEPROM);
         fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
         Ok(path)
     }
 
     /// Where the simulated port of the sensor board is linked.
     pub fn sensor_port(&self) -> PathBuf {
-        self.0.join("sensor.tty")
+        self.path.join(SENSOR)
     }
 
     /// Where the simulated port of the steering board is linked.
     pub fn steering_port(&self) -> PathBuf {
-        self.0.join("steering.tty")
+        self.path.join(STEERING)
     }
 
     /// Writes the effective configuration for the children and returns its path.
     pub fn write_config(&self, config: &Config) -> Result<PathBuf> {
-        let path = self.0.join(CONFIG);
+        let path = self.path.join(CONFIG);
         let whole = || -> Result<()> {
-            let new = self.0.join("lager.toml.new");
+            let new = self.path.join("lager.toml.new");
             fs::write(&new, toml::to_string(config)?)?;
             // Whoever reads it at this moment reads all of the old one or all of the new one.
             Ok(fs::rename(&new, &path)?)
@@ -95,94 +112,71 @@ impl RuntimeFolder {
     }
 
     /// Takes the robot's name for this process until the guard is dropped.
-    pub fn lock(&self, name: &str) -> Result<NameLock> {
-        let path = self.0.join("up.lock");
-        let mut file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path)
-            .with_context(|| {
-                format!(
-                    "cannot open {}; was it just removed? Try again",
-                    path.display()
-                )
-            })?;
-        if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
-            let mut owner = String::new();
-            file.read_to_string(&mut owner)?;
-            return Err(NameTaken {
-                name: name.to_owned(),
-                pid: owner.trim().to_owned(),
-            }
-            .into());
-        }
-        // An `up` that was just ending may have removed the file between opening and locking.
-        let still_there = fs::metadata(&path)
-            .is_ok_and(|there| file.metadata().is_ok_and(|held| held.ino() == there.ino()));
-        if !still_there {
-            bail!("the robot `{name}` was just going down; try again");
-        }
-        file.set_len(0)?;
-        file.rewind()?;
-        write!(file, "{}", std::process::id())?;
+    pub fn lock(&self) -> Result<NameLock> {
         Ok(NameLock {
-            _file: file,
-            folder: self.clone(),
+            lock: Some(self.place.lock_name(&self.robot)?),
+            place: self.place.clone(),
+            folder: self.path.clone(),
         })
     }
-}
-
-/// The folder of all of this user's robots.
-fn base() -> PathBuf {
-    match std::env::var_os("XDG_RUNTIME_DIR") {
-        Some(folder) if Path::new(&folder).is_dir() => PathBuf::from(folder).join("lager"),
-        _ => PathBuf::from(format!("/tmp/lager-{}", rustix::process::getuid().as_raw())),
-    }
-}
-
-fn below(base: &Path, config: &Config) -> PathBuf {
-    base.join(config.bus.prefix.as_deref().unwrap_or("bus"))
-        .join(&config.name)
 }
 
 /// Held by the one supervisor of a robot.
 #[derive(Debug)]
 pub struct NameLock {
-    _file: File,
-    folder: RuntimeFolder,
+    lock: Option<Lock>,
+    place: Place,
+    folder: PathBuf,
+}
+
+impl NameLock {
+    /// Whether the folder is still there, and the lock in it that everybody meets is this one.
+    pub fn is_held(&self) -> bool {
+        self.lock.as_ref().is_some_and(Lock::is_in_place)
+    }
+
+    /// Sees to it that others find this robot by its lock.
+    pub fn renew(&self) {
+        if let Some(lock) = &self.lock {
+            lock.renew();
+        }
+    }
+
+    /// Makes a folder that was removed anew, with what `config` needs in it.
+    ///
+    /// # Errors
+    /// It cannot be made, or somebody has taken the name meanwhile.
+    pub fn restore(&mut self, config: &Config) -> Result<()> {
+        let folder = RuntimeFolder::create(config)?;
+        if !self.is_held() {
+            *self = folder.lock()?;
+        }
+        folder.write_config(config)?;
+        if let Some(eeprom) = &config.chip.eeprom {
+            fs::create_dir_all(eeprom)
+                .with_context(|| format!("cannot make {}", eeprom.display()))?;
+        }
+        Ok(())
+    }
 }
 
 impl Drop for NameLock {
-    /// Leaves no file behind after a clean stop.
+    /// Leaves nothing of `up` behind after a clean stop but a stop that is set, and what boards have
+    /// written into their EEPROM.
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.folder.0);
-        // The two folders above stay while another robot or bus lives in them.
-        if let Some(bus) = self.folder.0.parent() {
-            let _ = fs::remove_dir(bus);
-            if let Some(base) = bus.parent() {
-                let _ = fs::remove_dir(base);
+        if self.is_held() {
+            for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, WAREHOUSE] {
+                let _ = fs::remove_file(self.folder.join(name));
             }
+            let _ = fs::remove_file(Queues::beside(&self.folder.join(WAREHOUSE)));
+            // It stays when it has something in it.
+            let _ = fs::remove_dir(self.folder.join(EEPROM));
+            StopWord::tidy(&self.folder.join(StopPage::FILE));
+            // A service that was killed has left its own.
+            self.place.sweep_locks();
         }
+        self.lock = None;
+        // It stays while anything else is in it.
+        let _ = fs::remove_dir(&self.folder);
     }
 }
-
-/// A second `up` of the same name.
-#[derive(Debug)]
-pub struct NameTaken {
-    name: String,
-    pid: String,
-}
-
-impl std::fmt::Display for NameTaken {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "a robot named `{}` is already up (process {}); give this one another name with --name, or stop that one with Ctrl-C",
-            self.name, self.pid
-        )
-    }
-}
-
-impl std::error::Error for NameTaken {}

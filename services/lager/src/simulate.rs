@@ -1,28 +1,29 @@
 //! `lager simulate`: the whole robot in one process in virtual time.
 //!
 //! The same state machines as in the real processes are joined by function calls: no bus, no
-//! clock, no thread. A run is a function of warehouse, mission and seed. It is the proof that the
+//! clock, no thread. The bridge is the real one but for its ports: its core, and the receiving end
+//! of each port. A run is a function of warehouse, mission and seed. It is the proof that the
 //! shells decide nothing, and the fast way to try a warehouse or a change.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
-use lager_bridge::arbiter::Arbiter;
-use lager_bridge::frames::{LineAssembler, ServoTable, steering_report};
-use lager_logic::{Input, Navigator};
+use anyhow::Result;
+use lager_bridge::listener::{Heard, Listener};
+use lager_bridge::machine::{Action, BridgeCore, CoreOptions};
+use lager_bridge::{Counts, Moment, PortEvent};
+use lager_logic::{Input, LogicConfig, Navigator, Pick};
 use lager_plant::{GoodState, Warehouse};
-use lager_simulator::{Robot, RobotOptions, Wire};
-use lager_topics::{AskKind, EventKind, Health, InputKind, WarehouseMap};
-use lager_wire::link::{HostEvent, HostLink, HostTransmitter, Up};
-use lager_wire::{Packet, Payload};
+use lager_ports::Stop;
+use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire};
+use lager_topics::{Ask, EventKind, FailureKind, Health, Role, SteeringOrder, SteeringReport, Tag};
 use serde::Serialize;
 
 use crate::cli::SimulateArgs;
 use crate::config::{self, Config};
 use crate::exit;
 use crate::map::bus_map;
-use crate::operator::{Act, ScriptedOperator, Seen};
+use crate::operator::{Act, Script, ScriptedOperator, Seen};
 use crate::up::mission;
 
 /// How far time moves at each turn of the loop.
@@ -46,13 +47,25 @@ struct Line<'a> {
     frames: u64,
     /// Packets lost on the wires.
     lost: u64,
+    /// How often the robot has found a way blocked.
+    blocked: u32,
+    /// How often the body has run into something.
+    collisions: u32,
+    /// How often goods have slipped out of the claw.
+    slips: u32,
+    /// Largest lateral error from the line after the first metre, in mm (E15).
+    lateral_mm: f64,
+    /// The battery at the end, in volts.
+    battery_volts: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     failure: Option<String>,
+    /// What logic calls it that it stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    failure_kind: Option<Tag<FailureKind>>,
 }
 
 /// Runs every seed in every warehouse; fails when a mission is not delivered.
 pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
-    let seeds = parse_seeds(&args.seeds)?;
     let names = if args.warehouse.is_empty() {
         vec![config.warehouse.clone()]
     } else {
@@ -63,13 +76,21 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
     for name in &names {
         let warehouse = config::warehouse(name)?;
         let mission = mission(&warehouse, &args.mission)?;
-        for seed in seeds.clone() {
+        for seed in args.seeds.clone() {
             let start = Instant::now();
-            let mut whole = Whole::new(config, &warehouse, &mission, seed)?;
+            let mut whole = Whole::new(config, &warehouse, &mission, seed, args.obstacles)?;
+            if let Some(percent) = args.battery {
+                let charge = f64::from(percent) / 100.0;
+                whole.robot.world_mut().set_battery_charge(charge);
+            }
+            if args.calibrate {
+                whole.calibrate()?;
+            }
             let failure = whole.run(limit);
             failed += u32::from(failure.is_some());
             let sim_seconds = whole.now.as_secs_f64();
             let wall_seconds = start.elapsed().as_secs_f64();
+            let world = whole.robot.world();
             let line = Line {
                 warehouse: name,
                 seed,
@@ -79,6 +100,12 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
                 times_real: sim_seconds / wall_seconds,
                 frames: whole.frames,
                 lost: whole.lost(),
+                blocked: whole.blocked,
+                failure_kind: whole.failure_kind().filter(|_| failure.is_some()),
+                collisions: world.collisions(),
+                slips: world.goods().slips(),
+                lateral_mm: world.worst_lateral_mm(),
+                battery_volts: world.battery_volts(),
                 failure,
             };
             tell(&line, args.json)?;
@@ -100,112 +127,135 @@ fn tell(line: &Line<'_>, as_json: bool) -> Result<()> {
         None => format!("delivered {:?}", line.delivered),
     };
     crate::say(&format!(
-        "{:8} seed {:3}: {end} in {:.1} s, {:.0} times as fast as real, {} frames, {} lost",
-        line.warehouse, line.seed, line.sim_seconds, line.times_real, line.frames, line.lost
+        "{:8} seed {:3}: {end} in {:.1} s, {:.0} times as fast as real, {} frames, {} lost, \
+         {} collisions, at most {:.0} mm off the line",
+        line.warehouse,
+        line.seed,
+        line.sim_seconds,
+        line.times_real,
+        line.frames,
+        line.lost,
+        line.collisions,
+        line.lateral_mm,
     ))
 }
 
-/// `7`, or `1..20` with both ends.
-fn parse_seeds(text: &str) -> Result<std::ops::RangeInclusive<u64>> {
-    let seed = |text: &str| {
-        text.parse::<u64>().with_context(|| {
-            format!("`{text}` is no seed; write --seeds 7 or --seeds 1..20 (both ends run)")
-        })
-    };
-    let (first, last) = match text.split_once("..") {
-        Some((first, last)) => (seed(first)?, seed(last.trim_start_matches('='))?),
-        None => (seed(text)?, seed(text)?),
-    };
-    if last < first {
-        bail!("--seeds {text} is empty; the first seed comes first");
-    }
-    Ok(first..=last)
-}
-
-/// One end of a UART on the Pi, as the bridge has it.
-struct Port {
-    wire: Wire,
-    link: HostLink,
-    transmitter: HostTransmitter,
-    up: Option<Up>,
-}
+/// The ends of the cables on the Pi, in the order of the ports.
+const WIRES: [Wire; 2] = [Wire::Sensor, Wire::Steering];
 
 /// Robot, bridge, logic and operator.
 struct Whole {
     now: Duration,
     robot: Robot,
-    ports: [Port; 2],
-    lines: LineAssembler,
-    servos: ServoTable,
-    arbiter: Arbiter,
+    ears: [Listener; 2],
+    counts: Counts,
+    bridge: BridgeCore,
+    /// The stop word.
+    stop: Option<Stop>,
+    /// Orders on their way to the bridge.
+    orders: Vec<SteeringOrder>,
+    /// Something has come to the bridge since it last decided.
+    stirred: bool,
     navigator: Navigator,
     operator: ScriptedOperator,
-    map: WarehouseMap,
     seen: Seen,
     renewed: Duration,
     looked: Duration,
     frames: u64,
+    /// How often logic has found a way blocked.
+    blocked: u32,
     bytes: Vec<u8>,
 }
 
 impl Whole {
-    fn new(config: &Config, warehouse: &Warehouse, mission: &[i32], seed: u64) -> Result<Self> {
+    fn new(
+        config: &Config,
+        warehouse: &Warehouse,
+        mission: &[i32],
+        seed: u64,
+        obstacles: u32,
+    ) -> Result<Self> {
         let options = RobotOptions {
             seed,
+            obstacles,
             baud: config.serial.baud,
             ..RobotOptions::default()
         };
-        let port = |wire| Port {
-            wire,
-            link: HostLink::new(),
-            transmitter: HostTransmitter::new(),
-            up: None,
+        let bridge = CoreOptions {
+            baud: config.serial.baud,
+            raw_line: config.serial.raw_line,
+            original_boards: config.serial.original_boards,
+            arm: config.arm,
         };
-        Ok(Self {
+        let map = bus_map(warehouse);
+        let mut whole = Self {
             now: Duration::ZERO,
             robot: Robot::new(warehouse, options)?,
-            ports: [port(Wire::Sensor), port(Wire::Steering)],
-            lines: LineAssembler::default(),
-            servos: ServoTable::default(),
-            arbiter: Arbiter::new(),
-            navigator: Navigator::new(config.navigator()),
-            operator: ScriptedOperator::new(mission.to_vec(), 0),
-            map: bus_map(warehouse),
+            ears: [Listener::new(0), Listener::new(1)],
+            counts: Counts::default(),
+            bridge: BridgeCore::new(bridge, None),
+            stop: None,
+            orders: Vec::new(),
+            stirred: true,
+            navigator: Navigator::new(LogicConfig {
+                pick: Pick::Auto,
+                ..config.navigator()
+            }),
+            operator: ScriptedOperator::new(Script::new(mission.to_vec()), 0),
             seen: Seen::default(),
             renewed: Duration::ZERO,
             looked: Duration::ZERO,
             frames: 0,
+            blocked: 0,
             bytes: Vec::new(),
-        })
+        };
+        whole.tell_logic(Input::Map(&map));
+        Ok(whole)
+    }
+
+    /// Has a person calibrate the line sensors before anything else happens.
+    fn calibrate(&mut self) -> Result<(), CalibrateError> {
+        lager_simulator::calibrate(&mut self.robot)?;
+        self.now = self.robot.now();
+        Ok(())
     }
 
     /// Runs until the operator's script has ended; the reason if it failed.
     fn run(&mut self, limit: Duration) -> Option<String> {
-        let map = self.map;
-        self.tell_logic(Input::Map(&map));
         while self.now < limit {
-            self.now += TICK;
-            self.robot.advance_to(self.now);
-            for port in 0..self.ports.len() {
-                self.receive(port);
-            }
-            self.tell_mode();
-            self.tell_logic(Input::Tick);
-            if self.now - self.renewed >= RENEW {
-                self.renew();
-            }
-            if self.now - self.looked >= LOOK {
-                self.looked = self.now;
-                self.operate();
-            }
-            self.transmit();
-            match self.operator.outcome() {
-                Some(Ok(())) => return self.not_at_the_bar(),
-                Some(Err(why)) => return Some(why.to_owned()),
-                None => {}
+            if let Some(outcome) = self.turn() {
+                return outcome.err();
             }
         }
         Some(format!("not delivered within {} s", limit.as_secs()))
+    }
+
+    /// One tick; `Some` once the operator's script has ended, with the reason if it failed.
+    fn turn(&mut self) -> Option<Result<(), String>> {
+        self.now += TICK;
+        self.robot.advance_to(self.now);
+        for place in 0..WIRES.len() {
+            self.receive(place);
+        }
+        self.tell_logic(Input::Tick);
+        if self.now - self.renewed >= RENEW {
+            self.renew();
+        }
+        if self.now - self.looked >= LOOK {
+            self.looked = self.now;
+            self.operate();
+        }
+        self.run_bridge();
+        match self.operator.outcome()? {
+            Ok(()) => Some(self.not_at_the_bar().map_or(Ok(()), Err)),
+            Err(why) => Some(Err(why.to_owned())),
+        }
+    }
+
+    /// What logic calls it that it stands.
+    fn failure_kind(&self) -> Option<Tag<FailureKind>> {
+        let failure = self.navigator.status().failure;
+        (!failure.is_none()).then_some(failure.kind)
     }
 
     /// What the mission says is delivered must lie at the delivery station.
@@ -224,68 +274,133 @@ impl Whole {
     }
 
     /// Takes what has arrived at one port.
-    fn receive(&mut self, port: usize) {
+    fn receive(&mut self, place: usize) {
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.clear();
-        self.robot.read(self.ports[port].wire, &mut bytes);
+        self.robot.read(WIRES[place], &mut bytes);
+        let at = self.moment();
         for byte in &bytes {
-            if let Some(event) = self.ports[port].link.push(*byte, self.now) {
-                self.take(port, event);
+            if let Some(heard) = self.ears[place].push(*byte, at, &self.counts) {
+                self.take(place, heard);
             }
+        }
+        if !bytes.is_empty() {
+            self.ears[place].measure(&self.counts);
         }
         self.bytes = bytes;
-        while let Some(event) = self.ports[port].link.poll(self.now) {
-            self.take(port, event);
+        while let Some(heard) = self.ears[place].poll(self.now, &self.counts) {
+            self.take(place, heard);
         }
     }
 
-    fn take(&mut self, port: usize, event: HostEvent) {
-        let Port {
-            wire,
-            link,
-            transmitter,
-            up: known,
-        } = &mut self.ports[port];
-        match event {
-            HostEvent::SendSyn => self.robot.write(*wire, &transmitter.syn()),
-            HostEvent::SendAck { up } => {
-                let Some(version) = link.version() else {
-                    return;
-                };
-                self.robot.write(*wire, &transmitter.ack(version));
-                if let Some(up) = up {
-                    *known = Some(up);
-                    if *wire == Wire::Steering {
-                        self.arbiter.board_up(self.now, up.version, up.rebooted);
-                    }
+    fn take(&mut self, place: usize, heard: Heard) {
+        match heard {
+            Heard::Line(frame) => {
+                self.frames += 1;
+                if let Some(state) = frame.state.get() {
+                    self.tell_logic(Input::Line(state));
                 }
             }
-            HostEvent::Up(up) => *known = Some(up),
-            HostEvent::Silent => *known = None,
-            HostEvent::Packet(packet) => self.take_packet(packet),
-        }
-    }
-
-    fn take_packet(&mut self, packet: Packet) {
-        self.frames += 1;
-        match packet.payload {
-            Payload::RawLine(bits) => self.lines.raw(packet.id, bits),
-            Payload::Line(state) => self.tell_logic(Input::Line(state)),
-            Payload::Distance(distance) => self.tell_logic(Input::Distance(distance.0)),
-            Payload::ArmData(data) => self.servos.hear(&data),
-            Payload::SteerData(data) => {
-                self.arbiter.observe(self.now, &data);
-                let report = steering_report(0, &data, &self.servos, &self.arbiter);
-                self.seen.report = Some(report);
-                self.tell_logic(Input::Steering(&report));
+            Heard::Distance(frame) => {
+                self.frames += 1;
+                self.tell_logic(Input::Distance(frame.distance_cm));
             }
-            _ => {}
+            Heard::Data(event) => {
+                self.frames += 1;
+                self.tell_bridge(place, event);
+            }
+            Heard::Link(event) => self.tell_bridge(place, event),
         }
     }
 
-    fn tell_mode(&mut self) {
-        let (mode, stopped) = (self.arbiter.mode(), self.arbiter.is_stopped());
-        self.tell_logic(Input::Mode { mode, stopped });
+    fn tell_bridge(&mut self, place: usize, event: PortEvent) {
+        self.bridge.port(self.moment(), place, event);
+        self.stirred = true;
+        self.act();
+    }
+
+    /// Lets the bridge decide when it has to, as it does when it is woken.
+    fn run_bridge(&mut self) {
+        self.stirred |= self.bridge.next_due() <= self.now;
+        while std::mem::take(&mut self.stirred) {
+            for order in std::mem::take(&mut self.orders) {
+                self.bridge.order(self.now, self.now, &order);
+            }
+            self.bridge.decide(self.now);
+            self.act();
+            // Whoever asked sees by `link/health` what became of it.
+            let _ = self.bridge.answer();
+        }
+    }
+
+    /// Does what the bridge wants done.
+    fn act(&mut self) {
+        while let Some(action) = self.bridge.next(self.moment()) {
+            match action {
+                Action::Write(write) => {
+                    self.robot.write(WIRES[write.place], &write.packet);
+                    self.bridge.wrote(&write, true, self.moment());
+                }
+                Action::PublishHealth { .. } => self.publish_health(),
+                Action::PublishState { .. } => self.publish_state(),
+                Action::Stop(cause) => {
+                    let stop = Stop::new(Role::Bridge, cause, self.moment().ns);
+                    self.stop.get_or_insert(stop);
+                    self.bridge.stop(stop);
+                }
+                Action::Release => {
+                    self.stop = None;
+                    self.bridge.released(true);
+                }
+                // What was written is on the wire, and nobody waits for a stop.
+                Action::Discard { .. } | Action::ShowReport(_) => {}
+                Action::Say(news) => tracing::debug!(at = ?self.now, ?news),
+            }
+        }
+    }
+
+    fn publish_health(&mut self) {
+        let mut health = Health::default();
+        self.bridge.fill_health(self.now, &self.counts, &mut health);
+        self.bridge.health_told();
+        // Logic is told what is new to it, as its shell does.
+        let told = self.seen.health.replace(health);
+        if told.map(|told| told.driven_by_hand) != Some(health.driven_by_hand) {
+            self.tell_logic(Input::DrivenByHand(health.driven_by_hand));
+        }
+        let steers = |health: Health| (health.mode, health.stopped);
+        if let Some(mode) = health.mode.get()
+            && told.map(steers) != Some(steers(health))
+        {
+            let stopped = health.stopped != 0;
+            self.tell_logic(Input::Mode { mode, stopped });
+        }
+    }
+
+    fn publish_state(&mut self) {
+        let mut report = SteeringReport::default();
+        self.bridge.fill_state(self.now, &mut report);
+        self.bridge.state_told();
+        self.tell_logic(Input::Steering(&report));
+    }
+
+    /// A request to the bridge; its answer is seen by what it does.
+    fn ask(&mut self, ask: &Ask) {
+        let ask = Ask {
+            issued_ns: self.moment().ns,
+            lifetime_ms: 1_000,
+            ..*ask
+        };
+        self.bridge.ask(self.moment(), &ask);
+        self.stirred = true;
+        self.act();
+    }
+
+    fn moment(&self) -> Moment {
+        Moment {
+            robot: self.now,
+            ns: self.now.as_nanos() as u64,
+        }
     }
 
     /// One input for logic; a changed order is given at once.
@@ -293,13 +408,16 @@ impl Whole {
         let before = self.navigator.current_order();
         let said = self.navigator.handle(self.now, input);
         for event in &said.events {
-            if event.kind.get() == Some(EventKind::Refused) {
-                self.seen.refused = Some(event.order_id);
+            match event.kind.get() {
+                Some(EventKind::Refused) => {
+                    self.seen.refused = Some((event.order_id, event.failure));
+                }
+                Some(EventKind::WayBlocked) => self.blocked += 1,
+                _ => {}
             }
         }
         if let Some(thought) = &said.thought {
-            tracing::info!(at = ?self.now, "{}", thought.text);
-            thought.text.as_str().clone_into(&mut self.seen.thought);
+            tracing::info!(at = ?self.now, "{thought}");
         }
         if self.navigator.current_order() != before {
             self.renew();
@@ -309,67 +427,68 @@ impl Whole {
     fn renew(&mut self) {
         self.renewed = self.now;
         if let Some(order) = self.navigator.current_order() {
-            self.arbiter.order(self.now, &order);
+            self.give(order);
         }
+    }
+
+    fn give(&mut self, order: SteeringOrder) {
+        self.orders.push(order);
+        self.stirred = true;
     }
 
     /// What the operator sees and does.
     fn operate(&mut self) {
-        let mut health = Health::default();
-        self.arbiter.fill(self.now, &mut health);
-        health.sensor.up = self.ports[0].up.is_some().into();
-        health.steering.up = self.ports[1].up.is_some().into();
-        self.seen.health = Some(health);
         self.seen.status = Some(self.navigator.status());
         match self.operator.step(self.now, &self.seen) {
-            Some(Act::Ask(ask)) => {
-                if let (Some(AskKind::SetMode), Some(mode)) = (ask.kind.get(), ask.mode.get()) {
-                    self.arbiter.set_mode(mode);
-                }
-            }
+            Some(Act::Ask(ask)) => self.ask(&ask),
             Some(Act::Order(order)) => self.tell_logic(Input::Order(&order)),
-            Some(Act::Steer(order)) => {
-                self.arbiter.order(self.now, &order);
-            }
-            Some(Act::Press(input)) if input.kind.get() == Some(InputKind::PickupDone) => {
-                self.tell_logic(Input::PickupDone {
-                    order_id: input.order_id,
-                });
-            }
-            Some(Act::Press(_)) | None => {}
-        }
-    }
-
-    /// Writes what the arbiter wants written.
-    fn transmit(&mut self) {
-        let steering = &mut self.ports[1];
-        while let Some(command) = self.arbiter.poll(self.now) {
-            match steering.transmitter.encode(Payload::SteerCommand(command)) {
-                Some(packet) => self.robot.write(steering.wire, &packet),
-                None => self.arbiter.not_written(self.now),
-            }
+            None => {}
         }
     }
 
     fn lost(&self) -> u64 {
-        self.ports
+        self.ears
             .iter()
-            .map(|port| u64::from(port.link.health().lost))
+            .map(|ear| u64::from(ear.health().lost))
             .sum()
     }
 }
 
 #[cfg(test)]
+mod boards;
+#[cfg(test)]
+mod disturbed;
+#[cfg(test)]
+mod obstacles;
+#[cfg(test)]
+mod worn;
+
+#[cfg(test)]
 mod tests {
-    use super::parse_seeds;
+    use super::*;
 
     #[test]
-    fn seeds_are_one_number_or_a_range_with_both_ends() {
-        assert_eq!(parse_seeds("7").expect("a seed"), 7..=7);
-        assert_eq!(parse_seeds("1..20").expect("a range"), 1..=20);
-        assert_eq!(parse_seeds("1..=20").expect("a range"), 1..=20);
-        for wrong in ["", "x", "1..", "5..4", "-1"] {
-            assert!(parse_seeds(wrong).is_err(), "{wrong}");
+    fn a_script_that_is_taken_over_again_and_again_is_delivered_once() {
+        let warehouse = Warehouse::builtin("small").expect("built in");
+        let mission = [1, 2];
+        // Whoever takes over sees nothing of before, not even the ids that were given.
+        for every in [700, 1_900, 5_300, 13_700] {
+            let mut whole =
+                Whole::new(&Config::default(), &warehouse, &mission, 1, 0).expect("a robot");
+            let every = Duration::from_millis(every);
+            let mut due = every;
+            while whole.operator.outcome().is_none() {
+                let failure = whole.run(due);
+                due += every;
+                assert!(due < Duration::from_secs(600), "{failure:?}");
+                let heir = whole.operator.script().clone();
+                whole.operator = ScriptedOperator::new(heir, due.as_millis() as u32 * 100);
+            }
+            assert_eq!(whole.operator.outcome(), Some(Ok(())), "every {every:?}");
+            assert_eq!(whole.operator.delivered(), mission, "every {every:?}");
+            let delivered = whole.seen.status.map(|status| status.delivered);
+            assert_eq!(delivered, Some(2), "every {every:?}");
+            assert_eq!(whole.not_at_the_bar(), None, "every {every:?}");
         }
     }
 }

@@ -1,33 +1,47 @@
-//! The one-shot commands: `drive`, `arm`, `stop`, `resume`, `mode`, `fetch`, `picked`, `reset`,
-//! `gains`, `calibrate`.
+//! The one-shot commands: `drive`, `arm`, `resume`, `mode`, `picked`, `reset`, `gains`,
+//! `calibrate`, and in files of their own those about orders and those that do what hands do.
+//! `stop` is apart, since it must do without the bus.
 //!
 //! Each opens the bus as an operator, does one thing through the same [`Hands`] as `up`, waits
 //! until the robot shows the effect, and says what came of it.
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
-use lager_ports::{Bus, BusConfig, Clock, Shutdown, Subscriber};
+use anyhow::{Result, anyhow, bail};
+use lager_bridge::arbiter::LEASE;
+use lager_ports::{Bus, BusConfig, Clock, Subscriber};
 use lager_topics::{
-    Answer, Ask, AskKind, EventKind, Finish, Health, Input, InputKind, LinkHealth, LogThought,
-    MissionEvent, Mode, NavStatus, Order, OrderKind, Origin, Outcome, Phase, Role, SteeringOrder,
-    SteeringState, Topic,
+    Answer, Ask, AskKind, Calibration, EventKind, Finish, Health, Input, InputKind, LinkHealth,
+    MissionEvent, Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Refusal, Role,
+    SteeringOrder, SteeringState, StopCause, Topic,
 };
-use lager_wire::{Command, OperatorCommand, WheelCommand, parse_code};
+use lager_wire::OperatorCommand;
 
 use crate::config::Config;
 use crate::hands::Hands;
+use crate::patience::Patience;
 use crate::runtime::RuntimeFolder;
+use crate::stop;
 
-/// How often an order is renewed, in robot time; its lease is 120 ms.
+mod queue;
+mod world;
+
+pub use world::{Obstacle, Place};
+
+/// How often an order is renewed, in robot time; its lease is three times as long.
 const RENEW: Duration = Duration::from_millis(40);
+/// How long a calibration may take in robot time; the board watches its sensors for five seconds.
+const CALIBRATION: Duration = Duration::from_secs(8);
 /// How long the robot may take to show an effect, in real time.
-const PATIENCE: Duration = Duration::from_secs(3);
+const PATIENCE: Duration = Duration::from_millis(2_500);
 
 /// An operator at work on a robot that is up.
 pub struct Operator {
+    patience: Patience,
     bus: Bus,
     hands: Hands,
+    /// What the robot was started with.
+    running: Config,
     health: Subscriber<LinkHealth>,
 }
 
@@ -36,93 +50,69 @@ impl Operator {
     ///
     /// # Errors
     /// When no bridge of this robot answers.
-    pub fn new(config: &Config) -> Result<Self> {
+    pub fn new(config: &Config, patience: Patience) -> Result<Self> {
         // The robot's clock may be another than this command's configuration says.
-        let running = RuntimeFolder::running(config)?.map(|running| running.bus());
-        let bus = match running.transpose()? {
-            Some(BusConfig { speed, clock, .. }) => BusConfig {
-                speed,
-                clock,
-                ..config.bus()?
-            },
-            None => config.bus()?,
+        let running = RuntimeFolder::running(config)?.unwrap_or_else(|| config.clone());
+        let BusConfig { speed, clock, .. } = running.bus()?;
+        let bus = BusConfig {
+            speed,
+            clock,
+            ..config.bus()?
         };
+        patience.watchdog.enter("joining the bus");
         let bus = Bus::open(&bus, Role::Operator)?;
+        patience.watchdog.enter("opening the operator's topics");
         let operator = Self {
             hands: Hands::new(&bus)?,
+            running,
             health: bus.subscriber()?,
             bus,
+            patience,
         };
         Ok(operator)
     }
 
     /// `lager drive`: gives the order and renews it until it is done, `seconds` have passed or
     /// Ctrl-C; then the robot stands, because nobody renews it any more.
-    pub fn drive(
-        &mut self,
-        command: &str,
-        seconds: Option<f64>,
-        shutdown: &Shutdown,
-    ) -> Result<String> {
-        let command = parse(command, OperatorCommand::wheel)?;
-        if matches!(command, OperatorCommand::Arm(_)) {
-            bail!("0x{:02X} moves the arm; use `lager arm`", command.code());
-        }
-        if command == OperatorCommand::Stop {
-            return self.stop();
-        }
+    pub fn drive(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let health = self.health()?;
         if health.mode.get() != Some(Mode::Manual) {
             bail!("the robot is autonomous; `lager mode manual` lets you drive");
         }
-        self.carry_out(command, seconds, shutdown)
+        self.carry_out(command, seconds)
     }
 
     /// `lager arm`: one step of the arm.
-    pub fn arm(&mut self, command: &str, shutdown: &Shutdown) -> Result<String> {
-        let command = parse(command, OperatorCommand::arm)?;
-        if !matches!(command, OperatorCommand::Arm(_)) {
-            bail!(
-                "0x{:02X} drives the wheels; use `lager drive`",
-                command.code()
-            );
-        }
-        self.carry_out(command, None, shutdown)
+    pub fn arm(&mut self, command: OperatorCommand) -> Result<String> {
+        self.carry_out(command, None)
     }
 
-    /// `lager stop`: latched by the bridge before this returns.
-    pub fn stop(&mut self) -> Result<String> {
-        let order = SteeringOrder {
-            id: Hands::fresh_id(),
-            origin: Origin::Operator.into(),
-            kind: OrderKind::Stop.into(),
-            code: Command::Wheel(WheelCommand::Standby).code(),
-            arm_granted: 0,
-        };
-        let give_up = Instant::now() + PATIENCE;
-        loop {
-            self.hands.steer(order)?;
-            std::thread::sleep(Duration::from_millis(10));
-            if self
-                .health
-                .latest()?
-                .is_some_and(|health| health.stopped != 0)
-            {
-                return Ok("stopped; `lager resume` lets it go on".into());
-            }
-            if Instant::now() >= give_up {
-                bail!("no bridge confirms the stop; is the robot up? (`lager up`)");
-            }
+    /// `lager resume`: tells what it releases, and what truly happened.
+    pub fn resume(&self, config: &Config) -> Result<String> {
+        let before = stop::current(config)?;
+        if let Some(stop) = before {
+            let said = stop::describe(stop.origin(), stop.cause(), stop.at_ns());
+            crate::say(&format!("it was stopped {said}"))?;
         }
-    }
-
-    /// `lager resume`.
-    pub fn resume(&self) -> Result<String> {
-        self.ask(Ask {
+        let answer = self.hands.ask(Ask {
             kind: AskKind::Resume.into(),
             ..Ask::default()
         })?;
-        Ok("the stop is released".into())
+        match (answer.outcome.get(), before) {
+            (Some(Outcome::Done), Some(_)) if answer.stopped == 0 => {
+                Ok("the stop is released".into())
+            }
+            (Some(Outcome::Done), None) if answer.stopped == 0 => {
+                Ok("the robot was not stopped".into())
+            }
+            _ => match stop::current(config)? {
+                Some(stop) => bail!(
+                    "it stays stopped: it was stopped again meanwhile, {}",
+                    stop::describe(stop.origin(), stop.cause(), stop.at_ns())
+                ),
+                None => bail!("the bridge does not release the stop now; try again"),
+            },
+        }
     }
 
     /// `lager mode`.
@@ -138,58 +128,47 @@ impl Operator {
         })
     }
 
-    /// `lager fetch`: ordered until logic shows that it took the order.
-    pub fn fetch(&self, product: i32) -> Result<String> {
-        let mut status = self.bus.subscriber::<NavStatus>()?;
+    /// `lager picked`: repeated until logic goes on, or refuses to because it does not feel the
+    /// goods.
+    pub fn picked(&self, force: bool) -> Result<String> {
         let mut events = self.bus.subscriber::<MissionEvent>()?;
-        let mut thoughts = self.bus.subscriber::<LogThought>()?;
-        let mut why = String::from("it is not up, or does not say why");
-        let order = Order {
-            id: Hands::fresh_id(),
-            product,
-        };
-        let give_up = Instant::now() + PATIENCE;
-        loop {
-            self.hands.fetch(order)?;
-            std::thread::sleep(Duration::from_millis(50));
-            if let Some(thought) = thoughts.latest()? {
-                thought.text.as_str().clone_into(&mut why);
-            }
-            while let Some(event) = events.receive()? {
-                if event.kind.get() == Some(EventKind::Refused) && event.order_id == order.id {
-                    bail!("logic refuses to fetch product {product}: {why}");
-                }
-            }
-            if let Some(status) = status.latest()? {
-                if status.order_id == order.id {
-                    return Ok(format!("logic fetches product {product}"));
-                }
-                if status.pending != 0 && status.pending_id == order.id {
-                    return Ok(format!("logic fetches product {product} next"));
-                }
-            }
-            if Instant::now() >= give_up {
-                bail!("logic does not take the order: {why}");
-            }
-        }
-    }
-
-    /// `lager picked`: repeated until logic goes on.
-    pub fn picked(&self) -> Result<String> {
         let mut status = self.bus.subscriber::<NavStatus>()?;
         let waits = |phase| phase == Some(Phase::Picking);
-        if !waits(first(&mut status, &self.bus)?.phase.get()) {
+        if !waits(first(&mut status, &self.bus, &self.patience)?.phase.get()) {
             bail!("the robot does not wait at a pick station; nothing is to be picked up now");
         }
-        self.press_until(InputKind::PickupDone, &mut status, |phase| !waits(phase))?;
+        let input = Input {
+            kind: match force {
+                true => InputKind::PickupForced.into(),
+                false => InputKind::PickupDone.into(),
+            },
+            ..Input::default()
+        };
+        self.press_until(input, &mut status, |status| {
+            while let Some(event) = events.receive()? {
+                if event.kind.get() == Some(EventKind::PickupRefused) {
+                    let why = event.failure;
+                    bail!("logic refuses to leave: {why}; `lager picked --force` overrules it");
+                }
+            }
+            Ok(!waits(status.phase.get()))
+        })?;
         Ok("the robot takes the product to delivery".into())
     }
 
     /// `lager reset`: repeated until logic has taken it.
     pub fn reset(&self) -> Result<String> {
         let mut status = self.bus.subscriber::<NavStatus>()?;
-        self.press_until(InputKind::ResetPressed, &mut status, |phase| {
-            matches!(phase, Some(Phase::WaitingForOrder | Phase::WaitingForMap))
+        let input = Input {
+            kind: InputKind::ResetPressed.into(),
+            ..Input::default()
+        };
+        self.press_until(input, &mut status, |status| {
+            let phase = status.phase.get();
+            Ok(matches!(
+                phase,
+                Some(Phase::WaitingForOrder | Phase::WaitingForMap)
+            ))
         })?;
         Ok("the robot takes it that it stands on the delivery node".into())
     }
@@ -197,21 +176,20 @@ impl Operator {
     /// Presses a button until logic shows the effect.
     fn press_until(
         &self,
-        kind: InputKind,
+        input: Input,
         status: &mut Subscriber<NavStatus>,
-        done: impl Fn(Option<Phase>) -> bool,
+        mut done: impl FnMut(&NavigatorStatus) -> Result<bool>,
     ) -> Result<()> {
         let pressed = Clock::monotonic_ns();
+        let id = Hands::fresh_id();
         let give_up = Instant::now() + PATIENCE;
         loop {
-            self.hands.press(Input {
-                kind: kind.into(),
-                ..Input::default()
-            })?;
-            std::thread::sleep(Duration::from_millis(50));
-            if status.latest()?.is_some_and(|status| {
-                status.stamp().publish_time_ns > pressed && done(status.phase.get())
-            }) {
+            self.hands.press(Input { id, ..input })?;
+            self.patience.pause(Duration::from_millis(50))?;
+            if let Some(status) = status.latest()?
+                && status.stamp().publish_time_ns > pressed
+                && done(&status)?
+            {
                 return Ok(());
             }
             if Instant::now() >= give_up {
@@ -234,19 +212,39 @@ impl Operator {
         ))
     }
 
-    /// `lager calibrate`.
-    pub fn calibrate(&self) -> Result<String> {
+    /// `lager calibrate`: waits for the end, and tells it.
+    pub fn calibrate(&mut self) -> Result<String> {
+        let ended_before = self.health()?.calibrations_ended;
         self.ask(Ask {
             kind: AskKind::Calibrate.into(),
             ..Ask::default()
         })?;
-        Ok("calibrating for five seconds: move the robot over tape and floor".into())
+        crate::say("calibrating for five seconds: move the robot over tape and floor")?;
+        let clock = self.bus.clock();
+        let mut heard = Instant::now();
+        let give_up = clock.now() + CALIBRATION;
+        while clock.now() < give_up {
+            if let Some(health) = self.health.latest()? {
+                heard = Instant::now();
+                if health.calibrations_ended != ended_before {
+                    return calibrated(&health);
+                }
+            }
+            if heard.elapsed() >= PATIENCE {
+                bail!("the bridge has fallen silent; nobody knows how the calibration went");
+            }
+            self.patience.pause(Duration::from_millis(20))?;
+        }
+        bail!("the sensor board does not say how the calibration went; try again")
     }
 
     fn ask(&self, ask: Ask) -> Result<Answer> {
         let answer = self.hands.ask(ask)?;
         match answer.outcome.get() {
             Some(Outcome::Done) => Ok(answer),
+            Some(Outcome::Late) => Err(anyhow!(
+                "the bridge was held up and found the request when its time was over; nothing was changed, try again"
+            )),
             Some(Outcome::NoBoard) => Err(anyhow!(
                 "the board that would have to do it is not connected; `lager topic echo link/health` shows the links"
             )),
@@ -257,29 +255,30 @@ impl Operator {
     }
 
     fn health(&mut self) -> Result<Health> {
-        first(&mut self.health, &self.bus)
+        first(&mut self.health, &self.bus, &self.patience)
     }
 
     /// Gives an order and renews it until it has finished or its time is over.
-    fn carry_out(
-        &mut self,
-        command: OperatorCommand,
-        seconds: Option<f64>,
-        shutdown: &Shutdown,
-    ) -> Result<String> {
+    fn carry_out(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let name = command.name();
         let health = self.health()?;
         if health.stopped != 0 {
-            bail!("the robot is stopped; `lager resume` releases the stop");
+            bail!(
+                "the robot is stopped {}; `lager resume` releases the stop",
+                by(&health)
+            );
         }
-        let (refused_before, mode) = (health.orders_refused, health.mode.get());
+        if let Some(why) = health.blocked.get().filter(|why| *why != Refusal::None) {
+            bail!("`{name}` is not possible now: {why}");
+        }
+        let mode = health.mode.get();
         let mut state = self.bus.subscriber::<SteeringState>()?;
         let order = SteeringOrder {
             id: Hands::fresh_id(),
             origin: Origin::Operator.into(),
-            kind: OrderKind::Drive.into(),
             code: command.firmware().code(),
             arm_granted: 0,
+            ..SteeringOrder::default()
         };
         let clock = self.bus.clock();
         let end = match seconds {
@@ -287,39 +286,67 @@ impl Operator {
             None => None,
         };
         let mut accepted = false;
+        let mut ended = None;
         let mut heard = Instant::now();
         let give_up = Instant::now() + PATIENCE;
-        while !shutdown.is_requested() && end.is_none_or(|end| clock.now() < end) {
+        let mut renewed = clock.now();
+        while end.is_none_or(|end| clock.now() < end) {
+            // Stopped and continued, or kept from its core: what it held is over.
+            let pause = clock.now().saturating_sub(renewed);
+            if pause >= LEASE {
+                bail!(
+                    "this command was held up for {} ms, so the robot stands; give it anew",
+                    pause.as_millis()
+                );
+            }
+            renewed = clock.now();
             self.hands.steer(order)?;
-            std::thread::sleep(clock.real(RENEW));
+            // Whoever lets go by Ctrl-C has done what he wanted.
+            if self.patience.pause(clock.real(RENEW)).is_err() {
+                break;
+            }
             if let Some(report) = state.latest()? {
                 let own =
                     |origin: Option<Origin>, id| origin == Some(Origin::Operator) && id == order.id;
                 accepted |= own(report.current_origin.get(), report.current_id);
-                // A setpoint that lapsed is taken up again with the next renewal.
-                let is_over = own(report.finished_origin.get(), report.finished_id);
-                if is_over && command.firmware().is_one_shot() {
-                    return match report.finish.get() {
-                        Some(Finish::Done) => Ok(format!("`{name}` is done")),
-                        Some(Finish::Aborted) => Err(anyhow!("`{name}` was cut short")),
-                        _ => Err(anyhow!(
-                            "the steering board refuses `{name}`: the arm moves only while the robot stands"
-                        )),
-                    };
+                if own(report.finished_origin.get(), report.finished_id) {
+                    ended = report.finish.get();
                 }
             }
             if let Some(health) = self.health.latest()?.map(|health| *health) {
                 heard = Instant::now();
+                if health.refused_origin.get() == Some(Origin::Operator)
+                    && health.refused_id == order.id
+                    && let Some(why) = health.refusal.get()
+                {
+                    bail!("the bridge refuses `{name}`: {why}");
+                }
                 if health.stopped != 0 {
-                    bail!("the robot has been stopped");
+                    bail!("the robot has been stopped {}", by(&health));
                 }
                 if health.mode.get() != mode {
                     bail!("the mode has been changed; somebody else steers now");
                 }
-                if !accepted && health.orders_refused > refused_before {
-                    bail!(
-                        "the bridge refuses `{name}` now: somebody else steers, or the mode does not allow it"
-                    );
+                if let Some(why) = health.blocked.get().filter(|why| *why != Refusal::None) {
+                    bail!("`{name}` was cut short: {why}");
+                }
+                match ended {
+                    Some(Finish::Done) => return Ok(format!("`{name}` is done")),
+                    Some(Finish::Refused) => bail!(
+                        "the steering board refuses `{name}`: the arm moves only while the robot stands, and no joint beyond its limits in [arm]"
+                    ),
+                    Some(Finish::Aborted) => bail!(
+                        "`{name}` was cut short: a board was reset, another order took its place, or it was not renewed in time"
+                    ),
+                    Some(Finish::NoWord) => bail!(
+                        "the steering board gave up `{name}`: the sensor board's words do not reach it; look at the cable between the two boards"
+                    ),
+                    Some(Finish::NoTape) => {
+                        bail!(
+                            "the steering board gave up `{name}`: it has seen no tape for too long"
+                        )
+                    }
+                    Some(Finish::None) | None => (),
                 }
             }
             if heard.elapsed() >= PATIENCE {
@@ -333,8 +360,34 @@ impl Operator {
     }
 }
 
+/// Who has stopped the robot, and why.
+fn by(health: &Health) -> String {
+    let cause = health.stop_cause.get().unwrap_or(StopCause::WordDamaged);
+    stop::describe(health.stop_origin.get(), cause, health.stopped_at_ns)
+}
+
+/// How a calibration has ended.
+fn calibrated(health: &Health) -> Result<String> {
+    let sensors = health.calibrated_sensors;
+    match health.calibration.get() {
+        Some(Calibration::Done) => {
+            Ok("the line sensors are calibrated: each of them has seen both floor and tape".into())
+        }
+        Some(Calibration::Partly) => bail!(
+            "only {sensors} of the 11 line sensors have seen both floor and tape, and the others keep their thresholds; calibrate again and move the robot to and fro across the tape meanwhile"
+        ),
+        _ => bail!(
+            "the sensor board fell silent or restarted before the calibration had ended; `lager doctor` looks for the cause"
+        ),
+    }
+}
+
 /// The state a topic holds; the services publish theirs several times a second.
-fn first<T: Topic>(subscriber: &mut Subscriber<T>, bus: &Bus) -> Result<T::Payload> {
+fn first<T: Topic>(
+    subscriber: &mut Subscriber<T>,
+    bus: &Bus,
+    patience: &Patience,
+) -> Result<T::Payload> {
     let give_up = Instant::now() + PATIENCE;
     loop {
         if let Some(sample) = subscriber.latest()? {
@@ -347,23 +400,6 @@ fn first<T: Topic>(subscriber: &mut Subscriber<T>, bus: &Bus) -> Result<T::Paylo
                 bus.robot()
             );
         }
-        std::thread::sleep(Duration::from_millis(5));
+        patience.pause(Duration::from_millis(5))?;
     }
-}
-
-/// A command by its name, as `by_name` knows them, or in one of the three forms of its code.
-fn parse(text: &str, by_name: fn(&str) -> Option<OperatorCommand>) -> Result<OperatorCommand> {
-    if let Some(command) = by_name(text) {
-        return Ok(command);
-    }
-    let names: Vec<_> = OperatorCommand::ALL
-        .into_iter()
-        .filter(|command| by_name(command.name()) == Some(*command))
-        .map(OperatorCommand::name)
-        .collect();
-    let code = parse_code(text)
-        .with_context(|| format!("`{text}` is no command; the names are {}", names.join(", ")))?;
-    OperatorCommand::from_code(code).with_context(|| {
-        format!("0x{code:02X} is no command; the wheels have 0x01 to 0x09, the arm 0xF1 to 0xFA")
-    })
 }

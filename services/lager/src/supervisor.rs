@@ -1,19 +1,30 @@
 //! The supervisor of the service processes: starts them, restarts them with back-off, ends them
 //! in order.
 //!
-//! It knows processes, not services: what to hand over before a restart is its caller's business.
-//! Children die with it. Each asks the kernel for SIGTERM at its parent's death ([`adopt`]), so
-//! even `kill -9` of the supervisor leaves no child.
+//! It knows processes, not what they do, and never touches the bus: what to hand over before a
+//! restart, and whether a silent process hangs, is its caller's business. Children die with it. Each
+//! asks the kernel for SIGTERM at its parent's death ([`adopt`]), so even `kill -9` of the
+//! supervisor leaves no child.
+//!
+//! A child reads its configuration from its standard input, which is memory: no file has to be
+//! there for a restart.
 
-use std::os::unix::process::CommandExt;
+use std::fs::File;
+use std::io::{Seek, Write};
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use lager_ports::Shutdown;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{MemfdFlags, memfd_create};
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
+
+use crate::services::Service;
+use crate::signals::Signals;
 
 /// A child that lived this long was healthy: its restart does not wait.
 const HEALTHY: Duration = Duration::from_secs(1);
@@ -25,18 +36,21 @@ const LONGEST_WAIT: Duration = Duration::from_secs(5);
 const SETTLED: Duration = Duration::from_secs(30);
 /// How often in a row a child may end by itself before it has settled.
 const MOST_FAILURES: u32 = 5;
-/// How long a service may take from its start until it has everything that others keep for it.
-const INTRODUCTION: Duration = Duration::from_millis(500);
 /// How often a child is looked at whose end the kernel does not tell.
 const LOOK: Duration = Duration::from_millis(50);
 /// How long a child may take to stop before it is killed.
-pub const PATIENCE: Duration = Duration::from_secs(3);
+pub const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a killed child may take to end. Even a killed process has to run once more to end, and
+/// real-time load can keep it from its core.
+const LAST_PATIENCE: Duration = Duration::from_millis(500);
 
 /// All children of one robot, in the order in which they start.
 pub struct Supervisor {
     program: PathBuf,
-    config: PathBuf,
-    services: Vec<Service>,
+    config: String,
+    processes: Vec<Process>,
+    /// The services that have been started at any time.
+    known: Vec<Service>,
     restarts: u32,
 }
 
@@ -48,112 +62,159 @@ pub struct Supervisor {
 ///    ^                                               |
 ///    +-----------------------------------------------+
 /// ```
-struct Service {
-    name: &'static str,
-    child: Option<Child>,
-    started: Instant,
+struct Process {
+    service: Service,
+    running: Option<Running>,
     start_at: Instant,
     wait: Duration,
-    restarted: bool,
     /// How often in a row it has ended by itself before it had settled.
     failures: u32,
+}
+
+struct Running {
+    child: Child,
+    /// What tells the child's end; `None` before Linux 5.3.
+    end: Option<OwnedFd>,
+    started: Instant,
+}
+
+/// How a service is started.
+#[derive(Debug)]
+pub struct Start {
+    /// Whether it goes on where one before it was.
+    pub resume: bool,
+    /// Its standard output.
+    pub output: Stdio,
 }
 
 /// A child ended without being asked to.
 #[derive(Debug)]
 pub struct Ended {
-    /// The service's name.
-    pub service: &'static str,
+    /// The service.
+    pub service: Service,
     /// How it ended, in words.
     pub how: String,
+    /// Whether it has ended itself; nobody's signal has.
+    pub by_itself: bool,
+    /// Whether memory that it had mapped was gone.
+    pub lost_memory: bool,
 }
 
 impl Supervisor {
-    /// A supervisor whose children run this very program with `config`.
-    pub fn new(config: PathBuf) -> Result<Self> {
+    /// A supervisor whose children run this very program with `config`, in TOML.
+    pub fn new(config: String) -> Result<Self> {
         Ok(Self {
             program: std::env::current_exe().context("cannot find this program's own file")?,
             config,
-            services: Vec::new(),
+            processes: Vec::new(),
+            known: Vec::new(),
             restarts: 0,
         })
     }
 
-    /// Starts `name`, the subcommand of the service.
-    pub fn start(&mut self, name: &'static str) -> Result<()> {
-        let now = Instant::now();
-        let mut service = Service {
-            name,
-            child: None,
-            started: now,
-            start_at: now,
-            wait: Duration::ZERO,
-            restarted: false,
-            failures: 0,
-        };
-        service.spawn(&self.program, &self.config)?;
-        self.services.push(service);
-        Ok(())
+    /// Starts `service`, whose process is returned, anew or again.
+    pub fn start(&mut self, service: Service, start: Start) -> Result<u32> {
+        match self.known.contains(&service) {
+            true => self.restarts += 1,
+            false => self.known.push(service),
+        }
+        let place = self
+            .processes
+            .iter()
+            .position(|each| each.service == service);
+        let place = place.unwrap_or_else(|| {
+            self.processes.push(Process::new(service));
+            self.processes.len() - 1
+        });
+        let process = &mut self.processes[place];
+        let started = process.spawn(&self.program, &self.config, start);
+        if started.is_err() {
+            process.back_off(true);
+        }
+        started
     }
 
-    /// Restarts what has ended and is due again; `hand_over` runs before each restart. A child
-    /// that cannot be started counts as one that ended at once.
-    ///
-    /// Returns the children found ended by this call.
-    pub fn poll(&mut self, mut hand_over: impl FnMut(&'static str)) -> Vec<Ended> {
-        let now = Instant::now();
+    /// The children found ended by this call; they are due again after a while.
+    pub fn reap(&mut self) -> Vec<Ended> {
         let mut ended = Vec::new();
-        for service in &mut self.services {
-            let how = match service.child.as_mut().map(Child::try_wait) {
-                // One that was killed may do better next time.
-                Some(Ok(Some(status))) => Some((status.to_string(), status.code().is_some())),
-                Some(Err(error)) => Some((error.to_string(), false)),
-                Some(Ok(None)) | None => None,
-            };
-            if let Some((how, by_itself)) = how {
-                service.child = None;
-                service.back_off(now, by_itself);
-                ended.push(Ended {
-                    service: service.name,
-                    how,
-                });
-            }
-            if service.child.is_none() && now >= service.start_at {
-                hand_over(service.name);
-                service.restarted = true;
-                self.restarts += 1;
-                if let Err(error) = service.spawn(&self.program, &self.config) {
-                    service.back_off(now, true);
-                    ended.push(Ended {
-                        service: service.name,
-                        how: format!("{error:#}"),
-                    });
+        for process in &mut self.processes {
+            let status = process.running.as_mut().map(|each| each.child.try_wait());
+            let (how, by_itself, lost_memory) = match status {
+                Some(Ok(Some(status))) => {
+                    (status.to_string(), status.code().is_some(), faulted(status))
                 }
-            }
+                Some(Err(error)) => (error.to_string(), false, false),
+                Some(Ok(None)) | None => continue,
+            };
+            // One that was killed may do better next time.
+            process.back_off(by_itself);
+            ended.push(Ended {
+                service: process.service,
+                how,
+                by_itself,
+                lost_memory,
+            });
         }
         ended
     }
 
-    /// Waits until there is something for [`poll`](Self::poll) to do, but not longer than `at_most`.
-    pub fn wait(&self, at_most: Duration) {
+    /// The services that have ended and are to be started again now.
+    pub fn due(&self) -> Vec<Service> {
         let now = Instant::now();
-        let stopped = self.services.iter().filter(|each| each.child.is_none());
-        let due = stopped.map(|service| service.start_at.saturating_duration_since(now));
-        let children = self.services.iter().filter_map(|each| each.child.as_ref());
-        wait_for_an_end(children, due.fold(at_most, Duration::min));
+        let due = |process: &&Process| process.running.is_none() && now >= process.start_at;
+        self.processes
+            .iter()
+            .filter(due)
+            .map(|process| process.service)
+            .collect()
     }
 
-    /// Whether a service has started a moment ago, and may still wait for what others keep for it.
-    pub fn has_newcomer(&self) -> bool {
-        let mut running = self.services.iter().filter(|each| each.child.is_some());
-        running.any(|service| service.started.elapsed() < INTRODUCTION)
+    /// The process of `service`, if it runs.
+    pub fn process(&self, service: Service) -> Option<u32> {
+        let process = self.processes.iter().find(|each| each.service == service)?;
+        Some(process.running.as_ref()?.child.id())
+    }
+
+    /// The services that run, and their processes.
+    pub fn running(&self) -> impl Iterator<Item = (Service, u32)> {
+        let id = |process: &Process| Some((process.service, process.running.as_ref()?.child.id()));
+        self.processes.iter().filter_map(id)
+    }
+
+    /// Ends a service that does not answer. It is found ended by the next [`reap`](Self::reap).
+    pub fn kill(&mut self, service: Service) {
+        let mut processes = self.processes.iter_mut();
+        if let Some(process) = processes.find(|each| each.service == service)
+            && let Some(running) = &mut process.running
+        {
+            let _ = running.child.kill();
+        }
+    }
+
+    /// Waits until a child has ended or one is due, there is something to read from one of
+    /// `others`, or `at_most` is over.
+    pub fn wait(&self, others: &[BorrowedFd<'_>], at_most: Duration) {
+        let now = Instant::now();
+        let stopped = self.processes.iter().filter(|each| each.running.is_none());
+        let due = stopped
+            .map(|process| process.start_at.saturating_duration_since(now))
+            .filter(|due| !due.is_zero());
+        let running = || {
+            self.processes
+                .iter()
+                .filter_map(|each| each.running.as_ref())
+        };
+        let unseen = running().any(|each| each.end.is_none()).then_some(LOOK);
+        let ends = running().filter_map(|each| each.end.as_ref().map(AsFd::as_fd));
+        let sources: Vec<BorrowedFd<'_>> = ends.chain(others.iter().copied()).collect();
+        wait_for(&sources, due.chain(unseen).fold(at_most, Duration::min));
     }
 
     /// A service that ends by itself at every start, if there is one: more starts will not help.
-    pub fn hopeless(&self) -> Option<&'static str> {
-        let mut services = self.services.iter();
-        let service = services.find(|service| service.failures >= MOST_FAILURES)?;
-        Some(service.name)
+    pub fn hopeless(&self) -> Option<Service> {
+        let mut processes = self.processes.iter();
+        let process = processes.find(|process| process.failures >= MOST_FAILURES)?;
+        Some(process.service)
     }
 
     /// How many restarts there were in all.
@@ -161,33 +222,84 @@ impl Supervisor {
         self.restarts
     }
 
-    /// Ends every child with SIGTERM, the last started first, each before the next.
-    pub fn stop(&mut self) {
-        while let Some(mut service) = self.services.pop() {
-            let Some(mut child) = service.child.take() else {
+    /// Ends every child with SIGTERM, the last started first, each before the next, and forgets
+    /// them. One that does not end in time is killed; another Ctrl-C kills all that are left.
+    /// Returns what there is to tell of it.
+    pub fn stop(&mut self, patience: Duration, signals: &mut Signals) -> Vec<String> {
+        signals.forget_interrupt();
+        let mut told = Vec::new();
+        let mut hurry = false;
+        while let Some(process) = self.processes.pop() {
+            let Some(mut running) = process.running else {
                 continue;
             };
-            let _ = kill_process(pid_of(&child), Signal::TERM);
-            if !ends_within(&mut child, PATIENCE) {
-                tracing::warn!(service = service.name, "does not stop, killing it");
-                let _ = child.kill();
-                // Even a killed process has to run once more to end. One that real-time load keeps
-                // from its core must not keep the others from being stopped.
-                if !ends_within(&mut child, PATIENCE) {
-                    tracing::error!(
-                        service = service.name,
-                        "is killed and gets no time to end; see which real-time process holds its core (ps -eLo pid,cls,rtprio,psr,args)"
-                    );
+            let _ = kill_process(Pid::from_child(&running.child), Signal::TERM);
+            if !hurry && running.ends_within(patience, Some(signals)) {
+                continue;
+            }
+            if !hurry && signals.interrupted() {
+                hurry = true;
+                let mut rest = self.processes.iter_mut();
+                while let Some(rest) = rest.find_map(|each| each.running.as_mut()) {
+                    let _ = rest.child.kill();
                 }
             }
+            if !hurry {
+                told.push(format!(
+                    "the {} does not stop and is killed",
+                    process.service
+                ));
+            }
+            let _ = running.child.kill();
+            if !running.ends_within(LAST_PATIENCE, None) {
+                told.push(format!(
+                    "the {} is killed and gets no time to end; see which real-time process holds its core (ps -eLo pid,cls,rtprio,psr,args)",
+                    process.service
+                ));
+            }
+        }
+        told
+    }
+
+    /// Ends every child at once.
+    fn kill_all(&mut self) {
+        let mut running: Vec<_> = self
+            .processes
+            .drain(..)
+            .filter_map(|each| each.running)
+            .collect();
+        for each in &mut running {
+            let _ = each.child.kill();
+        }
+        for each in &mut running {
+            each.ends_within(LAST_PATIENCE, None);
         }
     }
 }
 
-impl Service {
-    /// Sets the next start after an end found at `now`.
-    fn back_off(&mut self, now: Instant, by_itself: bool) {
-        let lived = now - self.started;
+impl Drop for Supervisor {
+    /// Nobody who has ended them in order has any left.
+    fn drop(&mut self) {
+        self.kill_all();
+    }
+}
+
+impl Process {
+    fn new(service: Service) -> Self {
+        Self {
+            service,
+            running: None,
+            start_at: Instant::now(),
+            wait: Duration::ZERO,
+            failures: 0,
+        }
+    }
+
+    /// Sets the next start after an end that has just been found.
+    fn back_off(&mut self, by_itself: bool) {
+        let now = Instant::now();
+        let running = self.running.take();
+        let lived = running.map_or(Duration::ZERO, |running| now - running.started);
         self.wait = if lived >= HEALTHY {
             Duration::ZERO
         } else {
@@ -200,69 +312,92 @@ impl Service {
         self.start_at = now + self.wait;
     }
 
-    fn spawn(&mut self, program: &Path, config: &Path) -> Result<()> {
-        let mut command = Command::new(program);
-        command
-            .arg("--config")
-            .arg(config)
-            .arg(self.name)
-            .arg("--parent")
-            .arg(std::process::id().to_string())
-            .stdin(Stdio::null())
-            // Standard output is the supervisor's: its JSON line must stay alone there.
-            .stdout(Stdio::null())
-            // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
-            // children in order.
-            .process_group(0);
-        if self.restarted {
-            command.arg("--resume");
-        }
-        self.started = Instant::now();
-        let child = command
-            .spawn()
-            .with_context(|| format!("cannot start the service `{}`", self.name))?;
-        tracing::info!(service = self.name, pid = child.id(), "started");
-        self.child = Some(child);
-        Ok(())
+    fn spawn(&mut self, program: &Path, config: &str, start: Start) -> Result<u32> {
+        let name = self.service.command();
+        let attempt = || -> Result<Child> {
+            let mut command = Command::new(program);
+            command
+                .args(["--config", "-", name, "--parent"])
+                .arg(std::process::id().to_string())
+                .stdin(in_memory(config)?)
+                .stdout(start.output)
+                // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
+                // children in order.
+                .process_group(0);
+            if start.resume {
+                command.arg("--resume");
+            }
+            Ok(command.spawn()?)
+        };
+        let child = attempt().with_context(|| format!("cannot start the service `{name}`"))?;
+        let pid = child.id();
+        tracing::info!(service = name, pid, "started");
+        self.running = Some(Running {
+            end: pidfd_open(Pid::from_child(&child), PidfdFlags::empty()).ok(),
+            child,
+            started: Instant::now(),
+        });
+        Ok(pid)
     }
 }
 
-impl Drop for Supervisor {
-    fn drop(&mut self) {
-        self.stop();
+impl Running {
+    /// Whether it ends within `patience`, and before Ctrl-C comes.
+    fn ends_within(&mut self, patience: Duration, signals: Option<&mut Signals>) -> bool {
+        ends_within(&mut self.child, self.end.as_ref(), patience, signals)
     }
 }
 
-/// Whether `child` ends within `patience`.
-pub fn ends_within(child: &mut Child, patience: Duration) -> bool {
+/// Whether `child`, whose end is told by `end`, ends within `patience`, and before Ctrl-C comes if
+/// that is listened for.
+pub fn ends_within(
+    child: &mut Child,
+    end: Option<&OwnedFd>,
+    patience: Duration,
+    mut signals: Option<&mut Signals>,
+) -> bool {
     let give_up = Instant::now() + patience;
     while matches!(child.try_wait(), Ok(None)) {
         let left = give_up.saturating_duration_since(Instant::now());
-        if left.is_zero() {
+        let interrupted = signals
+            .as_mut()
+            .is_some_and(|signals| signals.interrupted());
+        if left.is_zero() || interrupted {
             return false;
         }
-        wait_for_an_end(core::iter::once(&*child), left.min(LOOK));
+        let sources: Vec<BorrowedFd<'_>> = (end.map(AsFd::as_fd).into_iter())
+            .chain(signals.as_ref().map(|signals| signals.as_fd()))
+            .collect();
+        wait_for(&sources, left.min(LOOK));
     }
     true
 }
 
-/// Waits until one of `children`, none of which has been waited for, has ended, a signal comes, or
-/// `at_most` is over.
-fn wait_for_an_end<'a>(children: impl Iterator<Item = &'a Child>, at_most: Duration) {
-    // One that cannot be watched (before Linux 5.3) is looked at when the time is over.
-    let ends: Vec<_> = children
-        .filter_map(|child| pidfd_open(pid_of(child), PidfdFlags::empty()).ok())
-        .collect();
-    let mut ends: Vec<_> = ends
+/// Waits until there is something to read from one of `sources`, a signal comes, or `at_most` is
+/// over.
+fn wait_for(sources: &[BorrowedFd<'_>], at_most: Duration) {
+    let mut sources: Vec<_> = sources
         .iter()
-        .map(|end| PollFd::new(end, PollFlags::IN))
+        .map(|source| PollFd::from_borrowed_fd(*source, PollFlags::IN))
         .collect();
     let at_most = Timespec::try_from(at_most).expect("no wait is as long as the clock's range");
-    let _ = poll(&mut ends, Some(&at_most));
+    let _ = poll(&mut sources, Some(&at_most));
 }
 
-fn pid_of(child: &Child) -> Pid {
-    Pid::from_child(child)
+/// Whether a process has died of memory that was gone or could not be had.
+fn faulted(status: ExitStatus) -> bool {
+    let signals = [Signal::BUS, Signal::SEGV].map(Signal::as_raw);
+    status
+        .signal()
+        .is_some_and(|signal| signals.contains(&signal))
+}
+
+/// A text as a file that nobody can remove.
+fn in_memory(text: &str) -> Result<Stdio> {
+    let mut file = File::from(memfd_create("lager.toml", MemfdFlags::CLOEXEC)?);
+    file.write_all(text.as_bytes())?;
+    file.rewind()?;
+    Ok(Stdio::from(file))
 }
 
 /// Binds this process's life to its supervisor's: SIGTERM when that one dies, and an end for

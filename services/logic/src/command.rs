@@ -5,7 +5,7 @@
 
 use core::time::Duration;
 
-use lager_topics::{Finish, OrderKind, Origin, SteeringOrder, SteeringReport};
+use lager_topics::{Finish, Origin, SteeringOrder, SteeringReport};
 use lager_wire::{Command, WheelCommand};
 
 /// The order in force.
@@ -137,9 +137,9 @@ impl Standing {
         SteeringOrder {
             id: self.id,
             origin: Origin::Logic.into(),
-            kind: OrderKind::Drive.into(),
             code: self.command.code(),
             arm_granted: self.arm_granted.into(),
+            ..SteeringOrder::default()
         }
     }
 }

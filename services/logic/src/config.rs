@@ -3,6 +3,17 @@
 use core::time::Duration;
 
 use lager_ports::Policy;
+use lager_wire::ArmProfile;
+
+/// Who picks the goods up at a station.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pick {
+    /// A person moves the arm and says when it is done.
+    #[default]
+    Manual,
+    /// The robot, by itself.
+    Auto,
+}
 
 /// What logic has to know of the robot and how much it forgives. Times are robot time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,8 +47,50 @@ pub struct LogicConfig {
     pub back_off_mm: f32,
     /// Longest way out to the place of delivery that is believed, in mm.
     pub longest_exit_mm: f32,
+    /// How far the ranger at the front sees, in cm; 0 = there is none, and no way is looked at.
+    pub ranger_cm: u8,
+    /// How far the ranger is ahead of the wheels' axle, in mm.
+    pub ranger_ahead_mm: f32,
+    /// By how much nearer than it can see, and than the next node, a thing must be to block a way,
+    /// in cm (AMB-48).
+    pub ranger_margin_cm: u8,
+    /// Distance of a thing between two nodes at which the robot stops before it, in cm: it must be
+    /// able to turn round there.
+    pub halt_cm: u8,
+    /// Distance of a thing at a node, in cm, that is too near to turn: the body's front corners
+    /// reach 192 mm from the axle, the ranger sees from 100 mm on and is 5 cm wrong there.
+    pub turn_room_cm: u8,
+    /// How far the robot backs up to have room to turn, in mm. Its sensors still come over the
+    /// tape that it turns to.
+    pub turn_room_mm: f32,
+    /// How far behind the next node a thing still blocks the way to it, in mm.
+    pub beyond_node_mm: f32,
+    /// How old a distance is, at most, when it comes.
+    pub ranger_lag: Duration,
+    /// How long a thing between two nodes must stay to block the way.
+    pub halt_patience: Duration,
+    /// After how long ways that were found blocked are tried again before a goal is called
+    /// unreachable.
+    pub try_again: Duration,
+    /// Who picks the goods up.
+    pub pick: Pick,
+    /// What the arm may do and where it is carried (`[arm]`).
+    pub arm: ArmProfile,
+    /// How far a joint may be from the carry pose while the robot drives with goods, in servo
+    /// units of 0.29 degrees.
+    pub carry_tolerance: u16,
+    /// How far the claw must be kept from closing to be holding something, in servo units.
+    pub held_margin: u16,
+    /// Battery, in tenths of a volt, below which the robot stands at the next node; 0 = none.
+    pub low_battery_decivolts: u8,
+    /// How much the battery must be above that to count as charged again, in tenths of a volt.
+    pub charged_by_decivolts: u8,
+    /// For how long the battery must be low, or charged, to be believed.
+    pub battery_steady: Duration,
     /// How long to drive on without a line frame.
     pub blind_after: Duration,
+    /// How long to drive on without a report of the steering board.
+    pub unheard_board: Duration,
     /// How long the robot stands before an interrupted turn or drop is judged or begun.
     pub settle: Duration,
     /// How long a setpoint may stay unheard of in the bridge's reports before it is given anew.
@@ -57,6 +110,13 @@ pub struct LogicConfig {
     pub resume: bool,
 }
 
+impl LogicConfig {
+    /// How far the axle must be from a crossing tape, in mm, for a turn not to end on it.
+    pub(crate) fn nearest_turn_mm(&self) -> f32 {
+        self.sensor_ahead_mm + self.tape_mm / 2.0
+    }
+}
+
 impl Default for LogicConfig {
     fn default() -> Self {
         Self {
@@ -73,7 +133,25 @@ impl Default for LogicConfig {
             bar_end_mm: 40.0,
             back_off_mm: 60.0,
             longest_exit_mm: 20_000.0,
+            ranger_cm: 0,
+            ranger_ahead_mm: 100.0,
+            ranger_margin_cm: 10,
+            halt_cm: 25,
+            turn_room_cm: 17,
+            turn_room_mm: 25.0,
+            beyond_node_mm: 100.0,
+            ranger_lag: Duration::from_millis(100),
+            halt_patience: Duration::from_secs(1),
+            try_again: Duration::from_secs(60),
+            pick: Pick::Manual,
+            arm: ArmProfile::default(),
+            carry_tolerance: 20,
+            held_margin: 40,
+            low_battery_decivolts: 100,
+            charged_by_decivolts: 4,
+            battery_steady: Duration::from_secs(3),
             blind_after: Duration::from_millis(120),
+            unheard_board: Duration::from_millis(200),
             settle: Duration::from_millis(300),
             unheard_setpoint: Duration::from_millis(300),
             unheard_one_shot: Duration::from_secs(1),

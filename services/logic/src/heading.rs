@@ -5,7 +5,7 @@
 
 use lager_topics::Heading;
 
-use crate::map::Node;
+use crate::node::Node;
 
 /// The four headings, clockwise.
 pub const HEADINGS: [Heading; 4] = [Heading::Left, Heading::Up, Heading::Right, Heading::Down];

@@ -9,18 +9,30 @@
 
 #![forbid(unsafe_code)]
 
+mod arm;
+mod battery;
+pub mod blocks;
+mod by_hand;
 mod command;
 mod config;
 pub mod heading;
+mod holding;
 pub mod judge;
+mod manoeuvre;
 pub mod map;
 pub mod marks;
+mod mission;
 mod navigator;
+pub mod node;
 pub mod odometer;
+mod output;
+mod place;
+pub mod queue;
 pub mod route;
 mod shell;
 pub mod turn;
 
-pub use config::LogicConfig;
-pub use navigator::{Input, Navigator, Output};
+pub use config::{LogicConfig, Pick};
+pub use navigator::{Input, Navigator};
+pub use output::Output;
 pub use shell::run;

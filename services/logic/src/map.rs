@@ -1,5 +1,5 @@
-//! The warehouse as the navigator sees it: nodes with their ways (L4), pick stations on the edges
-//! between them (AMB-37), and the way out at the delivery corner (L8).
+//! The floor as the navigator sees it: nodes, pick stations on the edges between them (AMB-37), and
+//! the way out at the delivery corner (L8).
 //!
 //! ```text
 //!   y
@@ -11,63 +11,28 @@
 //!      0    1    2   x    `=` is the way out at delivery corner (0, 0): outwards along x
 //! ```
 //!
-//! It never plans and never knows where the robot is. What tape lies on the floor and which way
-//! is open are two things: an obstacle closes a way and leaves the tape.
+//! It is what was published and never changes: what blocks a way stands in [`crate::blocks`]. It
+//! never plans and never knows where the robot is.
 
-use lager_topics::{Heading, Side, WarehouseMap};
+use lager_topics::{Failure, FailureKind, Heading, Side, WarehouseMap};
 
 use crate::heading::{Compass, HEADINGS};
+use crate::judge::Edge;
 use crate::marks::Sides;
+use crate::node::Node;
 
-/// Most nodes a warehouse can have; a published route holds as many.
-pub const MAX_NODES: usize = 256;
+/// Most nodes along one side of a warehouse.
+pub const MAX_SIDE: usize = 100;
+
+/// Most nodes a warehouse can have.
+pub const MAX_NODES: usize = MAX_SIDE * MAX_SIDE;
 
 /// Most pick stations; a published map holds as many.
-pub const MAX_STATIONS: usize = 64;
+pub const MAX_STATIONS: usize = 256;
 
 /// Shortest side of a square in cm. A mark at the middle of an edge must come under the sensors
 /// after the axle has passed the node before it.
 pub const MIN_SIDE_CM: u16 = 40;
-
-/// A crossing by its coordinates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Node {
-    /// Column, from 0 at the left.
-    pub x: u8,
-    /// Row, from 0 at the bottom.
-    pub y: u8,
-}
-
-impl Node {
-    /// The crossing at these coordinates.
-    pub const fn new(x: u8, y: u8) -> Self {
-        Self { x, y }
-    }
-}
-
-impl core::fmt::Display for Node {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(formatter, "({}, {})", self.x, self.y)
-    }
-}
-
-/// A set of ways out of a node (wayUp, wayRight, wayDown, wayLeft of L4).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Ways(u8);
-
-impl Ways {
-    fn has(self, heading: Heading) -> bool {
-        self.0 & (1 << heading as u8) != 0
-    }
-
-    fn open(&mut self, heading: Heading) {
-        self.0 |= 1 << heading as u8;
-    }
-
-    fn close(&mut self, heading: Heading) {
-        self.0 &= !(1 << heading as u8);
-    }
-}
 
 /// A place where a product is picked: the middle of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +54,14 @@ impl Station {
             .find(|heading| heading.step_from(node) == Some(other))
     }
 
+    /// On which side its mark is for one who drives along `heading`.
+    pub fn side_for(&self, heading: Heading) -> Sides {
+        Sides {
+            left: self.into == heading.left(),
+            right: self.into == heading.right(),
+        }
+    }
+
     /// The end that is not `node`, `None` if `node` is no end.
     pub fn other_end(&self, node: Node) -> Option<Node> {
         match self.ends {
@@ -99,49 +72,6 @@ impl Station {
     }
 }
 
-/// Why a published map cannot be driven in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum MapError {
-    /// No square in one direction.
-    #[error("a warehouse of {width} x {height} squares has no way round; give at least 1 x 1")]
-    NoSquares {
-        /// Squares from left to right.
-        width: u8,
-        /// Squares from bottom to top.
-        height: u8,
-    },
-    /// More nodes than there is room for.
-    #[error(
-        "{width} x {height} squares have more than {MAX_NODES} crossings; divide the warehouse"
-    )]
-    TooLarge {
-        /// Squares from left to right.
-        width: u8,
-        /// Squares from bottom to top.
-        height: u8,
-    },
-    /// The delivery station is not at one of the four corners (M2).
-    #[error("the delivery station ({x}, {y}) is not at a corner of the warehouse")]
-    DeliveryNotAtCorner {
-        /// Column of the node given.
-        x: u8,
-        /// Row of the node given.
-        y: u8,
-    },
-    /// The side length has not arrived (L2).
-    #[error("the side length of the squares is missing; set it in centimetres")]
-    NoSideLength,
-    /// The marks on an edge would lie too close to tell apart.
-    #[error("squares of {0} cm are too small; the side must be at least {MIN_SIDE_CM} cm")]
-    SideTooShort(u16),
-    /// A product's square is not in the warehouse, or its side is none.
-    #[error("product {0} does not stand at a side of a square of this warehouse")]
-    ProductOutside(i32),
-    /// Two products share a number.
-    #[error("product number {0} is given twice")]
-    ProductTwice(i32),
-}
-
 /// The warehouse, ready to be driven in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
@@ -149,31 +79,41 @@ pub struct Map {
     height: u8,
     side_mm: f32,
     delivery: Node,
-    open: [Ways; MAX_NODES],
     stations: heapless::Vec<Station, MAX_STATIONS>,
 }
 
 impl Map {
-    /// The map as published, with every way open.
+    /// The map as published.
     ///
     /// # Errors
     /// The published map is incomplete or contradicts itself.
-    pub fn new(published: &WarehouseMap) -> Result<Self, MapError> {
+    pub fn new(published: &WarehouseMap) -> Result<Self, Failure> {
+        let refuse = |kind, expected, seen| Err(Failure::new(kind, (0, 0), expected, seen));
         let WarehouseMap { width, height, .. } = *published;
         if width == 0 || height == 0 {
-            return Err(MapError::NoSquares { width, height });
+            return refuse(FailureKind::MapEmpty, 1, 0);
         }
-        if (usize::from(width) + 1) * (usize::from(height) + 1) > MAX_NODES {
-            return Err(MapError::TooLarge { width, height });
+        let crossings = usize::from(width.max(height)) + 1;
+        if crossings > MAX_SIDE {
+            return refuse(FailureKind::MapTooLarge, MAX_SIDE as i32, crossings as i32);
+        }
+        if usize::from(published.product_count) > MAX_STATIONS {
+            return refuse(
+                FailureKind::TooManyProducts,
+                MAX_STATIONS as i32,
+                published.product_count.into(),
+            );
         }
         let delivery = Node::new(published.delivery_x, published.delivery_y);
         if ![0, width].contains(&delivery.x) || ![0, height].contains(&delivery.y) {
             let Node { x, y } = delivery;
-            return Err(MapError::DeliveryNotAtCorner { x, y });
+            return Err(Failure::new(FailureKind::DeliveryOffCorner, (x, y), 0, 0));
         }
         match published.side_length_cm {
-            0 => return Err(MapError::NoSideLength),
-            short if short < MIN_SIDE_CM => return Err(MapError::SideTooShort(short)),
+            0 => return refuse(FailureKind::SideUnknown, MIN_SIDE_CM.into(), 0),
+            short if short < MIN_SIDE_CM => {
+                return refuse(FailureKind::SideTooShort, MIN_SIDE_CM.into(), short.into());
+            }
             _ => {}
         }
         let mut map = Self {
@@ -181,26 +121,15 @@ impl Map {
             height,
             side_mm: f32::from(published.side_length_cm) * 10.0,
             delivery,
-            open: [Ways::default(); MAX_NODES],
             stations: heapless::Vec::new(),
         };
-        for index in 0..map.node_count() {
-            for heading in HEADINGS {
-                if map.neighbour(map.node(index), heading).is_some() {
-                    map.open[index].open(heading);
-                }
-            }
-        }
         for product in published.products() {
-            let station = map
-                .station_at(
-                    product.id,
-                    Node::new(product.x, product.y),
-                    product.side.get(),
-                )
-                .ok_or(MapError::ProductOutside(product.id))?;
+            let square = Node::new(product.x, product.y);
+            let Some(station) = map.station_at(product.id, square, product.side.get()) else {
+                return refuse(FailureKind::ProductOutside, 0, product.id);
+            };
             if map.station(product.id).is_some() {
-                return Err(MapError::ProductTwice(product.id));
+                return refuse(FailureKind::ProductTwice, 0, product.id);
             }
             // As many places as the published list has.
             let _ = map.stations.push(station);
@@ -246,6 +175,11 @@ impl Map {
         }
     }
 
+    /// Squares from left to right and from bottom to top.
+    pub fn size(&self) -> [u8; 2] {
+        [self.width, self.height]
+    }
+
     /// How many nodes there are.
     pub fn node_count(&self) -> usize {
         (usize::from(self.width) + 1) * (usize::from(self.height) + 1)
@@ -269,29 +203,9 @@ impl Map {
         Node::new((index % columns) as u8, (index / columns) as u8)
     }
 
-    /// The next node in a direction, whether the way there is open or not.
+    /// The next node in a direction.
     pub fn neighbour(&self, node: Node, heading: Heading) -> Option<Node> {
         heading.step_from(node).filter(|next| self.contains(*next))
-    }
-
-    /// Whether one can go from `node` along `heading` to the next node.
-    pub fn is_open(&self, node: Node, heading: Heading) -> bool {
-        self.contains(node) && self.open[self.index(node)].has(heading)
-    }
-
-    /// Closes the way from `node` along `heading` at both of its ends (addObstacle of L4, and
-    /// AMB-47). Returns whether there was an open way.
-    pub fn block(&mut self, node: Node, heading: Heading) -> bool {
-        if !self.is_open(node, heading) {
-            return false;
-        }
-        let here = self.index(node);
-        self.open[here].close(heading);
-        if let Some(next) = self.neighbour(node, heading) {
-            let there = self.index(next);
-            self.open[there].close(heading.back());
-        }
-        true
     }
 
     /// Whether tape leads away from `node` along `heading`, to another node or out.
@@ -312,11 +226,22 @@ impl Map {
         let mut sides = Sides::NONE;
         for station in &self.stations {
             if station.heading_from(node) == Some(heading) {
-                sides.left |= station.into == heading.left();
-                sides.right |= station.into == heading.right();
+                let side = station.side_for(heading);
+                sides.left |= side.left;
+                sides.right |= side.right;
             }
         }
         sides
+    }
+
+    /// What lies on the edge from `node` along `heading`, if there is one.
+    pub fn edge(&self, node: Node, heading: Heading) -> Option<Edge> {
+        let end = self.neighbour(node, heading)?;
+        Some(Edge {
+            length_mm: self.side_mm,
+            stations: self.station_sides(node, heading),
+            crossing: self.crossing_sides(end, heading),
+        })
     }
 
     /// Where a product is picked.
@@ -330,6 +255,20 @@ impl Map {
     pub fn same_floor(&self, other: &Self) -> bool {
         let floor = |map: &Self| (map.width, map.height, map.side_mm, map.delivery);
         floor(self) == floor(other)
+    }
+}
+
+#[cfg(test)]
+impl Map {
+    /// A floor of 50 cm squares without products.
+    pub(crate) fn grid(width: u8, height: u8) -> Self {
+        let published = WarehouseMap {
+            width,
+            height,
+            side_length_cm: 50,
+            ..WarehouseMap::default()
+        };
+        Self::new(&published).expect("a floor")
     }
 }
 

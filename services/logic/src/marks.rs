@@ -60,6 +60,11 @@ impl Sides {
         (!self.left || other.left) && (!self.right || other.right)
     }
 
+    /// Bit 0 = left, bit 1 = right.
+    pub fn to_bits(self) -> u8 {
+        u8::from(self.left) | u8::from(self.right) << 1
+    }
+
     /// Whether a side is set in both.
     pub fn meets(self, other: Self) -> bool {
         (self.left && other.left) || (self.right && other.right)

@@ -1,10 +1,11 @@
 //! Dead reckoning from the steering board's reports: how far the axle has come and how far the
 //! robot has turned.
 //!
-//! Speed is taken as proportional to duty. That is wrong by some per cent, so every judged mark
-//! sets the way anew; this is only the bridge between two marks. It never guesses beyond the
-//! reports: what the board did not confirm lately counts as standing still, because a board that
-//! is silent stops by itself.
+//! Speed is taken as proportional to duty. That is wrong by ten per cent and more, so every judged
+//! mark sets the way anew and teaches how fast these wheels really are: half of what was missing on
+//! the way between two marks is believed. A successor learns it anew. This is only the bridge
+//! between two marks. It never guesses beyond the reports: what the board did not confirm lately
+//! counts as standing still, because a board that is silent stops by itself.
 
 use core::time::Duration;
 
@@ -14,10 +15,18 @@ use lager_wire::{Command, SteerFlags, WheelCommand};
 use crate::config::LogicConfig;
 
 /// Duty at which the configured speeds hold (PWM_STANDARD).
-const STANDARD_DUTY: f32 = 100.0;
+pub(crate) const STANDARD_DUTY: f32 = 100.0;
 
 /// How long a report is believed; the board stops by itself when its command is this old.
 const REPORT_AGE: Duration = Duration::from_millis(150);
+
+/// Way between two marks below which nothing is learnt, in mm: where exactly a mark was seen counts
+/// for too much there.
+const LEAST_LESSON_MM: f32 = 150.0;
+/// Part of what was missing that is believed.
+const BELIEVED: f32 = 0.5;
+/// The most that wheels are faster or slower than configured.
+const MOST_FASTER: f32 = 0.3;
 
 /// Way and angle since they were last set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,10 +35,11 @@ pub struct Odometer {
     pub travelled_mm: f32,
     /// Angle turned in degrees, positive = clockwise.
     pub turned_deg: f32,
-    /// Way of both wheels in mm, whatever the direction: is the robot moved at all?
-    pub stirred_mm: f32,
-    left_mm_per_s: f32,
-    right_mm_per_s: f32,
+    /// Way since the last mark, in mm, as reckoned.
+    lesson_mm: f32,
+    /// By which part these wheels are faster than configured.
+    faster: f32,
+    mm_per_s: f32,
     deg_per_s: f32,
     reported: Duration,
     reckoned: Duration,
@@ -41,9 +51,9 @@ impl Odometer {
         let until = now.min(self.reported + REPORT_AGE);
         let span = until.saturating_sub(self.reckoned).as_secs_f32();
         self.reckoned = now.max(self.reckoned);
-        let (left, right) = (self.left_mm_per_s, self.right_mm_per_s);
-        self.travelled_mm += (left + right) / 2.0 * span;
-        self.stirred_mm += (left.abs() + right.abs()) / 2.0 * span;
+        let way_mm = self.mm_per_s * span;
+        self.travelled_mm += way_mm;
+        self.lesson_mm += way_mm;
         self.turned_deg += self.deg_per_s * span;
     }
 
@@ -51,10 +61,31 @@ impl Odometer {
     pub fn report(&mut self, now: Duration, report: &SteeringReport, config: &LogicConfig) {
         self.advance(now);
         let (left, right) = speeds(report);
-        self.left_mm_per_s = left * config.cruise_mm_per_s;
-        self.right_mm_per_s = right * config.cruise_mm_per_s;
+        let (left, right) = (left * (1.0 + self.faster), right * (1.0 + self.faster));
+        // On the spot the board has both sides go alike, and duties that differ say how unlike the
+        // motors are, not that the axle moves.
+        self.mm_per_s = match left * right < 0.0 {
+            true => 0.0,
+            false => (left + right) / 2.0 * config.cruise_mm_per_s,
+        };
         self.deg_per_s = (left - right) / 2.0 * config.turn_deg_per_s;
         self.reported = now;
+    }
+
+    /// A mark whose place is known has shown that the way is `missing_mm` more than reckoned.
+    pub fn correct(&mut self, missing_mm: f32) {
+        self.travelled_mm += missing_mm;
+        let reckoned_mm = core::mem::take(&mut self.lesson_mm);
+        if reckoned_mm >= LEAST_LESSON_MM {
+            let missing = (missing_mm / reckoned_mm).clamp(-MOST_FASTER, MOST_FASTER);
+            let faster = (1.0 + self.faster) * (1.0 + BELIEVED * missing) - 1.0;
+            self.faster = faster.clamp(-MOST_FASTER, MOST_FASTER);
+        }
+    }
+
+    /// The robot was put somewhere: what was driven since the last mark teaches nothing.
+    pub fn forget_way(&mut self) {
+        self.lesson_mm = 0.0;
     }
 }
 
@@ -134,11 +165,44 @@ mod tests {
     }
 
     #[test]
+    fn marks_teach_how_fast_the_wheels_are() {
+        let config = LogicConfig::default();
+        let mut odometer = Odometer::default();
+        let mut now = Duration::ZERO;
+        let mut missing = f32::MAX;
+        // Wheels that are 12 % slower than configured, a mark each 500 mm.
+        for _ in 0..8 {
+            odometer.travelled_mm = 0.0;
+            let mut really_mm = 0.0;
+            while really_mm < 500.0 {
+                odometer.report(now, &report(100, 100, SteerFlags(0)), &config);
+                now += Duration::from_millis(10);
+                odometer.advance(now);
+                really_mm += 0.88 * config.cruise_mm_per_s * 0.01;
+            }
+            missing = 500.0 - odometer.travelled_mm;
+            odometer.correct(missing);
+            assert!((odometer.travelled_mm - 500.0).abs() < 0.1);
+        }
+        assert!(missing.abs() < 5.0, "{missing}");
+    }
+
+    #[test]
+    fn a_short_way_teaches_nothing() {
+        let mut odometer = after_a_second(&report(100, 100, SteerFlags(0)));
+        odometer.correct(40.0);
+        assert_eq!(odometer.faster, 0.0);
+        assert!((odometer.travelled_mm - 113.3).abs() < 0.1);
+    }
+
+    #[test]
     fn a_quarter_turn_takes_three_seconds_and_no_way() {
         let right = after_a_second(&report(100, 100, SteerFlags::RIGHT_REVERSE));
         assert!((right.turned_deg - 30.0).abs() < 0.1, "{right:?}");
         assert!(right.travelled_mm.abs() < 0.01, "{right:?}");
-        assert!((right.stirred_mm - 73.3).abs() < 0.1, "{right:?}");
+        // Of a board that makes up for motors that differ.
+        let unlike = after_a_second(&report(105, 95, SteerFlags::RIGHT_REVERSE));
+        assert!(unlike.travelled_mm.abs() < 0.01, "{unlike:?}");
         let left = after_a_second(&report(100, 100, SteerFlags::LEFT_REVERSE));
         assert!((left.turned_deg + 30.0).abs() < 0.1, "{left:?}");
     }

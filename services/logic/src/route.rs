@@ -1,139 +1,195 @@
 //! Shortest ways over open edges: the breadth-first search of L5.
 //!
-//! The search runs from the goal and yields every node's distance to it, so that one search
-//! answers both questions the navigator has: which of two nodes is nearer, and where to go from
-//! here. Among equally short ways the one that goes straight on longest without turning is
-//! preferred, because a turn costs three seconds. Nothing is allocated and nothing is remembered.
+//! The search runs from the goals and yields every node's distance to the nearest of them, so that
+//! one search answers both questions the navigator has: which of two nodes is nearer, and where to
+//! go from here. It is kept until the goals, the floor or what blocks it are others: on the way
+//! nothing is searched twice. Among equally short ways the one with the fewest quarter turns is
+//! taken, because each costs three seconds, and among those the one that goes straight on first.
+//! Nothing is allocated but the tables themselves, at start-up.
+//!
+//! The search queues the nodes by their distance, so a second pass in that order knows the turns of
+//! every nearer node already: leaving `n` along `h` towards `m`, the turns to come are the fewest of
+//! `m` after arriving there along `h`.
 
 use lager_topics::{Heading, Route, RouteNode};
 
+use crate::blocks::Blocks;
 use crate::heading::{Compass, HEADINGS, Spin};
-use crate::map::{MAX_NODES, Map, Node};
+use crate::map::{MAX_NODES, Map};
+use crate::node::Node;
 
-/// Distance of a node from which the goal cannot be reached.
+/// Distance of a node from which no goal can be reached.
 const UNREACHABLE: u16 = u16::MAX;
 
-/// How many edges each node is away from one goal.
+/// How many edges each node is away from the nearest of some goals.
 #[derive(Clone, Debug)]
 pub struct Distances {
     edges: [u16; MAX_NODES],
+    queue: [Node; MAX_NODES],
+    /// For each node the quarter turns to come after leaving it along each heading, on a shortest
+    /// way; [`UNREACHABLE`] where none begins like that.
+    turns: [[u16; 4]; MAX_NODES],
+    /// What was searched last: the goals, and the revision of the blocks.
+    searched: Option<([Node; 2], u32)>,
+}
+
+impl Default for Distances {
+    fn default() -> Self {
+        Self {
+            edges: [UNREACHABLE; MAX_NODES],
+            queue: [Node::default(); MAX_NODES],
+            turns: [[UNREACHABLE; 4]; MAX_NODES],
+            searched: None,
+        }
+    }
 }
 
 impl Distances {
-    /// Searches from `goal` over all open ways. The goal must be in the map.
-    pub fn to(map: &Map, goal: Node) -> Self {
-        let mut edges = [UNREACHABLE; MAX_NODES];
-        let mut queue = [goal; MAX_NODES];
-        let mut queued = 1;
-        edges[map.index(goal)] = 0;
-        let mut next = 0;
+    /// The floor is another one.
+    pub fn forget(&mut self) {
+        self.searched = None;
+    }
+
+    /// Searches from the `goals`, which must be in the map, over all open ways.
+    pub fn search(&mut self, map: &Map, blocks: &Blocks, goals: [Node; 2]) {
+        let searched = Some((goals, blocks.revision()));
+        if self.searched == searched {
+            return;
+        }
+        self.searched = searched;
+        self.edges.fill(UNREACHABLE);
+        let (mut queued, mut next) = (0, 0);
+        for goal in goals {
+            if self.edges[map.index(goal)] != 0 {
+                self.edges[map.index(goal)] = 0;
+                self.queue[queued] = goal;
+                queued += 1;
+            }
+        }
         while next < queued {
-            let node = queue[next];
+            let node = self.queue[next];
             next += 1;
             for heading in HEADINGS {
                 // A way is open at both ends or at none, so searching backwards is the same.
                 let Some(neighbour) = map
                     .neighbour(node, heading)
-                    .filter(|_| map.is_open(node, heading))
+                    .filter(|_| blocks.is_open(map, node, heading))
                 else {
                     continue;
                 };
                 let place = map.index(neighbour);
-                if edges[place] == UNREACHABLE {
-                    edges[place] = edges[map.index(node)] + 1;
-                    queue[queued] = neighbour;
+                if self.edges[place] == UNREACHABLE {
+                    self.edges[place] = self.edges[map.index(node)] + 1;
+                    self.queue[queued] = neighbour;
                     queued += 1;
                 }
             }
         }
-        Self { edges }
+        for index in 0..queued {
+            let node = self.queue[index];
+            self.turns[map.index(node)] =
+                HEADINGS.map(|heading| self.turns_after(map, blocks, node, heading));
+        }
     }
 
-    /// Edges from `node` to the goal, `None` if there is no way.
+    /// The turns to come after leaving `node` along `heading`; those of all nearer nodes are known.
+    fn turns_after(&self, map: &Map, blocks: &Blocks, node: Node, heading: Heading) -> u16 {
+        let next = map
+            .neighbour(node, heading)
+            .filter(|_| blocks.is_open(map, node, heading))
+            .map(|next| map.index(next));
+        match next {
+            Some(next) if self.edges[next] + 1 == self.edges[map.index(node)] => {
+                match self.edges[next] {
+                    0 => 0,
+                    _ => self
+                        .fewest(next, heading)
+                        .map_or(UNREACHABLE, |(turns, _)| turns),
+                }
+            }
+            _ => UNREACHABLE,
+        }
+    }
+
+    /// The fewest turns to come at a node for one who faces `facing`, and where to go then.
+    fn fewest(&self, place: usize, facing: Heading) -> Option<(u16, Heading)> {
+        [(0, 0), (1, 1), (3, 1), (2, 2)]
+            .into_iter()
+            .filter_map(|(quarters, turns)| {
+                let heading = facing.turned(Spin::Right, quarters);
+                let after = self.turns[place][heading as usize];
+                (after != UNREACHABLE).then(|| (turns + after, heading))
+            })
+            .min_by_key(|(turns, _)| *turns)
+    }
+
+    /// Edges from `node` to the nearest goal, `None` if there is no way.
     pub fn from(&self, map: &Map, node: Node) -> Option<u16> {
         Some(self.edges[map.index(node)]).filter(|edges| *edges != UNREACHABLE)
     }
 
-    /// Where to go from `node`, facing `facing`: along a shortest way, straight on if that is
-    /// one. `None` at the goal and where there is no way.
+    /// Where to go from `node`, facing `facing`: along a shortest way, of those the one with the
+    /// fewest turns. `None` at a goal and where there is no way.
     pub fn next(&self, map: &Map, node: Node, facing: Heading) -> Option<Heading> {
-        let here = self.from(map, node)?;
-        [0, 1, 3, 2]
-            .map(|quarters| facing.turned(Spin::Right, quarters))
-            .into_iter()
-            .filter(|heading| map.is_open(node, *heading))
-            .find(|heading| {
-                map.neighbour(node, *heading)
-                    .and_then(|next| self.from(map, next))
-                    .is_some_and(|there| there + 1 == here)
-            })
+        self.from(map, node).filter(|edges| *edges > 0)?;
+        let (_, heading) = self.fewest(map.index(node), facing)?;
+        Some(heading)
     }
-}
 
-/// The nearer of the two nodes a station lies between, with the distances to it; `None` if
-/// neither can be reached (L5). Of two equally near ones it is the first.
-pub fn nearer(map: &Map, from: Node, ends: [Node; 2]) -> Option<(Node, Distances)> {
-    ends.map(|end| {
-        let distances = Distances::to(map, end);
-        distances
-            .from(map, from)
-            .map(|edges| (edges, end, distances))
-    })
-    .into_iter()
-    .flatten()
-    .min_by_key(|(edges, ..)| *edges)
-    .map(|(_, end, distances)| (end, distances))
-}
-
-/// Writes the nodes from `from` to the goal of `distances` into `route`, the next one first.
-pub fn write_route(
-    map: &Map,
-    distances: &Distances,
-    from: Node,
-    facing: Heading,
-    route: &mut Route,
-) {
-    *route = Route::default();
-    let (mut node, mut heading) = (from, facing);
-    while let Some(next) = distances.next(map, node, heading) {
-        let Some(neighbour) = map.neighbour(node, next) else {
-            return;
-        };
-        (node, heading) = (neighbour, next);
-        route.nodes[usize::from(route.length)] = RouteNode {
-            x: node.x,
-            y: node.y,
-        };
-        route.length += 1;
+    /// Writes the nodes from `from` to the nearest goal into `route`, the next one first: as many
+    /// as there is room for, and how many there are.
+    pub fn write_route(&self, map: &Map, from: Node, facing: Heading, route: &mut Route) {
+        *route = Route::default();
+        let (mut node, mut heading) = (from, facing);
+        while let Some(next) = self.next(map, node, heading) {
+            let Some(neighbour) = map.neighbour(node, next) else {
+                return;
+            };
+            (node, heading) = (neighbour, next);
+            if let Some(place) = route.nodes.get_mut(usize::from(route.length)) {
+                *place = RouteNode {
+                    x: node.x,
+                    y: node.y,
+                };
+            }
+            route.length += 1;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use lager_topics::WarehouseMap;
+    use core::time::Duration;
+
+    use lager_topics::BlockSource;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::blocks::Block;
 
-    fn grid(width: u8, height: u8) -> Map {
-        Map::new(&WarehouseMap {
-            width,
-            height,
-            side_length_cm: 50,
-            ..WarehouseMap::default()
-        })
-        .unwrap()
+    fn blocked(map: &Map, ways: Vec<(u8, u8, usize)>) -> Blocks {
+        let mut blocks = Blocks::default();
+        for (x, y, heading) in ways {
+            let block = Block {
+                node: Node::new(x, y),
+                heading: HEADINGS[heading],
+                since: Duration::ZERO,
+                source: BlockSource::Sensor,
+            };
+            blocks.block(map, block);
+        }
+        blocks
     }
 
     /// All distances by relaxing every edge until nothing changes (Floyd and Warshall): slow,
     /// and nothing like a breadth-first search. From `a` to `b` at `a * nodes + b`.
-    fn oracle(map: &Map) -> Vec<Option<u16>> {
+    fn oracle(map: &Map, blocks: &Blocks) -> Vec<Option<u16>> {
         let count = map.node_count();
         let mut edges = vec![None; count * count];
         for from in 0..count {
             edges[from * count + from] = Some(0);
             for heading in HEADINGS {
-                if map.is_open(map.node(from), heading) {
+                if blocks.is_open(map, map.node(from), heading) {
                     let to = map.index(map.neighbour(map.node(from), heading).unwrap());
                     edges[from * count + to] = Some(1);
                 }
@@ -154,33 +210,73 @@ mod tests {
         edges
     }
 
+    fn quarters(from: Heading, to: Heading) -> u16 {
+        [0, 1, 2, 1][usize::from(from.quarters_right_to(to))]
+    }
+
+    /// Edges and quarter turns of the best way, by relaxing every move of every pose until nothing
+    /// changes (Bellman and Ford).
+    fn cheapest(
+        map: &Map,
+        blocks: &Blocks,
+        start: (Node, Heading),
+        goal: Node,
+    ) -> Option<(u16, u16)> {
+        let pose = |node: Node, heading: Heading| map.index(node) * 4 + heading as usize;
+        let mut costs = vec![None; map.node_count() * 4];
+        costs[pose(start.0, start.1)] = Some((0, 0));
+        let mut changed = true;
+        while core::mem::take(&mut changed) {
+            for place in 0..costs.len() {
+                let Some((edges, turns)) = costs[place] else {
+                    continue;
+                };
+                let node = map.node(place / 4);
+                for heading in HEADINGS
+                    .into_iter()
+                    .filter(|to| blocks.is_open(map, node, *to))
+                {
+                    let there = pose(map.neighbour(node, heading).unwrap(), heading);
+                    let cost = (edges + 1, turns + quarters(HEADINGS[place % 4], heading));
+                    if costs[there].is_none_or(|known| cost < known) {
+                        costs[there] = Some(cost);
+                        changed = true;
+                    }
+                }
+            }
+        }
+        HEADINGS
+            .into_iter()
+            .filter_map(|heading| costs[pose(goal, heading)])
+            .min()
+    }
+
     proptest! {
         #[test]
         fn distances_and_routes_are_shortest_around_any_obstacles(
             (width, height) in (1u8..6, 1u8..6),
-            blocks in prop::collection::vec((0u8..6, 0u8..6, 0usize..4), 0..30),
+            ways in prop::collection::vec((0u8..6, 0u8..6, 0usize..4), 0..30),
             facing in 0usize..4,
         ) {
-            let mut map = grid(width, height);
-            for (x, y, heading) in blocks {
-                map.block(Node::new(x, y), HEADINGS[heading]);
-            }
+            let map = Map::grid(width, height);
+            let blocks = blocked(&map, ways);
             let count = map.node_count();
-            let truth = oracle(&map);
+            let truth = oracle(&map, &blocks);
+            let mut distances = Box::<Distances>::default();
             for goal in 0..count {
-                let distances = Distances::to(&map, map.node(goal));
+                distances.search(&map, &blocks, [map.node(goal); 2]);
                 for from in 0..count {
                     let node = map.node(from);
                     let shortest = truth[from * count + goal];
                     prop_assert_eq!(distances.from(&map, node), shortest);
                     let mut route = Route::default();
-                    write_route(&map, &distances, node, HEADINGS[facing], &mut route);
+                    distances.write_route(&map, node, HEADINGS[facing], &mut route);
                     prop_assert_eq!(route.length, shortest.unwrap_or(0));
                     let mut at = node;
                     for step in route.nodes() {
                         let to = Node::new(step.x, step.y);
                         let open = HEADINGS.into_iter().any(|heading| {
-                            map.is_open(at, heading) && map.neighbour(at, heading) == Some(to)
+                            blocks.is_open(&map, at, heading) && map.neighbour(at, heading) == Some(to)
                         });
                         prop_assert!(open, "{} to {} is no open way", at, to);
                         at = to;
@@ -193,30 +289,56 @@ mod tests {
         }
 
         #[test]
+        fn among_the_shortest_ways_the_one_with_the_fewest_turns_is_taken(
+            (width, height) in (1u8..5, 1u8..5),
+            ways in prop::collection::vec((0u8..5, 0u8..5, 0usize..4), 0..20),
+            picks in (0usize..25, 0usize..25, 0usize..4),
+        ) {
+            let map = Map::grid(width, height);
+            let blocks = blocked(&map, ways);
+            let (from, goal) = (picks.0 % map.node_count(), picks.1 % map.node_count());
+            let facing = HEADINGS[picks.2];
+            let mut distances = Box::<Distances>::default();
+            distances.search(&map, &blocks, [map.node(goal); 2]);
+            let mut route = Route::default();
+            distances.write_route(&map, map.node(from), facing, &mut route);
+            let (mut at, mut heading, mut turns) = (map.node(from), facing, 0);
+            for step in route.nodes() {
+                let to = Node::new(step.x, step.y);
+                let next = HEADINGS.into_iter().find(|next| next.step_from(at) == Some(to));
+                turns += quarters(heading, next.unwrap());
+                (at, heading) = (to, next.unwrap());
+            }
+            let best = cheapest(&map, &blocks, (map.node(from), facing), map.node(goal));
+            let way = distances.from(&map, map.node(from)).map(|edges| (edges, turns));
+            prop_assert_eq!(way, best);
+        }
+
+        #[test]
         fn the_nearer_end_is_nearer(
             (width, height) in (1u8..6, 1u8..6),
-            blocks in prop::collection::vec((0u8..6, 0u8..6, 0usize..4), 0..30),
+            ways in prop::collection::vec((0u8..6, 0u8..6, 0usize..4), 0..30),
             picks in (0usize..36, 0usize..36, 0usize..36),
         ) {
-            let mut map = grid(width, height);
-            for (x, y, heading) in blocks {
-                map.block(Node::new(x, y), HEADINGS[heading]);
-            }
+            let map = Map::grid(width, height);
+            let blocks = blocked(&map, ways);
             let count = map.node_count();
             let (from, first, second) = (picks.0 % count, picks.1 % count, picks.2 % count);
             let ends = [map.node(first), map.node(second)];
-            let truth = oracle(&map);
+            let truth = oracle(&map, &blocks);
             let best = [first, second].into_iter().filter_map(|end| truth[from * count + end]).min();
-            let found = nearer(&map, map.node(from), ends);
-            let distance = found.and_then(|(end, _)| truth[from * count + map.index(end)]);
-            prop_assert_eq!(distance, best);
+            let mut distances = Box::<Distances>::default();
+            distances.search(&map, &blocks, ends);
+            prop_assert_eq!(distances.from(&map, map.node(from)), best);
         }
     }
 
     #[test]
     fn straight_on_is_preferred_among_equals() {
-        let map = grid(3, 3);
-        let distances = Distances::to(&map, Node::new(3, 3));
+        let map = Map::grid(3, 3);
+        let blocks = Blocks::default();
+        let mut distances = Box::<Distances>::default();
+        distances.search(&map, &blocks, [Node::new(3, 3); 2]);
         let from = Node::new(0, 0);
         assert_eq!(distances.next(&map, from, Heading::Up), Some(Heading::Up));
         assert_eq!(
@@ -224,15 +346,43 @@ mod tests {
             Some(Heading::Right)
         );
         let mut route = Route::default();
-        write_route(&map, &distances, from, Heading::Up, &mut route);
+        distances.write_route(&map, from, Heading::Up, &mut route);
         let nodes: Vec<_> = route.nodes().iter().map(|node| (node.x, node.y)).collect();
         assert_eq!(nodes, [(0, 1), (0, 2), (0, 3), (1, 3), (2, 3), (3, 3)]);
     }
 
     #[test]
     fn at_the_goal_there_is_nowhere_to_go() {
-        let map = grid(1, 1);
-        let distances = Distances::to(&map, Node::new(1, 0));
-        assert_eq!(distances.next(&map, Node::new(1, 0), Heading::Left), None);
+        let map = Map::grid(1, 1);
+        let blocks = Blocks::default();
+        let mut distances = Box::<Distances>::default();
+        distances.search(&map, &blocks, [Node::new(1, 0); 2]);
+        let next = distances.next(&map, Node::new(1, 0), Heading::Left);
+        assert_eq!(next, None);
+    }
+
+    #[test]
+    fn the_largest_floor_is_crossed() {
+        let map = Map::grid(99, 99);
+        let blocks = Blocks::default();
+        let mut distances = Box::<Distances>::default();
+        distances.search(&map, &blocks, [Node::new(99, 99); 2]);
+        let mut route = Route::default();
+        distances.write_route(&map, Node::new(0, 0), Heading::Up, &mut route);
+        assert_eq!(route.length, 198);
+        assert_eq!(route.nodes().len(), 198);
+    }
+
+    #[test]
+    fn a_search_is_made_anew_when_a_way_is_blocked() {
+        let map = Map::grid(1, 1);
+        let mut blocks = Blocks::default();
+        let mut distances = Box::<Distances>::default();
+        let (from, goal) = (Node::new(0, 0), Node::new(1, 0));
+        distances.search(&map, &blocks, [goal; 2]);
+        assert_eq!(distances.from(&map, from), Some(1));
+        blocks = blocked(&map, vec![(0, 0, 2)]);
+        distances.search(&map, &blocks, [goal; 2]);
+        assert_eq!(distances.from(&map, from), Some(3));
     }
 }

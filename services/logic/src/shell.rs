@@ -1,12 +1,12 @@
 //! The navigator's shell on the bus: it carries samples in and out and decides nothing.
 //!
 //! One turn: wait, drain what has been rung for, hand each sample to the navigator, and send what
-//! changed at once: events first, then the status, then the order, and what nobody acts upon
-//! last. Killed between any two of the first three, the successor knows at least as much as the
-//! bridge; an event can come twice, never not at all. Only a setpoint in place of a setpoint goes
-//! before the status, since giving it twice is giving it once; its number, which the successor may
-//! not know, is left out when a status is taken up. An unchanged order is renewed every 40 ms of
-//! robot time.
+//! changed at once: events first, then the blocked ways, the queue and the status, then the order,
+//! and what nobody acts upon last. Killed between any two of the first five, the successor knows at
+//! least as much as the bridge; an event can come twice, never not at all. Only a setpoint in place of a
+//! setpoint goes before the status, since giving it twice is giving it once; its number, which the
+//! successor may not know, is left out when a status is taken up. An unchanged order is renewed
+//! every 40 ms of robot time.
 //!
 //! A turn takes one decision for each sample and, only if there was none, one for the time that
 //! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`).
@@ -21,14 +21,15 @@ use lager_ports::{
     Waiter,
 };
 use lager_topics::{
-    InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, Mode, NavMap, NavRoute,
-    NavStatus, NavigatorStatus, OperatorInput, SensorDistance, SensorLine, SteeringCommand,
-    SteeringOrder, SteeringState, Topic,
+    BlockedWays, InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, Mode,
+    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, OrderQueue,
+    SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringState, Topic,
 };
 use lager_wire::Command;
 
 use crate::config::LogicConfig;
 use crate::navigator::{Input, Navigator};
+use crate::node::Node;
 
 /// How often the order in force is renewed, in robot time; its lease is three times as long.
 const RENEWAL: Duration = Duration::from_millis(40);
@@ -48,18 +49,33 @@ const RESUME_WAIT: Duration = Duration::from_millis(500);
 /// # Errors
 /// Logic's place on the bus cannot be had; the sentence says what to do.
 pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), PortError> {
-    let kept = if config.resume {
-        bus.kept::<NavStatus>(RESUME_WAIT)?
-    } else {
-        None
+    let (kept, blocks, queue) = match config.resume {
+        true => (
+            kept::<NavStatus>(bus),
+            kept::<NavBlocks>(bus),
+            kept::<MissionQueue>(bus),
+        ),
+        false => (None, None, None),
     };
-    let mut shell = Shell::new(bus, config, kept.as_ref())?;
+    let (blocks, queue) = (blocks.unwrap_or_default(), queue.unwrap_or_default());
+    let mut shell = Shell::new(bus, config, kept.as_ref(), &blocks, &queue)?;
     shutdown.wake(shell.waiter.ringer()?);
+    shell.publish_blocks(Cause::OWN);
+    shell.publish_queue(Cause::OWN);
     shell.publish_status(shell.clock.now());
     while !shutdown.is_requested() {
         shell.turn();
     }
     Ok(())
+}
+
+/// What an earlier navigator has left. Whatever stands in the way of it, without it the robot may be
+/// anywhere.
+fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
+    bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
+        tracing::warn!("the earlier navigator's {} is lost: {error}", T::NAME);
+        None
+    })
 }
 
 struct Shell {
@@ -77,6 +93,8 @@ struct Shell {
 
     commands: Publisher<SteeringCommand>,
     status: Publisher<NavStatus>,
+    blocks: Publisher<NavBlocks>,
+    queue: Publisher<MissionQueue>,
     route: Publisher<NavRoute>,
     events: Publisher<MissionEvent>,
     thoughts: Publisher<LogThought>,
@@ -85,6 +103,8 @@ struct Shell {
     decisions: u64,
     /// Who may drive and whether a stop is latched, as the navigator was told last.
     told_mode: Option<(Mode, bool)>,
+    /// What was driven by hand, as the navigator was told last.
+    told_by_hand: Option<u64>,
     sent_status: NavigatorStatus,
     status_due: Duration,
     sent_order: Option<SteeringOrder>,
@@ -98,6 +118,8 @@ impl Shell {
         bus: &Bus,
         config: &LogicConfig,
         kept: Option<&NavigatorStatus>,
+        blocks: &BlockedWays,
+        queue: &OrderQueue,
     ) -> Result<Self, PortError> {
         let navigator = match kept {
             Some(status) => {
@@ -106,7 +128,13 @@ impl Shell {
                     order = status.order_id,
                     "the state of an earlier navigator is taken up"
                 );
-                Navigator::resume(*config, status)
+                Navigator::resume(*config, status, blocks, queue)
+            }
+            None if config.resume => {
+                tracing::warn!(
+                    "there is no state of an earlier navigator: where the robot is has to be told by a reset"
+                );
+                Navigator::lost(*config)
             }
             None => Navigator::new(*config),
         };
@@ -123,11 +151,14 @@ impl Shell {
             inputs: bus.subscriber()?,
             commands: bus.publisher()?,
             status: bus.publisher()?,
+            blocks: bus.publisher()?,
+            queue: bus.publisher()?,
             route: bus.publisher()?,
             events: bus.publisher()?,
             thoughts: bus.publisher()?,
             decisions: 0,
             told_mode: None,
+            told_by_hand: None,
             sent_status: navigator.status(),
             navigator,
             status_due: Duration::ZERO,
@@ -174,6 +205,10 @@ impl Shell {
         if let Some((health, cause)) = self.next(|shell| shell.health.latest())
             && let Some(mode) = health.mode.get()
         {
+            if self.told_by_hand != Some(health.driven_by_hand) {
+                self.told_by_hand = Some(health.driven_by_hand);
+                self.decide(Input::DrivenByHand(health.driven_by_hand), cause);
+            }
             let stopped = health.stopped != 0;
             // The bridge repeats it ten times a second, and with every order it has taken.
             if self.told_mode != Some((mode, stopped)) {
@@ -192,10 +227,24 @@ impl Shell {
         if self.waiter.has::<OperatorInput>() {
             while let Some((input, cause)) = self.next(|shell| shell.inputs.receive()) {
                 match input.kind.get() {
-                    Some(InputKind::PickupDone) => {
+                    Some(kind @ (InputKind::PickupDone | InputKind::PickupForced)) => {
                         let order_id = input.order_id;
-                        self.decide(Input::PickupDone { order_id }, cause);
+                        let forced = kind == InputKind::PickupForced;
+                        self.decide(Input::PickupDone { order_id, forced }, cause);
                     }
+                    Some(InputKind::Placed) => {
+                        if let Some(heading) = input.heading.get() {
+                            let node = Node::new(input.x, input.y);
+                            self.decide(Input::Placed { node, heading }, cause);
+                        }
+                    }
+                    Some(InputKind::OrderCancelled) => {
+                        self.decide(Input::Cancel(input.order_id), cause);
+                    }
+                    Some(InputKind::OrderMovedUp) => {
+                        self.decide(Input::MoveUp(input.order_id), cause);
+                    }
+                    Some(InputKind::QueueCleared) => self.decide(Input::ClearQueue, cause),
                     Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
                     // The switch is the bridge's (E14): the mode comes back with its health.
                     Some(InputKind::SwitchPressed) | None => {}
@@ -263,7 +312,13 @@ impl Shell {
         if is_new && goes_first {
             self.give_order(now, cause);
         }
-        if Navigator::is_news(&self.sent_status, &self.navigator.status()) {
+        if output.blocks_changed {
+            self.publish_blocks(cause);
+        }
+        if output.queue_changed {
+            self.publish_queue(cause);
+        }
+        if output.status_changed {
             self.publish_status(now);
         }
         if is_new && !goes_first {
@@ -274,7 +329,7 @@ impl Shell {
             self.check(sent);
         }
         if let Some(thought) = output.thought {
-            tracing::debug!("{}", thought.text.as_str());
+            tracing::debug!("{thought}");
             let sent = self.thoughts.send(cause, thought);
             self.check(sent);
         }
@@ -287,6 +342,8 @@ impl Shell {
             self.publish_status(now);
             self.status.tick();
             self.route.tick();
+            self.blocks.tick();
+            self.queue.tick();
         }
         if now >= self.renewal_due {
             self.give_order(now, Cause::OWN);
@@ -299,6 +356,16 @@ impl Shell {
             let sent = self.commands.send(cause, order);
             self.check(sent);
         }
+    }
+
+    fn publish_blocks(&mut self, cause: Cause) {
+        let sent = self.blocks.send(cause, self.navigator.blocks());
+        self.check(sent);
+    }
+
+    fn publish_queue(&mut self, cause: Cause) {
+        let sent = self.queue.send(cause, self.navigator.queue());
+        self.check(sent);
     }
 
     fn publish_status(&mut self, now: Duration) {

@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use lager_logic::{LogicConfig, run};
-use lager_ports::{Bus, BusConfig, Cause, Publisher, Shutdown, Subscriber, remove_stale_nodes};
+use lager_ports::{Bus, BusConfig, Cause, Publisher, Shutdown, Subscriber};
 use lager_topics::{
-    DistanceFrame, EventKind, Health, Input, LineFrame, LinkHealth, LogThought, MapProduct,
-    MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
-    Order, Phase, Role, SensorDistance, SensorLine, Side, SteeringCommand, SteeringOrder,
-    SteeringReport, SteeringState, WarehouseMap,
+    DistanceFrame, EventKind, Health, Input, InputKind, LineFrame, LinkHealth, LogThought,
+    MapProduct, MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus,
+    OperatorInput, Order, Phase, Role, SensorDistance, SensorLine, Side, SteeringCommand,
+    SteeringOrder, SteeringReport, SteeringState, WarehouseMap,
 };
 use lager_wire::LineState;
 
@@ -20,10 +20,9 @@ impl Domain {
     fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let id = format!("ll{}x{number}", std::process::id());
+        let folder = format!("/dev/shm/ll{}x{number}", std::process::id());
         Self(BusConfig {
-            prefix: Some(format!("{id}_")),
-            root: Some(std::env::temp_dir().join(id)),
+            folder: Some(folder.into()),
             ..BusConfig::default()
         })
     }
@@ -35,18 +34,15 @@ impl Domain {
 
 impl Drop for Domain {
     fn drop(&mut self) {
-        let _ = remove_stale_nodes(&self.0);
-        let prefix = self.0.prefix.clone().unwrap();
-        for entry in std::fs::read_dir("/dev/shm")
-            .into_iter()
-            .flatten()
-            .flatten()
-        {
-            if entry.file_name().to_string_lossy().starts_with(&prefix) {
-                let _ = std::fs::remove_file(entry.path());
-            }
-        }
-        let _ = std::fs::remove_dir_all(self.0.root.as_ref().unwrap());
+        self.0.place().unwrap().remove();
+    }
+}
+
+/// What a steering board says that stands.
+fn report() -> SteeringReport {
+    SteeringReport {
+        age_ms: 0,
+        ..SteeringReport::default()
     }
 }
 
@@ -105,9 +101,7 @@ impl World {
             ..Health::default()
         };
         self.health.send(Cause::OWN, health).unwrap();
-        self.state
-            .send(Cause::OWN, SteeringReport::default())
-            .unwrap();
+        self.state.send(Cause::OWN, report()).unwrap();
         let frame = LineFrame {
             state: LineState::OnLine.into(),
             ..LineFrame::default()
@@ -311,10 +305,7 @@ fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
             distance.send(Cause::OWN, DistanceFrame::default()).unwrap();
         });
         world.miss("steering/state", |world| {
-            world
-                .state
-                .send(Cause::OWN, SteeringReport::default())
-                .unwrap();
+            world.state.send(Cause::OWN, report()).unwrap();
         });
         world.miss("mission/order", |world| {
             world
@@ -326,4 +317,48 @@ fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
             inputs.send(Cause::OWN, Input::default()).unwrap();
         });
     });
+}
+
+#[test]
+fn a_successor_that_finds_nothing_kept_knows_no_place_until_a_reset() {
+    let domain = Domain::new();
+    let shutdown = Shutdown::new();
+    let bus = domain.open(Role::Logic);
+    let logic = {
+        let shutdown = shutdown.clone();
+        let config = LogicConfig {
+            resume: true,
+            ..LogicConfig::default()
+        };
+        std::thread::spawn(move || run(&bus, &config, &shutdown).unwrap())
+    };
+    let others = domain.open(Role::Supervisor);
+    let inputs = others.publisher::<OperatorInput>().unwrap();
+    let mut world = World::new(&others);
+    let phase = |world: &World| world.seen.and_then(|status| status.phase.get());
+    world.until("it says that it is lost", false, |world| {
+        phase(world) == Some(Phase::Lost)
+    });
+    world.until("it refuses an order", false, |world| {
+        let order = Order { id: 7, product: 1 };
+        world.orders.send(Cause::OWN, order).unwrap();
+        // Standing still is all that it orders.
+        assert!(world.given.iter().all(|order| order.code == 1));
+        world.given.len() > 20
+    });
+    let mut refused = false;
+    while let Some(event) = world.events.receive().unwrap() {
+        refused |= event.kind.get() == Some(EventKind::Refused);
+    }
+    assert!(refused);
+    world.until("a reset tells it where it is", false, |world| {
+        let input = Input {
+            kind: InputKind::ResetPressed.into(),
+            ..Input::default()
+        };
+        inputs.send(Cause::OWN, input).unwrap();
+        phase(world) == Some(Phase::WaitingForOrder)
+    });
+    shutdown.request();
+    logic.join().unwrap();
 }

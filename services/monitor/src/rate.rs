@@ -3,42 +3,29 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, Clock, Shutdown, Subscriber};
+use lager_ports::Clock;
 use lager_topics::{Stamp, Topic, TopicVisitor, visit};
 use serde_json::json;
 
-use crate::{POLL, ToolError};
+use crate::{ToolError, Tools};
 
 /// One line is printed for each window.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// Measures `name` until `windows` lines are printed or the shutdown.
-pub fn hz(
-    bus: &Bus,
-    name: &str,
-    windows: Option<u64>,
-    as_json: bool,
-    shutdown: &Shutdown,
-    out: &mut impl Write,
-) -> Result<(), ToolError> {
-    visit(
-        name,
-        Hz {
-            bus,
-            windows,
-            as_json,
-            shutdown,
-            out,
-        },
-    )?
+impl<W: Write> Tools<'_, W> {
+    /// `topic hz`: measures `name` until `windows` lines are printed or the shutdown.
+    ///
+    /// # Errors
+    /// No topic has that name, it cannot be read, or the output cannot be written.
+    pub fn hz(&mut self, name: &str, windows: Option<u64>) -> Result<(), ToolError> {
+        let tools = self;
+        visit(name, Hz { tools, windows })?
+    }
 }
 
-struct Hz<'a, W> {
-    bus: &'a Bus,
+struct Hz<'a, 'b, W> {
+    tools: &'a mut Tools<'b, W>,
     windows: Option<u64>,
-    as_json: bool,
-    shutdown: &'a Shutdown,
-    out: &'a mut W,
 }
 
 /// What the stamps of one window tell.
@@ -76,43 +63,49 @@ impl Window {
     }
 }
 
-impl<W: Write> TopicVisitor for Hz<'_, W> {
+impl<W: Write> TopicVisitor for Hz<'_, '_, W> {
     type Output = Result<(), ToolError>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        let mut subscriber: Subscriber<T> = self.bus.subscriber()?;
+        let Self { tools, windows } = self;
+        let mut subscriber = tools.subscriber::<T>()?;
         let (mut printed, mut lost) = (0, 0);
-        while !self.shutdown.is_requested() && self.windows.is_none_or(|count| printed < count) {
+        let mut heard = Instant::now();
+        while windows.is_none_or(|count| printed < count) {
             let mut window = Window::default();
             let end = Instant::now() + WINDOW;
-            while Instant::now() < end && !self.shutdown.is_requested() {
-                while let Some(sample) = subscriber.receive()? {
-                    window.add(sample.stamp(), Clock::monotonic_ns());
+            while Instant::now() < end {
+                if tools.shutdown.is_requested() {
+                    return Ok(());
                 }
-                std::thread::sleep(POLL);
+                while let Some(sample) = tools.receive(&mut subscriber)? {
+                    window.add(sample.stamp(), Clock::monotonic_ns());
+                    heard = Instant::now();
+                }
+                tools.pause(heard)?;
             }
             let newly_lost = subscriber.lost() - lost;
             lost = subscriber.lost();
             printed += 1;
-            if self.as_json {
+            if tools.as_json {
                 let value = json!({
                     "topic": T::NAME, "hz": window.rate(), "samples": window.samples,
                     "longest_gap_ns": window.longest_gap_ns,
                     "oldest_ns": window.oldest_source_ns, "lost": newly_lost,
                 });
-                writeln!(self.out, "{value}")?;
+                writeln!(tools.out, "{value}")?;
             } else if window.samples == 0 {
-                writeln!(self.out, "no sample in the last second")?;
+                writeln!(tools.out, "no sample in the last second")?;
             } else {
                 writeln!(
-                    self.out,
+                    tools.out,
                     "{:9.2} Hz   longest gap {:8.3} ms   oldest {:8.3} ms   lost {newly_lost}",
                     window.rate(),
                     window.longest_gap_ns as f64 / 1e6,
                     window.oldest_source_ns as f64 / 1e6,
                 )?;
             }
-            self.out.flush()?;
+            tools.out.flush()?;
         }
         Ok(())
     }

@@ -145,7 +145,6 @@ impl SteeringBoard for SteeringPins<'_> {
     }
 
     fn battery_decivolts(&mut self) -> u8 {
-        // Three lithium cells at rest.
-        111
+        (self.world.battery_volts() * 10.0) as u8
     }
 }

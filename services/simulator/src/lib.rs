@@ -5,20 +5,25 @@
 //! place of the USB cables, real time times the speed of the bus's clock, and `truth/pose`.
 //!
 //! Nobody on the Pi can tell it from the boards, and it knows nothing of who is there: it never
-//! reads a topic but its own, from before its restart.
+//! reads a topic but its own, from before its restart. What a person's hands would do to the world
+//! it does when it is asked to.
 //!
 //! Safe state: the steering board's own. A simulator that ends takes the robot with it; a
 //! restarted one begins with both boards starting, motors off.
 #![forbid(unsafe_code)]
 
 mod boards;
+mod calibrate;
 mod exde;
+mod hands;
 mod robot;
+mod running;
 mod shell;
-mod station;
 mod truth;
 mod uart;
 
-pub use robot::{Robot, RobotOptions, Truth, Wire};
+pub use calibrate::{CalibrateError, calibrate};
+pub use hands::{Wish, answer, wish};
+pub use robot::{Robot, RobotOptions, Snapshot, Wire};
 pub use shell::{RunError, SimulatorConfig, run};
 pub use truth::{message, world_state};

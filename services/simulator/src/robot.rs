@@ -16,16 +16,16 @@
 use core::time::Duration;
 
 use lager_ax12::table::MAX_POSITION;
-use lager_control::arm::ArmConfig;
 use lager_control::{SensorConfig, SensorUnit, SteeringConfig, SteeringUnit};
 use lager_plant::arm::SERVOS;
 use lager_plant::noise::Noise;
-use lager_plant::{Pose, Warehouse, WarehouseError, World, WorldState};
-use lager_wire::ResetCause;
+use lager_plant::{HandsOff, Make, Pose, Warehouse, WarehouseError, World, WorldState};
+use lager_wire::{ArmProfile, ResetCause};
 
 use crate::boards::{SensorPins, SteeringPins};
 use crate::exde::ExDe;
-use crate::station::{START_UP_NS, Station};
+use crate::hands::Wish;
+use crate::running::{Running, START_UP_NS};
 use crate::uart::Uart;
 
 /// The middle of a servo's range.
@@ -47,6 +47,10 @@ pub enum Wire {
 pub struct RobotOptions {
     /// Chooses every imperfection: the same seed is the same robot.
     pub seed: u64,
+    /// How many things come and go on the floor.
+    pub obstacles: u32,
+    /// Which imperfections there are.
+    pub make: Make,
     /// Baud rate of both serial lines.
     pub baud: u32,
     /// What the boards say why they started.
@@ -61,6 +65,8 @@ impl Default for RobotOptions {
     fn default() -> Self {
         Self {
             seed: 1,
+            obstacles: 0,
+            make: Make::Varied,
             baud: 500_000,
             cause: ResetCause::PowerOn,
             sensor: SensorConfig::default(),
@@ -71,7 +77,7 @@ impl Default for RobotOptions {
 
 /// How the robot really is; its own boards do not know it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Truth {
+pub struct Snapshot {
     /// Everything that is worth keeping.
     pub world: WorldState,
     /// Duties at the left and the right motor driver, negative backwards.
@@ -84,11 +90,13 @@ pub struct Truth {
 #[derive(Debug)]
 pub struct Robot {
     world: World,
-    sensor: Station<SensorUnit>,
-    steering: Station<SteeringUnit>,
+    sensor: Running<SensorUnit>,
+    steering: Running<SteeringUnit>,
     exde: ExDe,
     options: RobotOptions,
     now_ns: u64,
+    /// When the world makes its next step.
+    world_due_ns: u64,
 }
 
 impl Robot {
@@ -99,14 +107,17 @@ impl Robot {
     pub fn new(warehouse: &Warehouse, options: RobotOptions) -> Result<Self, WarehouseError> {
         let mut spread = Noise::new(options.seed, START_STREAM);
         let mut starts_ns = || START_UP_NS + spread.bits() % 5_000 * 1_000;
-        let pose = resting_arm(&options.steering.arm);
+        let pose = resting_arm(&options.steering.arm.profile);
+        let mut world = World::new(warehouse, options.seed, options.make, pose)?;
+        world.scatter_obstacles(options.obstacles, options.seed);
         Ok(Self {
-            world: World::new(warehouse, options.seed, pose)?,
-            sensor: Station::new(options.baud, options.cause, starts_ns()),
-            steering: Station::new(options.baud, options.cause, starts_ns()),
+            world,
+            sensor: Running::new(options.baud, options.cause, starts_ns()),
+            steering: Running::new(options.baud, options.cause, starts_ns()),
             exde: ExDe::default(),
             options,
             now_ns: 0,
+            world_due_ns: 0,
         })
     }
 
@@ -114,6 +125,7 @@ impl Robot {
     pub fn resume(&mut self, state: &WorldState) {
         self.world.restore(state);
         self.now_ns = state.time.as_nanos() as u64;
+        self.world_due_ns = self.now_ns;
         self.reset_board(Wire::Sensor, ResetCause::External);
         self.reset_board(Wire::Steering, ResetCause::External);
     }
@@ -127,11 +139,14 @@ impl Robot {
     pub fn advance_to(&mut self, now: Duration) {
         let target = now.as_nanos() as u64;
         loop {
-            let next = self.next_ns();
-            if next > target {
+            let boards = self.next_of_boards();
+            if self.run_wires(boards.min(target.saturating_add(1))) {
+                continue;
+            }
+            if boards > target {
                 break;
             }
-            self.handle(next);
+            self.handle(boards);
         }
         self.settle(target);
     }
@@ -146,7 +161,11 @@ impl Robot {
                 self.steering.chip.uart.next_end(self.now_ns),
             ];
             let end = ends.into_iter().flatten().min().unwrap_or(u64::MAX);
-            let next = self.next_ns();
+            let boards = self.next_of_boards();
+            if self.run_wires(boards.min(end).min(limit.saturating_add(1))) {
+                continue;
+            }
+            let next = boards.min(self.exde.next_event());
             if end.min(next) > limit {
                 self.settle(limit);
                 return self.now();
@@ -164,7 +183,7 @@ impl Robot {
 
     /// When something happens next.
     pub fn next_event(&self) -> Duration {
-        Duration::from_nanos(self.next_ns())
+        Duration::from_nanos(self.next_of_boards().min(self.exde.next_event()))
     }
 
     /// The Pi writes to a board; the bytes leave at the baud rate from now on.
@@ -180,8 +199,8 @@ impl Robot {
     }
 
     /// How the robot really is.
-    pub fn truth(&self) -> Truth {
-        Truth {
+    pub fn truth(&self) -> Snapshot {
+        Snapshot {
             world: WorldState {
                 time: self.now(),
                 ..self.world.state()
@@ -189,11 +208,6 @@ impl Robot {
             duties: self.world.duties(),
             carrying: self.world.goods().held(),
         }
-    }
-
-    /// Counts changes of any goods' state.
-    pub fn goods_changes(&self) -> u64 {
-        self.world.goods().changes()
     }
 
     /// Resets a board now. The steering board's motors go off at once.
@@ -237,6 +251,19 @@ impl Robot {
         self.world.place(pose);
     }
 
+    /// Does what a person's hands would do.
+    ///
+    /// # Errors
+    /// Why they leave the world as it is.
+    pub fn obey(&mut self, wish: Wish) -> Result<(), HandsOff> {
+        match wish {
+            Wish::Place(pose) => self.place(pose),
+            Wish::Put(edge) => self.world.put_obstacle(edge)?,
+            Wish::Take(edge) => self.world.take_obstacle(edge)?,
+        }
+        Ok(())
+    }
+
     /// The world, for what tests and tools want to know of it.
     pub fn world(&self) -> &World {
         &self.world
@@ -262,7 +289,8 @@ impl Robot {
         }
     }
 
-    fn next_ns(&self) -> u64 {
+    /// When a board notices something next, other than a word on ExDe.
+    fn next_of_boards(&self) -> u64 {
         let servo = match (self.steering.unit.is_some(), self.world.next_servo_byte()) {
             (true, Some(at)) => at.as_nanos() as u64,
             _ => u64::MAX,
@@ -272,14 +300,31 @@ impl Robot {
             .next_event(self.now_ns)
             .min(self.steering.next_event(self.now_ns))
             .min(servo)
-            .min(self.exde.next_event())
+    }
+
+    /// Lets the wires of ExDe run until `before`; whether a board noticed it, and then no farther.
+    /// Of the steps that a word takes the boards notice only its end.
+    fn run_wires(&mut self, before: u64) -> bool {
+        while self.exde.next_event() < before {
+            let now = self.exde.next_event().max(self.now_ns);
+            self.settle(now);
+            self.exde.interrupt(now, self.steering.clock_us(now));
+            if self.exde.sent || self.exde.arrived {
+                self.step_boards(now);
+                return true;
+            }
+        }
+        false
     }
 
     /// Moves the time without an event.
     fn settle(&mut self, now: u64) {
         if now > self.now_ns {
             self.now_ns = now;
-            self.world.advance_to(Duration::from_nanos(now));
+            if now >= self.world_due_ns {
+                self.world.advance_to(Duration::from_nanos(now));
+                self.world_due_ns = (self.world.now() + World::STEP).as_nanos() as u64;
+            }
         }
     }
 
@@ -296,6 +341,11 @@ impl Robot {
         if self.exde.next_event() <= now {
             self.exde.interrupt(now, self.steering.clock_us(now));
         }
+        self.step_boards(now);
+    }
+
+    /// Lets the boards work that want to, the sensor board first.
+    fn step_boards(&mut self, now: u64) {
         if self.sensor.wants(now, self.exde.sent) {
             self.step_sensor(now);
         }
@@ -314,7 +364,7 @@ impl Robot {
             self.exde.start_sender(now);
         }
         self.sensor.come_to(now);
-        let Station { unit, chip, .. } = &mut self.sensor;
+        let Running { unit, chip, .. } = &mut self.sensor;
         let mut pins = SensorPins {
             chip,
             world: &mut self.world,
@@ -331,7 +381,7 @@ impl Robot {
             self.exde.start_receiver();
         }
         self.steering.come_to(now);
-        let Station { unit, chip, .. } = &mut self.steering;
+        let Running { unit, chip, .. } = &mut self.steering;
         let mut pins = SteeringPins {
             chip,
             world: &mut self.world,
@@ -343,18 +393,17 @@ impl Robot {
     }
 }
 
-/// Where the servos stand before anybody has moved them: the pose the arm is carried in, the
-/// claw open.
-fn resting_arm(arm: &ArmConfig) -> [u16; SERVOS] {
-    let carry = arm.carry;
+/// Where the servos stand before anybody has moved them: the neutral pose, the claw open.
+fn resting_arm(arm: &ArmProfile) -> [u16; SERVOS] {
+    let pose = arm.neutral;
     let facing = |position: u16| MAX_POSITION - position;
     [
-        carry.base,
-        carry.shoulder,
-        facing(carry.shoulder),
-        carry.elbow,
-        facing(carry.elbow),
-        carry.wrist,
+        pose.base,
+        pose.shoulder,
+        facing(pose.shoulder),
+        pose.elbow,
+        facing(pose.elbow),
+        pose.wrist,
         REST,
         arm.gripper_open,
     ]

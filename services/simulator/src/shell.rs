@@ -4,7 +4,8 @@
 //!         sleep until input, or until something happens, at least 0.5 ms
 //!              |
 //!   ports --bytes--> robot.advance_to(clock) --bytes--> ports
-//!                                  '--> truth/pose, 50 times a second and when goods change state
+//!                                  |--> truth/pose, 50 times a second and when goods change state
+//!                                  '<-- world/request: what a person's hands would do
 //! ```
 //! Robot time is the bus's clock, so it runs at the speed of everybody else's. The loop works in
 //! batches, which costs little processor time and delays a byte by no more than a batch.
@@ -13,12 +14,15 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use lager_plant::{Warehouse, WarehouseError};
-use lager_ports::{Bus, Cause, Clock, PortError, Publisher, SendError, Shutdown};
+use lager_ports::{
+    Bus, Cause, Clock, PortError, Publisher, ReceiveError, SendError, Server, Shutdown,
+};
 use lager_pty::{Port, PtyError};
-use lager_topics::TruthPose;
+use lager_topics::{TruthPose, WorldRequest};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
+use crate::hands::{answer, wish};
 use crate::robot::{Robot, RobotOptions, Wire};
 use crate::truth::{message, world_state};
 
@@ -38,6 +42,8 @@ pub struct SimulatorConfig {
     pub warehouse: Warehouse,
     /// Chooses every imperfection.
     pub seed: u64,
+    /// So many things come and go on the edges.
+    pub obstacles: u32,
     /// Baud rate of both serial lines.
     pub baud: u32,
     /// Where the sensor board's port is linked.
@@ -60,6 +66,9 @@ pub enum RunError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] PortError),
+    /// Nobody's hands can be obeyed.
+    #[error(transparent)]
+    Hands(#[from] ReceiveError),
     /// The truth cannot be told.
     #[error(transparent)]
     Send(#[from] SendError),
@@ -71,12 +80,13 @@ pub enum RunError {
 /// The warehouse, the ports or the bus cannot be used.
 pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(), RunError> {
     let kept = if config.resume {
-        bus.kept::<TruthPose>(KEPT_WAIT)?
+        bus.kept::<TruthPose>(KEPT_WAIT).map_err(PortError::from)?
     } else {
         None
     };
     let options = RobotOptions {
         seed: config.seed,
+        obstacles: config.obstacles,
         baud: config.baud,
         ..RobotOptions::default()
     };
@@ -91,11 +101,13 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
     let mut shell = Shell {
         truth: bus.publisher::<TruthPose>()?,
         truth_due: robot.now(),
-        goods_told: robot.goods_changes(),
+        changes_told: robot.world().changes(),
         lines: [
             Line::new(Wire::Sensor, Port::create(&config.sensor_link)?),
             Line::new(Wire::Steering, Port::create(&config.steering_link)?),
         ],
+        hands: bus.server::<WorldRequest>()?,
+        warehouse: config.warehouse.clone(),
         robot,
     };
     shell.run(&bus.clock(), shutdown)
@@ -121,10 +133,12 @@ impl Line {
 
 struct Shell {
     robot: Robot,
+    warehouse: Warehouse,
+    hands: Server<WorldRequest>,
     lines: [Line; 2],
     truth: Publisher<TruthPose>,
     truth_due: Duration,
-    goods_told: u64,
+    changes_told: u64,
 }
 
 impl Shell {
@@ -134,6 +148,7 @@ impl Shell {
             let now = robot_start + clock.now().saturating_sub(clock_start);
             self.robot.advance_to(now);
             self.exchange();
+            self.obey_hands()?;
             self.tell_truth(now)?;
             let quiet = clock.real(self.robot.next_event().saturating_sub(now));
             self.sleep(quiet.clamp(BATCH, LONGEST_SLEEP));
@@ -167,12 +182,21 @@ impl Shell {
         }
     }
 
+    /// Does what a person's hands would do.
+    fn obey_hands(&mut self) -> Result<(), ReceiveError> {
+        let (robot, warehouse) = (&mut self.robot, &self.warehouse);
+        self.hands.serve(|ask| {
+            wish(warehouse, ask).map_or_else(|refused| refused, |wish| answer(robot.obey(wish)))
+        })?;
+        Ok(())
+    }
+
     fn tell_truth(&mut self, now: Duration) -> Result<(), SendError> {
-        let changes = self.robot.goods_changes();
-        if now < self.truth_due && changes == self.goods_told {
+        let changes = self.robot.world().changes();
+        if now < self.truth_due && changes == self.changes_told {
             return Ok(());
         }
-        self.goods_told = changes;
+        self.changes_told = changes;
         self.truth_due = now + TRUTH_PERIOD;
         self.truth.send(Cause::OWN, message(&self.robot.truth()))
     }

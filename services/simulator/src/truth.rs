@@ -2,13 +2,13 @@
 
 use core::time::Duration;
 
-use lager_plant::{Good, GoodState, Pose, WorldState};
+use lager_plant::{Edge, Good, GoodState, Pose, Standing, WorldState};
 use lager_topics as topics;
 
-use crate::robot::Truth;
+use crate::robot::Snapshot;
 
 /// The sample that tells the truth.
-pub fn message(truth: &Truth) -> topics::Truth {
+pub fn message(truth: &Snapshot) -> topics::Truth {
     let world = &truth.world;
     let mut message = topics::Truth {
         time_ns: world.time.as_nanos() as u64,
@@ -21,6 +21,8 @@ pub fn message(truth: &Truth) -> topics::Truth {
         left_duty: truth.duties[0].unsigned_abs().min(255) as u8,
         right_duty: truth.duties[1].unsigned_abs().min(255) as u8,
         servo_position: world.servo_positions,
+        battery_charge: world.battery_charge as f32,
+        collisions: world.collisions,
         ..topics::Truth::default()
     };
     for (place, good) in message.goods.iter_mut().zip(&world.goods) {
@@ -39,6 +41,20 @@ pub fn message(truth: &Truth) -> topics::Truth {
             ..topics::TruthGood::default()
         };
     }
+    for (place, stands) in message.obstacles.iter_mut().zip(&world.obstacles) {
+        let [x, y] = stands.edge.from;
+        *place = topics::TruthObstacle {
+            x,
+            y,
+            heading: match stands.edge.to[0] > x {
+                true => topics::Heading::Right,
+                false => topics::Heading::Up,
+            }
+            .into(),
+            by_chance: stands.by_chance.into(),
+        };
+    }
+    message.obstacle_count = world.obstacles.len().min(message.obstacles.len()) as u16;
     message.good_count = world.goods.len().min(message.goods.len()) as u16;
     message
 }
@@ -58,6 +74,18 @@ pub fn world_state(message: &topics::Truth) -> WorldState {
             },
         })
     });
+    let obstacles = message.obstacles().iter().filter_map(|stands| {
+        let from = [stands.x, stands.y];
+        let to = match stands.heading.get()? {
+            topics::Heading::Right => [stands.x.checked_add(1)?, stands.y],
+            topics::Heading::Up => [stands.x, stands.y.checked_add(1)?],
+            _ => return None,
+        };
+        Some(Standing {
+            edge: Edge { from, to },
+            by_chance: stands.by_chance != 0,
+        })
+    });
     WorldState {
         time: Duration::from_nanos(message.time_ns),
         pose: Pose {
@@ -68,6 +96,9 @@ pub fn world_state(message: &topics::Truth) -> WorldState {
         wheel_speeds: [message.left_mm_per_s, message.right_mm_per_s].map(f64::from),
         servo_positions: message.servo_position.map(|position| position.min(1_023)),
         goods: goods.collect(),
+        battery_charge: f64::from(message.battery_charge),
+        collisions: message.collisions,
+        obstacles: obstacles.collect(),
     }
 }
 
@@ -97,8 +128,26 @@ mod tests {
                 good(9, GoodState::Lying),
                 good(10, GoodState::Delivered),
             ],
+            battery_charge: 0.625,
+            collisions: 3,
+            obstacles: vec![
+                Standing {
+                    edge: Edge {
+                        from: [1, 2],
+                        to: [2, 2],
+                    },
+                    by_chance: true,
+                },
+                Standing {
+                    edge: Edge {
+                        from: [0, 0],
+                        to: [0, 1],
+                    },
+                    by_chance: false,
+                },
+            ],
         };
-        let truth = Truth {
+        let truth = Snapshot {
             world: world.clone(),
             duties: [-100, 120],
             carrying: Some(8),

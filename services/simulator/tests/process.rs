@@ -37,8 +37,7 @@ impl Place {
         std::fs::create_dir_all(&folder).unwrap();
         let bus = BusConfig {
             speed: 2.0,
-            prefix: Some(format!("{name}_")),
-            root: Some(folder.join("bus")),
+            folder: Some(std::path::Path::new("/dev/shm").join(name)),
             ..BusConfig::default()
         };
         Self { bus, folder }
@@ -52,6 +51,7 @@ impl Place {
         SimulatorConfig {
             warehouse: Warehouse::builtin("large").unwrap(),
             seed: 5,
+            obstacles: 0,
             baud: 500_000,
             sensor_link: self.folder.join("sensor"),
             steering_link: self.folder.join("steering"),
@@ -72,20 +72,14 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let prefix = self.bus.prefix.as_deref().unwrap();
-        let mut left = Vec::new();
-        for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
-            let name = entry.file_name().into_string().unwrap_or_default();
-            if name.starts_with(prefix) {
-                let _ = std::fs::remove_file(entry.path());
-                left.push(name);
-            }
-        }
+        let place = self.bus.place().unwrap();
+        let mut left = place.segments();
+        place.remove();
         let _ = std::fs::remove_dir_all(&self.folder);
         // The transport keeps one small segment for each bus for ever.
-        left.retain(|name| !name.ends_with(".global_mgmt"));
+        left.retain(|segment| segment.extension().is_none_or(|end| end != "global_mgmt"));
         if !std::thread::panicking() {
-            assert_eq!(left, Vec::<String>::new());
+            assert_eq!(left, Vec::<PathBuf>::new());
         }
     }
 }

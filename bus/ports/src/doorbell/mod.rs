@@ -31,7 +31,6 @@ mod word;
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use iceoryx2::config::Config;
 use lager_topics::Role;
 
 pub(crate) use pace::{Pace, Plan};
@@ -42,6 +41,7 @@ use word::Sleeper;
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::name::RobotName;
+use crate::place::Place;
 
 /// The reason of a ring by a thread of the waiter's own process.
 pub(crate) const INSIDE: usize = 0;
@@ -62,7 +62,8 @@ impl Board {
         if let Some(segment) = known.upgrade() {
             return Ok(segment);
         }
-        let path = segment::path(bus.transport(), bus.robot());
+        bus.place().robot(bus.robot());
+        let path = segment::path(bus.place(), bus.robot());
         let segment = Segment::join(&path).map_err(|fault| error(role, fault))?;
         let segment = Arc::new(segment);
         *known = Arc::downgrade(&segment);
@@ -71,13 +72,13 @@ impl Board {
 }
 
 /// Clears the seats of killed processes on one robot's board, or removes it if it is unused.
-pub(crate) fn sweep(config: &Config, robot: &RobotName) {
-    sweep_at(&segment::path(config, robot));
+pub(crate) fn sweep(place: &Place, robot: &RobotName) {
+    sweep_at(&segment::path(place, robot));
 }
 
 /// The same for every robot of the bus.
-pub(crate) fn sweep_all(config: &Config) {
-    for path in segment::all(config) {
+pub(crate) fn sweep_all(place: &Place) {
+    for path in segment::all(place) {
         sweep_at(&path);
     }
 }
@@ -90,9 +91,14 @@ fn sweep_at(path: &std::path::Path) {
     }
 }
 
+/// Removes the board of a robot that has nobody to ring, whatever is in it.
+pub(crate) fn remove(place: &Place, robot: &RobotName) {
+    let _ = std::fs::remove_file(segment::path(place, robot));
+}
+
 /// The living processes whose waiters are rung for `role`; a process may wait more than once.
-pub(crate) fn woken(config: &Config, robot: &RobotName, role: Role) -> Vec<u32> {
-    match Segment::existing(&segment::path(config, robot)) {
+pub(crate) fn woken(place: &Place, robot: &RobotName, role: Role) -> Vec<u32> {
+    match Segment::existing(&segment::path(place, robot)) {
         Ok(Some(segment)) => segment.woken(role),
         _ => Vec::new(),
     }

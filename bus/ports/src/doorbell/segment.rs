@@ -12,8 +12,7 @@
 //! presence is removed. Joining and leaving exclude each other by the door, so of two that leave at
 //! once the second knows that it is the last, and nobody joins a board that is being removed.
 //!
-//! The file lies in `/dev/shm` beside the transport's and begins with the bus's prefix. Its name
-//! holds the bus's root as a number, since the transport keeps buses with different roots apart.
+//! The file is `bells` in the robot's folder ([`Place`]).
 
 #![allow(unsafe_code, reason = "a mapping is shared memory")]
 
@@ -27,7 +26,6 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use iceoryx2::config::Config;
 use lager_topics::Role;
 use rustix::fs::{FallocateFlags, fallocate};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
@@ -36,9 +34,9 @@ use rustix::thread::{MembarrierCommand, membarrier};
 use super::board::{Board, Layout, SEATS, SEATS_PER_ROLE};
 use super::locks::{Kind, is_held, try_lock, unlock};
 use crate::name::RobotName;
+use crate::place::Place;
 
-const FOLDER: &str = "/dev/shm";
-const SUFFIX: &str = ".bells";
+const NAME: &str = "bells";
 
 const DOOR: u64 = 0;
 const PRESENCE: u64 = 1;
@@ -66,39 +64,14 @@ impl From<Error> for Fault {
 }
 
 /// Where the board of a robot lies.
-pub(crate) fn path(config: &Config, robot: &RobotName) -> PathBuf {
-    let (head, tail) = ends(config);
-    Path::new(FOLDER).join(format!("{head}{robot}{tail}"))
+pub(crate) fn path(place: &Place, robot: &RobotName) -> PathBuf {
+    place.folder_of(robot).join(NAME)
 }
 
-/// The boards of all robots on a bus.
-pub(crate) fn all(config: &Config) -> Vec<PathBuf> {
-    let (head, tail) = ends(config);
-    let Ok(entries) = std::fs::read_dir(FOLDER) else {
-        return Vec::new();
-    };
-    entries
-        .filter_map(Result::ok)
-        .filter(|entry| {
-            let name = entry.file_name();
-            name.to_str()
-                .is_some_and(|name| name.starts_with(&head) && name.ends_with(&tail))
-        })
-        .map(|entry| entry.path())
-        .collect()
-}
-
-/// What stands before and behind the robot in the file's name.
-fn ends(config: &Config) -> (String, String) {
-    let root = config.global.root_path().to_string();
-    // FNV-1a.
-    let hash = root.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
-    (
-        format!("{}lager_", config.global.prefix),
-        format!("_{hash:016x}{SUFFIX}"),
-    )
+/// Where the boards of all robots on a bus lie, if they have one.
+pub(crate) fn all(place: &Place) -> Vec<PathBuf> {
+    let robots = place.robots();
+    robots.iter().map(|robot| path(place, robot)).collect()
 }
 
 /// An open board. The last one dropped removes the file.

@@ -6,12 +6,12 @@
 
 use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
 use iceoryx2::prelude::PortFactory;
-use lager_topics::Topic;
 
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::service::{self, EventService, Fault, patiently};
 use crate::transport::Ipc;
+use crate::untyped::Kind;
 
 /// The standard listeners of one topic, from a writer's side.
 pub(crate) struct StandardListeners {
@@ -20,9 +20,9 @@ pub(crate) struct StandardListeners {
 }
 
 impl StandardListeners {
-    pub(crate) fn of<T: Topic>(bus: &Bus) -> Result<Self, PortError> {
-        let service = service::event::<T>(bus)?;
-        let notifier = patiently(bus, T::NAME, || {
+    pub(crate) fn of(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
+        let service = service::event(bus, kind)?;
+        let notifier = patiently(bus, kind.name, || {
             service
                 .notifier_builder()
                 .name(bus.port_name())
@@ -30,11 +30,11 @@ impl StandardListeners {
                 .map_err(|error| match error {
                     NotifierCreateError::ExceedsMaxSupportedNotifiers => {
                         Fault::Full(PortError::TooManyWriters {
-                            topic: T::NAME.to_owned(),
-                            limit: T::QOS.max_publishers(),
+                            topic: kind.name.to_owned(),
+                            limit: kind.qos.max_publishers(),
                         })
                     }
-                    other => service::no_resources(T::NAME, other),
+                    other => service::no_resources(kind.name, other),
                 })
         })?;
         Ok(Self { service, notifier })

@@ -23,8 +23,8 @@ fn somewhere(round: u64) {
 }
 
 fn bells(domain: &Domain) -> usize {
-    let left = domain.in_shared_memory();
-    left.iter().filter(|name| name.ends_with(".bells")).count()
+    let left = domain.left_in_folder();
+    left.iter().filter(|path| path.ends_with("bells")).count()
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn of_killed_processes_alone_nothing_is_left() {
             } else {
                 domain.open(Role::Supervisor);
             }
-            domain.in_shared_memory().is_empty()
+            domain.in_shared_memory().is_empty() && bells(&domain) == 0
         });
     }
 }
@@ -156,12 +156,9 @@ fn boards_are_joined_and_left_by_many_at_once() {
 }
 
 #[test]
-fn robots_and_roots_have_boards_of_their_own() {
+fn robots_and_buses_have_boards_of_their_own() {
     let domain = Domain::new();
-    let elsewhere = Domain::at(
-        domain.config.prefix.as_deref().unwrap(),
-        domain.config.root.as_ref().unwrap().with_extension("b"),
-    );
+    let elsewhere = Domain::new();
     let writer = domain.open_robot("r1", Role::Bridge);
     let publisher = writer.publisher::<SensorLine>().unwrap();
     let ours = domain.open_robot("r1", Role::Logic);
@@ -176,7 +173,7 @@ fn robots_and_roots_have_boards_of_their_own() {
             .waiter(Policy::Block)
             .unwrap(),
     ];
-    assert_eq!(bells(&domain), 3);
+    assert_eq!((bells(&domain), bells(&elsewhere)), (2, 1));
     send(&publisher, 0);
     let rung = waiters
         .each_ref()

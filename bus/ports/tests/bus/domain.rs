@@ -1,11 +1,11 @@
 //! A bus of its own for each test.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use lager_ports::{
-    Bus, BusConfig, Cause, NodeInfo, NodeState, Publisher, RobotName, Subscriber, nodes,
+    Bus, BusConfig, Cause, NodeInfo, NodeState, Place, Publisher, RobotName, Subscriber, nodes,
     remove_stale_nodes,
 };
 use lager_topics::{LineFrame, Role, SensorLine};
@@ -23,17 +23,20 @@ impl Domain {
             std::process::id(),
             NEXT.fetch_add(1, Ordering::Relaxed)
         );
-        Self::at(&format!("{id}_"), std::env::temp_dir().join(id))
+        Self::at(Path::new("/dev/shm").join(id))
     }
 
-    pub(crate) fn at(prefix: &str, root: PathBuf) -> Self {
+    pub(crate) fn at(folder: PathBuf) -> Self {
         Self {
             config: BusConfig {
-                prefix: Some(prefix.to_owned()),
-                root: Some(root),
+                folder: Some(folder),
                 ..BusConfig::default()
             },
         }
+    }
+
+    pub(crate) fn place(&self) -> Place {
+        self.config.place().unwrap()
     }
 
     pub(crate) fn open(&self, role: Role) -> Bus {
@@ -57,18 +60,15 @@ impl Domain {
     }
 
     fn left_in_shared_memory(&self) -> Vec<String> {
-        let prefix = self.config.prefix.as_deref().unwrap();
-        std::fs::read_dir("/dev/shm")
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .filter(|name| name.starts_with(prefix))
-            .collect()
+        let segments = self.place().segments();
+        let name = |path: &PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
+        segments.iter().map(name).collect()
     }
 
-    /// Files (not folders) below the root.
-    pub(crate) fn left_below_root(&self) -> Vec<PathBuf> {
+    /// Files (not folders) in the bus's folder.
+    pub(crate) fn left_in_folder(&self) -> Vec<PathBuf> {
         let mut files = Vec::new();
-        let mut folders = vec![self.config.root.clone().unwrap()];
+        let mut folders = vec![self.place().folder().to_owned()];
         while let Some(folder) = folders.pop() {
             let Ok(entries) = std::fs::read_dir(folder) else {
                 continue;
@@ -90,11 +90,8 @@ impl Drop for Domain {
     fn drop(&mut self) {
         let swept = remove_all_stale_nodes(&self.config);
         let left = self.in_shared_memory();
-        let files = self.left_below_root();
-        for name in self.left_in_shared_memory() {
-            let _ = std::fs::remove_file(PathBuf::from("/dev/shm").join(name));
-        }
-        let _ = std::fs::remove_dir_all(self.config.root.as_ref().unwrap());
+        let files = self.left_in_folder();
+        self.place().remove();
         if !std::thread::panicking() {
             assert!(swept, "a killed process could not be swept");
             assert_eq!(left, Vec::<String>::new());

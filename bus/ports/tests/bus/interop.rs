@@ -6,28 +6,28 @@ use std::time::Duration;
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{
-    AttributeVerifier, CallbackProgression, FileName, Node, NodeBuilder, NodeState, Path,
-    PortFactory, SemanticString, Service, ServiceName, SignalHandlingMode, ipc,
+    AttributeVerifier, CallbackProgression, FilePath, Node, NodeBuilder, NodeState, PortFactory,
+    SemanticString, Service, ServiceName, SignalHandlingMode, ipc,
 };
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
 use iceoryx2::service::port_factory::event;
 use lager_ports::{Cause, Clock, Policy, Wake};
 use lager_topics::{
-    Answer, Ask, BridgeRequest, LineFrame, Qos, Request, Role, Schema, SensorLine, Stamp, Topic,
+    Answer, Ask, BridgeRequest, LineFrame, NavStatus, NavigatorStatus, Qos, Request, Role, Schema,
+    SensorLine, Stamp, Topic,
 };
 
 use crate::domain::{Domain, frame, send};
 use crate::process::Player;
 
+/// As a stock program reads it from what `lager config --iceoryx2` prints.
 fn config(domain: &Domain) -> Config {
-    let mut config = Config::default();
-    let prefix = domain.config.prefix.as_deref().unwrap();
-    let root = domain.config.root.as_deref().unwrap();
-    config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
-    config
-        .global
-        .set_root_path(&Path::new(root.as_os_str().as_encoded_bytes()).unwrap());
+    let file = domain.place().folder().join("iceoryx2.toml");
+    std::fs::write(&file, domain.config.iceoryx2_toml().unwrap()).unwrap();
+    let path = FilePath::new(file.as_os_str().as_encoded_bytes()).unwrap();
+    let config = Config::from_file(&path).unwrap();
+    std::fs::remove_file(file).unwrap();
     config
 }
 
@@ -120,6 +120,54 @@ fn our_subscriber_gets_the_samples_of_a_stock_publisher() {
     }
     assert_eq!(subscriber.received(), 500);
     assert_eq!(subscriber.lost(), 249);
+}
+
+#[test]
+fn a_hostile_stamp_silences_nobody_and_makes_no_loss() {
+    let domain = Domain::new();
+    let node = stock(&domain);
+    let supervisor = domain.open(Role::Supervisor);
+    let mut keeper = supervisor.keeper::<NavStatus>().unwrap();
+    let bus = domain.open(Role::Logic);
+    let publisher = bus.publisher::<NavStatus>().unwrap();
+    let mut subscriber = supervisor.subscriber::<NavStatus>().unwrap();
+    let hostile = node
+        .service_builder(&name(NavStatus::NAME))
+        .publish_subscribe::<NavigatorStatus>()
+        .user_header::<Stamp>()
+        .open_with_attributes(&schema::<NavigatorStatus, Stamp>())
+        .unwrap()
+        .publisher_builder()
+        .create()
+        .unwrap();
+    let status = |order_id| NavigatorStatus {
+        order_id,
+        ..NavigatorStatus::default()
+    };
+    publisher.send(Cause::OWN, status(1)).unwrap();
+    for epoch in [publisher.epoch(), 1, u64::MAX] {
+        let sample = hostile.loan_uninit().unwrap();
+        let mut sample = sample.write_payload(status(666));
+        *sample.user_header_mut() = Stamp {
+            sequence: u64::MAX,
+            source_time_ns: u64::MAX,
+            publish_time_ns: u64::MAX,
+            epoch,
+            writer: std::process::id(),
+            ..Stamp::default()
+        };
+        sample.send().unwrap();
+        if let Some(latest) = subscriber.latest().unwrap() {
+            assert_eq!(latest.order_id, 1);
+        }
+        keeper.remember().unwrap();
+        assert_eq!(keeper.value().unwrap().0.order_id, 1);
+    }
+    publisher.send(Cause::OWN, status(2)).unwrap();
+    assert_eq!(subscriber.latest().unwrap().unwrap().order_id, 2);
+    keeper.remember().unwrap();
+    assert_eq!(keeper.value().unwrap().0.order_id, 2);
+    assert_eq!(subscriber.lost(), 0);
 }
 
 #[test]

@@ -162,7 +162,7 @@ fn a_killed_process_is_listed_as_stale_until_it_is_removed() {
 
 /// Where the transport keeps the tags and details of the only node.
 fn node_folder(domain: &Domain) -> PathBuf {
-    let nodes = domain.config.root.as_ref().unwrap().join("nodes");
+    let nodes = domain.place().transport_folder().join("nodes");
     let entries = std::fs::read_dir(nodes).unwrap().map(Result::unwrap);
     let mut folders = entries
         .map(|entry| entry.path())
@@ -176,8 +176,8 @@ fn node_folder(domain: &Domain) -> PathBuf {
 fn a_process_killed_while_it_writes_a_tag_is_removed() {
     let domain = Domain::new();
     Player::start(&domain, "line-writer").kill();
-    let prefix = domain.config.prefix.as_ref().unwrap();
-    let tag = node_folder(&domain).join(format!("{prefix}7.port_tag"));
+    let name = format!("{}7.port_tag", domain.place().prefix());
+    let tag = node_folder(&domain).join(name);
     std::fs::write(&tag, "").unwrap();
     // As it is while the transport writes.
     std::fs::set_permissions(&tag, Permissions::from_mode(0o600)).unwrap();

@@ -1,9 +1,10 @@
 //! `kill -9` of every part, and what the others make of it.
 
+use std::path::Path;
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use lager_ports::{CallError, Cause, Policy, Wake};
+use lager_ports::{CallError, Cause, KeptError, Policy, Wake};
 use lager_topics::{
     Ask, BridgeRequest, NavStatus, NavigatorStatus, Outcome, Role, SensorLine, SteeringCommand,
     Topic,
@@ -236,6 +237,52 @@ fn a_keeper_withdraws_when_the_successor_speaks() {
     publisher.tick();
     assert_eq!(observer.latest().unwrap().unwrap().order_id, 9);
     assert_eq!(observer.received(), 1);
+}
+
+#[test]
+fn a_kept_value_that_cannot_be_read_is_not_taken_for_none() {
+    let domain = Domain::new();
+    let supervisor = domain.open(Role::Supervisor);
+    let publisher = supervisor.publisher::<NavStatus>().unwrap();
+    publisher
+        .send(Cause::OWN, NavigatorStatus::default())
+        .unwrap();
+    for name in domain.in_shared_memory() {
+        if name.ends_with(".data") {
+            std::fs::remove_file(Path::new("/dev/shm").join(name)).unwrap();
+        }
+    }
+    let bus = domain.open(Role::Logic);
+    // It is told at once, not when the time is over.
+    let hour = Duration::from_secs(3600);
+    let error = bus.kept::<NavStatus>(hour).unwrap_err();
+    assert!(matches!(error, KeptError::Unreadable { .. }), "{error}");
+}
+
+#[test]
+fn a_hand_over_that_failed_is_tried_again() {
+    let domain = Domain::new();
+    let supervisor = domain.open(Role::Supervisor);
+    let mut keeper = supervisor.keeper::<NavStatus>().unwrap();
+    let service = Player::start(&domain, "navigator");
+    keeper.remember().unwrap();
+    service.kill();
+    keeper.remember().unwrap();
+    sweep(&supervisor, 1);
+    let others = domain.open(Role::Logic);
+    let places = NavStatus::QOS.max_publishers();
+    let mut taken: Vec<_> = (0..places)
+        .map(|_| others.publisher::<NavStatus>().unwrap())
+        .collect();
+    assert!(keeper.hand_over().is_err());
+    assert!(keeper.remember().is_err() && !keeper.is_standing_in());
+    taken.pop();
+    keeper.remember().unwrap();
+    assert!(keeper.is_standing_in());
+    let mut successor = others.subscriber::<NavStatus>().unwrap();
+    // Who comes late is served at the next look.
+    keeper.remember().unwrap();
+    assert_eq!(successor.latest().unwrap().unwrap().order_id, 7);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_ports::{Bus, BusConfig, Cause, OpenError, Policy, PortError, Wake};
+use lager_ports::{Bus, Cause, OpenError, Policy, PortError, Wake};
 use lager_topics::{
     DistanceFrame, Field, FieldInfo, LineFrame, OBSERVERS, Payload, Qos, Role, Schema, SensorLine,
     SteeringCommand, Topic,
@@ -109,12 +109,9 @@ fn too_many_waiters_are_refused_and_a_free_seat_can_be_taken() {
 
 /// The file of the bell board.
 fn board_of(domain: &Domain) -> PathBuf {
-    let name = domain
-        .in_shared_memory()
-        .into_iter()
-        .find(|name| name.ends_with(".bells"))
-        .expect("somebody waits");
-    Path::new("/dev/shm").join(name)
+    let board = domain.place().folder().join("r1/bells");
+    assert!(board.exists(), "somebody waits");
+    board
 }
 
 #[test]
@@ -244,7 +241,7 @@ fn a_changed_layout_is_refused_with_a_sentence() {
 /// The file that describes the line topic to newcomers.
 fn description_of_line(domain: &Domain) -> PathBuf {
     domain
-        .left_below_root()
+        .left_in_folder()
         .into_iter()
         .find(|path| {
             path.extension().is_some_and(|end| end == "service")
@@ -252,7 +249,7 @@ fn description_of_line(domain: &Domain) -> PathBuf {
                     text.contains("sensor/line") && text.contains("PublishSubscribe")
                 })
         })
-        .expect("the topic's description lies below the root")
+        .expect("the topic's description lies in the folder")
 }
 
 #[test]
@@ -304,24 +301,21 @@ fn overwrite(path: &Path, contents: &[u8]) {
 }
 
 #[test]
-fn a_root_of_the_greatest_length_carries_a_whole_robot() {
+fn a_folder_of_the_greatest_length_carries_a_whole_robot() {
     let folder_of = |length: usize| {
-        let mut folder = std::env::temp_dir()
-            .join(format!("lplong{}", std::process::id()))
-            .into_os_string();
-        folder.push("x".repeat(length - folder.len()));
+        let mut folder = format!("/dev/shm/lplong{}", std::process::id());
+        folder.push_str(&"x".repeat(length - folder.len()));
         PathBuf::from(folder)
     };
-    let too_long = BusConfig {
-        prefix: Some("lplong_".to_owned()),
-        root: Some(folder_of(80)),
-        ..BusConfig::default()
-    };
-    let Err(OpenError::RootTooLong { limit, .. }) = Bus::open(&too_long, Role::Bridge) else {
-        panic!("80 bytes are too many");
+    let too_long = Domain::at(folder_of(60));
+    let refused = Bus::open(&too_long.config, Role::Bridge).unwrap_err();
+    std::fs::remove_dir(folder_of(60)).unwrap();
+    std::mem::forget(too_long);
+    let OpenError::FolderTooLong { limit, .. } = refused else {
+        panic!("60 bytes are too many: {refused}");
     };
 
-    let domain = Domain::at("lplong_", folder_of(limit));
+    let domain = Domain::at(folder_of(limit));
     let bus = domain.open(Role::Bridge);
     let waiter = bus.waiter(Policy::Block).unwrap();
     let mut orders = bus.subscriber::<SteeringCommand>().unwrap();

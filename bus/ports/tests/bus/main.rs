@@ -3,6 +3,7 @@
 //! Every test has a bus of its own and checks at its end that nothing is left of it.
 
 mod bells;
+mod damage;
 mod domain;
 mod interop;
 mod introspection;

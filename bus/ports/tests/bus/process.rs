@@ -13,8 +13,7 @@ use lager_topics::{
 use crate::domain::{Domain, frame};
 
 const PART: &str = "LAGER_PORTS_TEST_PART";
-const PREFIX: &str = "LAGER_PORTS_TEST_PREFIX";
-const ROOT: &str = "LAGER_PORTS_TEST_ROOT";
+const FOLDER: &str = "LAGER_PORTS_TEST_FOLDER";
 
 /// A process that plays a part and waits to be killed.
 pub(crate) struct Player {
@@ -29,8 +28,7 @@ impl Player {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["process::player", "--exact", "--ignored", "--nocapture"])
             .env(PART, part)
-            .env(PREFIX, domain.config.prefix.as_deref().unwrap())
-            .env(ROOT, domain.config.root.as_ref().unwrap())
+            .env(FOLDER, domain.config.folder.as_ref().unwrap())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -78,8 +76,7 @@ fn until_parent_ends() {
 
 fn open(role: Role) -> Bus {
     let config = BusConfig {
-        prefix: std::env::var(PREFIX).ok(),
-        root: std::env::var(ROOT).ok().map(PathBuf::from),
+        folder: std::env::var(FOLDER).ok().map(PathBuf::from),
         ..BusConfig::default()
     };
     Bus::open(&config, role).unwrap()

@@ -2,7 +2,9 @@
 
 use lager_wire::ResetCause;
 
-use super::steering::{Finish, Origin};
+use super::steering::{Finish, Origin, Refusal};
+use super::stop::StopCause;
+use crate::role::Role;
 use crate::schema::payload;
 use crate::tag::{Tag, coded, coded_as_is};
 
@@ -23,6 +25,38 @@ coded! {
         Manual = 0,
         /// The navigator.
         Autonomous = 1,
+    }
+}
+
+coded! {
+    /// What the steering board says to the arm's profile (`[arm]` of the configuration).
+    pub enum ArmProfileState {
+        /// No board is up that knows profiles.
+        NoBoard = 0,
+        /// It is being told; the arm stands meanwhile.
+        Telling = 1,
+        /// It obeys the profile.
+        Accepted = 2,
+        /// It does not take the profile; the arm is not moved.
+        Refused = 3,
+        /// It does not answer; the arm is not moved until it does.
+        Unanswered = 4,
+    }
+}
+
+coded! {
+    /// How the last calibration of the line sensors went.
+    pub enum Calibration {
+        /// There was none since the robot was started.
+        Never = 0,
+        /// The sensor board watches its sensors.
+        Running = 1,
+        /// Every sensor has a new threshold.
+        Done = 2,
+        /// Only some have; the others have not seen both floor and tape.
+        Partly = 3,
+        /// The board fell silent or restarted before the end.
+        BrokenOff = 4,
     }
 }
 
@@ -80,7 +114,7 @@ impl BoardHealth {
 
 payload! {
     /// Both links and the arbiter: all that a restarted bridge needs to go on.
-    pub struct Health: 136 bytes {
+    pub struct Health: 184 bytes {
         /// The sensor board's link.
         pub sensor: BoardHealth,
         /// The steering board's link.
@@ -88,6 +122,11 @@ payload! {
         /// Samples of the bus the bridge itself has missed, and board data that it dropped
         /// because its main loop was behind.
         pub bus_lost: u64,
+        /// What the wheels have turned in manual mode, whatever the direction: duty × µs, summed
+        /// over both motors. It grows over all lives of the bridge.
+        pub driven_by_hand: u64,
+        /// When the stop that is latched was set, in ns of `CLOCK_MONOTONIC`; 0 = none is.
+        pub stopped_at_ns: u64,
         /// The order in force.
         pub current_id: u32,
         /// The order that ended last.
@@ -96,6 +135,10 @@ payload! {
         pub orders_refused: u32,
         /// Orders that ended because nobody renewed them.
         pub leases_expired: u32,
+        /// The order refused last.
+        pub refused_id: u32,
+        /// The presses of the switch taken last, by their ids, the last one first; 0 = none.
+        pub switch_ids: [u32; 4],
         /// Until the lease of the order in force ends, in ms; 0 = none runs.
         pub next_lease_ms: u16,
         /// Gain on the error that was set by request, -1 = never set.
@@ -116,9 +159,27 @@ payload! {
         pub wire_seq: u8,
         /// How the last order ended.
         pub finish: Tag<Finish>,
+        /// Who gave the order refused last.
+        pub refused_origin: Tag<Origin>,
+        /// Why it was refused.
+        pub refusal: Tag<Refusal>,
+        /// Why nobody may move the robot at present.
+        pub blocked: Tag<Refusal>,
+        /// What the steering board says to the arm's profile.
+        pub arm_profile: Tag<ArmProfileState>,
+        /// How the last calibration of the line sensors went.
+        pub calibration: Tag<Calibration>,
+        /// Line sensors that it gave a new threshold, 0..=11.
+        pub calibrated_sensors: u8,
+        /// Calibrations that have ended; wraps.
+        pub calibrations_ended: u8,
+        /// Why a stop is latched.
+        pub stop_cause: Tag<StopCause>,
+        /// Who has set the stop that is latched; without meaning if none is.
+        pub stop_origin: Tag<Role>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 3],
+        pub reserved: [u8; 6],
     }
 }
 

@@ -1,5 +1,8 @@
-//! What the robot is to fetch and how it goes: `mission/order`, `mission/event`, `operator/input`.
+//! What the robot is to fetch and how it goes: `mission/order`, `mission/queue`, `mission/event`,
+//! `operator/input`.
 
+use super::failure::Failure;
+use super::nav::Heading;
 use crate::schema::payload;
 use crate::tag::{Tag, coded};
 
@@ -10,6 +13,49 @@ payload! {
         pub id: u32,
         /// The product's number on the map.
         pub product: i32,
+    }
+}
+
+payload! {
+    /// An order that waits for its turn.
+    pub struct WaitingOrder: 12 bytes {
+        /// Its number.
+        pub id: u32,
+        /// The product's number on the map.
+        pub product: i32,
+        /// 1 = its turn had come and there was no way: it is tried again when one may be open.
+        pub put_off: u8,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 3],
+    }
+}
+
+payload! {
+    /// All orders that are not carried out yet (F3): what observers want to see and a restarted
+    /// navigator needs.
+    pub struct OrderQueue: 396 bytes {
+        /// The order under way, if `under_way` is 1.
+        pub order_id: u32,
+        /// The product of that order.
+        pub product: i32,
+        /// 1 = there is one.
+        pub under_way: u8,
+        /// How many of `orders` are used.
+        pub count: u8,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 2],
+        /// The orders that wait, the next one first.
+        #[serde(with = "crate::list")]
+        pub orders: [WaitingOrder; 32],
+    }
+}
+
+impl OrderQueue {
+    /// The orders that wait.
+    pub fn orders(&self) -> &[WaitingOrder] {
+        &self.orders[..usize::from(self.count).min(self.orders.len())]
     }
 }
 
@@ -26,25 +72,32 @@ coded! {
         NextNode = 3,
         /// The order cannot be carried out.
         Refused = 4,
+        /// The goods are not felt in the claw, so the robot does not leave the pick station.
+        PickupRefused = 5,
+        /// The robot cannot go on with what it was doing; `failure` says why and what would end it.
+        Failed = 6,
+        /// The robot has found the way from the node along `heading` blocked (L6).
+        WayBlocked = 7,
     }
 }
 
 payload! {
     /// Something that happened on a mission.
-    pub struct Event: 12 bytes {
+    pub struct Event: 24 bytes {
         /// What.
         pub kind: Tag<EventKind>,
         /// Column of the node last passed.
         pub x: u8,
         /// Row of the node last passed.
         pub y: u8,
-        /// Always 0.
-        #[serde(skip)]
-        pub reserved: u8,
+        /// Where the robot looks.
+        pub heading: Tag<Heading>,
         /// The order it belongs to.
         pub order_id: u32,
         /// The product of that order.
         pub product: i32,
+        /// Why, if it was refused or has failed.
+        pub failure: Failure,
     }
 }
 
@@ -55,20 +108,37 @@ coded! {
         PickupDone = 0,
         /// The switch button was pressed (E14).
         SwitchPressed = 1,
-        /// The reset button was pressed (B1).
+        /// The reset button was pressed (B1): the robot has been put on the delivery node, looking
+        /// into the warehouse.
         ResetPressed = 2,
+        /// The robot has been put on node (`x`, `y`), looking along `heading`.
+        Placed = 3,
+        /// The goods are in the gripper, whether or not it feels them.
+        PickupForced = 4,
+        /// The waiting order `order_id` is not to be carried out.
+        OrderCancelled = 5,
+        /// The waiting order `order_id` is to change places with the one before it.
+        OrderMovedUp = 6,
+        /// No waiting order is to be carried out.
+        QueueCleared = 7,
     }
 }
 
 payload! {
     /// Input of a person.
-    pub struct Input: 8 bytes {
+    pub struct Input: 12 bytes {
         /// What was done.
         pub kind: Tag<InputKind>,
-        /// Always 0.
-        #[serde(skip)]
-        pub reserved: [u8; 3],
+        /// Column of the node the robot was put on.
+        pub x: u8,
+        /// Row of the node the robot was put on.
+        pub y: u8,
+        /// Where the robot looks that was put down.
+        pub heading: Tag<Heading>,
         /// The order it concerns, 0 = none.
         pub order_id: u32,
+        /// Distinguishes this press from another one; a repeated sample has the same. A switch
+        /// without one (0) is not taken.
+        pub id: u32,
     }
 }

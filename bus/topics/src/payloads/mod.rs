@@ -1,5 +1,6 @@
 //! The sample layouts, one file per family of topics.
 
+mod failure;
 mod latency;
 mod link;
 mod log;
@@ -8,19 +9,25 @@ mod nav;
 mod request;
 mod sensor;
 mod steering;
+mod stop;
 mod truth;
 
+pub use failure::{Failure, FailureKind, Remedy};
 pub use latency::{PathLatency, StageLatency};
-pub use link::{BoardHealth, Health, Mode};
-pub use log::Thought;
-pub use mission::{Event, EventKind, Input, InputKind, Order};
+pub use link::{ArmProfileState, BoardHealth, Calibration, Health, Mode};
+pub use log::{Joint, Thought, ThoughtKind};
+pub use mission::{Event, EventKind, Input, InputKind, Order, OrderQueue, WaitingOrder};
 pub use nav::{
-    Goal, Heading, MapProduct, NavigatorStatus, Phase, Route, RouteNode, Side, Step, WarehouseMap,
+    BlockSource, BlockedWay, BlockedWays, Goal, Heading, Hold, MapProduct, NavigatorStatus, Phase,
+    Route, RouteNode, Side, Step, WarehouseMap,
 };
-pub use request::{Answer, Ask, AskKind, Outcome};
+pub use request::{
+    Answer, Ask, AskKind, Outcome, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
+};
 pub use sensor::{DistanceFrame, LineFrame};
-pub use steering::{Finish, OrderKind, Origin, SteeringOrder, SteeringReport};
-pub use truth::{GoodState, Truth, TruthGood};
+pub use steering::{Finish, Origin, Refusal, SteeringOrder, SteeringReport};
+pub use stop::StopCause;
+pub use truth::{GoodState, Truth, TruthGood, TruthObstacle};
 
 /// Position of a servo that has not been heard yet; real ones are 0..=1023 (AX-12).
 pub const SERVO_UNKNOWN: u16 = 0xFFFF;

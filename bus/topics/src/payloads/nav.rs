@@ -1,5 +1,6 @@
 //! Where the robot is, where it goes and in what world: `nav/status`, `nav/map`, `nav/route`.
 
+use super::failure::{Failure, Remedy};
 use super::link::Mode;
 use crate::schema::payload;
 use crate::tag::{Tag, coded};
@@ -63,6 +64,50 @@ coded! {
         Returning = 12,
         /// It cannot go on without help (AMB-49).
         Stuck = 13,
+        /// It was restarted and nobody kept where it was: it knows no place until a reset.
+        Lost = 14,
+        /// It stands at a node and looks whether the way ahead is open (L6).
+        Looking = 15,
+        /// It stands between two nodes before something and looks whether that stays.
+        Halted = 16,
+        /// It turns round between two nodes, since the way ahead is blocked.
+        TurningBack = 17,
+    }
+}
+
+impl Phase {
+    /// Whether only a person who puts the robot down somewhere and says where leads out of it.
+    pub const fn needs_reset(self) -> bool {
+        matches!(self, Self::Stuck | Self::Lost)
+    }
+}
+
+coded! {
+    /// Why the navigator stands although its phase would turn the wheels.
+    pub enum Hold {
+        /// Nothing keeps it.
+        None = 0,
+        /// No line frames come, or no distances where the robot has to look ahead.
+        Blind = 1,
+        /// The steering board does not report.
+        Unheard = 2,
+        /// The arm is not where it is carried while the robot drives with goods.
+        Arm = 3,
+        /// The battery is low.
+        Battery = 4,
+    }
+}
+
+impl Hold {
+    /// What ends it.
+    pub const fn remedy(self) -> Remedy {
+        match self {
+            Self::None => Remedy::None,
+            Self::Blind => Remedy::Light,
+            Self::Unheard => Remedy::Report,
+            Self::Arm => Remedy::Arm,
+            Self::Battery => Remedy::Charge,
+        }
     }
 }
 
@@ -99,20 +144,19 @@ coded! {
 
 payload! {
     /// The navigator's state: what observers want to see and a restarted navigator needs.
-    pub struct NavigatorStatus: 72 bytes {
+    pub struct NavigatorStatus: 96 bytes {
         /// Samples the navigator has missed, of `sensor/line`, `sensor/distance`,
         /// `steering/state`, `mission/order` and `operator/input`.
         pub frames_lost: u64,
         /// Samples of `sensor/line` the navigator has read.
         pub frames: u64,
+        /// What [`Health::driven_by_hand`](crate::Health::driven_by_hand) was when it last was
+        /// sure of its place.
+        pub driven_by_hand: u64 = Self::NEVER_HEARD,
         /// The order it is on, or was on last.
         pub order_id: u32,
         /// The product of that order.
         pub product: i32,
-        /// The order that waits, if `pending` is 1.
-        pub pending_id: u32,
-        /// The product of the order that waits.
-        pub pending_product: i32,
         /// The steering order it gave last.
         pub command_id: u32,
         /// Products delivered.
@@ -123,12 +167,16 @@ payload! {
         /// From the delivery corner to the cross bar as measured on the way out, in mm; 0 =
         /// never driven.
         pub exit_mm: i32,
+        /// Why it cannot go on, and what would end that.
+        pub failure: Failure,
         /// Node last passed.
         pub x: i16,
         /// Node last passed.
         pub y: i16,
         /// Degrees turned since the last heading it is sure of, positive = clockwise.
         pub turned_deg: i16,
+        /// How old `distance_cm` is, in ms; 65535 = that or older, or never heard.
+        pub distance_age_ms: u16 = u16::MAX,
         /// What it does.
         pub phase: Tag<Phase>,
         /// Step within a drive.
@@ -148,18 +196,40 @@ payload! {
         pub tries: u8,
         /// How often it has passed the pick station without finding it.
         pub misses: u8,
-        /// 1 = one more order waits.
-        pub pending: u8,
+        /// How many orders wait; `mission/queue` has them.
+        pub waiting: u8,
         /// Distance to what is in front, in cm, 255 = nothing seen.
         pub distance_cm: u8 = 255,
         /// Who may drive.
         pub mode: Tag<Mode>,
         /// 1 = a stop is latched.
         pub stopped: u8,
+        /// Why it stands although its phase would turn the wheels.
+        pub hold: Tag<Hold>,
+        /// 1 = a person said that the goods are held although the claw did not feel them.
+        pub forced: u8,
+        /// Headings that are possible besides `heading` since a turn was disturbed: bit n = n
+        /// quarters further to the right; bit 0 = the turn under way was disturbed.
+        pub doubt: u8,
+        /// For each of these headings, from one quarter on, the node last passed.
+        pub doubt_x: [u8; 3],
+        /// For each of these headings, from one quarter on, the node last passed.
+        pub doubt_y: [u8; 3],
+        /// The attempt to pick that is under way, from 0.
+        pub arm_attempt: u8,
+        /// How many moves of the arm's routine are done.
+        pub arm_moves: u8,
+        /// What would end that it stands: its failure, what holds it, a stop, or the manual mode.
+        pub remedy: Tag<Remedy>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 5],
+        pub reserved: [u8; 3],
     }
+}
+
+impl NavigatorStatus {
+    /// `driven_by_hand` before the bridge has told it.
+    pub const NEVER_HEARD: u64 = u64::MAX;
 }
 
 payload! {
@@ -181,7 +251,7 @@ payload! {
 
 payload! {
     /// The warehouse as the external computer describes it (M1-M3).
-    pub struct WarehouseMap: 520 bytes {
+    pub struct WarehouseMap: 2056 bytes {
         /// Squares from left to right.
         pub width: u8,
         /// Squares from bottom to top.
@@ -196,7 +266,7 @@ payload! {
         pub product_count: u16,
         /// The pick stations.
         #[serde(with = "crate::list")]
-        pub products: [MapProduct; 64],
+        pub products: [MapProduct; 256],
     }
 }
 
@@ -204,6 +274,62 @@ impl WarehouseMap {
     /// The products in use.
     pub fn products(&self) -> &[MapProduct] {
         &self.products[..usize::from(self.product_count).min(self.products.len())]
+    }
+}
+
+coded! {
+    /// Who says that a way is blocked.
+    pub enum BlockSource {
+        /// The robot has seen something there.
+        Sensor = 0,
+        /// A person.
+        Person = 1,
+    }
+}
+
+payload! {
+    /// A way between two nodes on which something stands.
+    pub struct BlockedWay: 16 bytes {
+        /// Since when, in ns of robot time.
+        pub since_ns: u64,
+        /// Column of the node at one end.
+        pub x: u8,
+        /// Row of the node at one end.
+        pub y: u8,
+        /// Where the way leads from there.
+        pub heading: Tag<Heading>,
+        /// Who says so.
+        pub source: Tag<BlockSource>,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 4],
+    }
+}
+
+payload! {
+    /// All ways that are blocked: what observers want to see and a restarted navigator needs.
+    pub struct BlockedWays: 1032 bytes {
+        /// Squares of the floor from left to right.
+        pub width: u8,
+        /// Squares of the floor from bottom to top.
+        pub height: u8,
+        /// How often all ways that the robot had found blocked were tried again for its goal.
+        pub tries: u8,
+        /// How many of `ways` are used.
+        pub count: u8,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 4],
+        /// The ways, the one that has been blocked for longest first.
+        #[serde(with = "crate::list")]
+        pub ways: [BlockedWay; 64],
+    }
+}
+
+impl BlockedWays {
+    /// The ways in use.
+    pub fn ways(&self) -> &[BlockedWay] {
+        &self.ways[..usize::from(self.count).min(self.ways.len())]
     }
 }
 
@@ -219,15 +345,15 @@ payload! {
 
 payload! {
     /// The way the navigator has planned, next node first.
-    pub struct Route: 516 bytes {
-        /// How many of `nodes` are used.
+    pub struct Route: 1028 bytes {
+        /// How many nodes the way has.
         pub length: u16,
         /// Always 0.
         #[serde(skip)]
         pub reserved: u16,
-        /// The nodes.
+        /// The nodes, as far as there is room for them.
         #[serde(with = "crate::list")]
-        pub nodes: [RouteNode; 256],
+        pub nodes: [RouteNode; 512],
     }
 }
 

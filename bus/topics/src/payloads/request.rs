@@ -1,6 +1,7 @@
 //! What the bridge can be asked for: `bridge/request`.
 
 use super::link::Mode;
+use super::nav::Heading;
 use crate::schema::payload;
 use crate::tag::{Tag, coded};
 
@@ -29,12 +30,18 @@ coded! {
         Refused = 1,
         /// No board that could do it is connected.
         NoBoard = 2,
+        /// It came when its time was over; nothing was done.
+        Late = 3,
     }
 }
 
 payload! {
     /// A request to the bridge.
-    pub struct Ask: 8 bytes {
+    pub struct Ask: 24 bytes {
+        /// When it was asked, in ns of `CLOCK_MONOTONIC`.
+        pub issued_ns: u64,
+        /// For how long it may be answered, in ms: as long as its asker waits.
+        pub lifetime_ms: u32,
         /// What is asked.
         pub kind: Tag<AskKind>,
         /// The mode to set.
@@ -45,7 +52,86 @@ payload! {
         pub gain_d: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 4],
+        pub reserved: [u8; 8],
+    }
+}
+
+impl Ask {
+    /// Whether its time is over at `now_ns`: its asker has given up, or never said when he asked.
+    pub fn is_over(&self, now_ns: u64) -> bool {
+        is_over(self.issued_ns, self.lifetime_ms, now_ns)
+    }
+}
+
+fn is_over(issued_ns: u64, lifetime_ms: u32, now_ns: u64) -> bool {
+    let lifetime_ns = u64::from(lifetime_ms) * 1_000_000;
+    // What was asked in the future was not asked by this machine's clock.
+    issued_ns.abs_diff(now_ns) >= lifetime_ns
+}
+
+coded! {
+    /// What is done to the simulated world.
+    pub enum WorldAskKind {
+        /// The robot is taken up and put on a node, at rest.
+        Place = 0,
+        /// A thing is put on the edge that leaves the node towards `heading`.
+        Put = 1,
+        /// The thing on that edge is taken away.
+        Take = 2,
+    }
+}
+
+coded! {
+    /// Why hands leave the simulated world as it is.
+    pub enum WorldRefusal {
+        /// They do not: it was done.
+        None = 0,
+        /// The warehouse has no such node or edge.
+        NoPlace = 1,
+        /// The robot is where a thing was to be put.
+        RobotThere = 2,
+        /// Nothing stands where a thing was to be taken from.
+        NothingThere = 3,
+        /// As many things stand as there is room for.
+        Full = 4,
+    }
+}
+
+payload! {
+    /// A request to whoever simulates the world: what a person would do with his hands.
+    pub struct WorldAsk: 16 bytes {
+        /// When it was asked, in ns of `CLOCK_MONOTONIC`.
+        pub issued_ns: u64,
+        /// For how long it may be answered, in ms: as long as its asker waits.
+        pub lifetime_ms: u32,
+        /// What is to be done.
+        pub kind: Tag<WorldAskKind>,
+        /// Column of the node.
+        pub x: u8,
+        /// Row of the node.
+        pub y: u8,
+        /// Where the robot is to look, or which of the node's edges is meant.
+        pub heading: Tag<Heading>,
+    }
+}
+
+impl WorldAsk {
+    /// Whether its time is over at `now_ns`, as with [`Ask::is_over`].
+    pub fn is_over(&self, now_ns: u64) -> bool {
+        is_over(self.issued_ns, self.lifetime_ms, now_ns)
+    }
+}
+
+payload! {
+    /// What became of a request to the simulated world.
+    pub struct WorldAnswer: 8 bytes {
+        /// What became of it.
+        pub outcome: Tag<Outcome>,
+        /// Why it was refused.
+        pub refusal: Tag<WorldRefusal>,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 6],
     }
 }
 

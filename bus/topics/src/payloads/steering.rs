@@ -1,5 +1,7 @@
 //! What the steering board is told and what it reports: `steering/command`, `steering/state`.
 
+use core::fmt;
+
 use super::SERVO_UNKNOWN;
 use crate::schema::payload;
 use crate::tag::{Tag, coded};
@@ -15,16 +17,6 @@ coded! {
 }
 
 coded! {
-    /// What an order asks of the bridge.
-    pub enum OrderKind {
-        /// Carry out `code`.
-        Drive = 0,
-        /// Stop now and stay stopped until resumed.
-        Stop = 1,
-    }
-}
-
-coded! {
     /// How an order ended.
     pub enum Finish {
         /// Nothing has ended yet.
@@ -35,22 +27,94 @@ coded! {
         Aborted = 2,
         /// It was not begun.
         Refused = 3,
+        /// The steering board gave up following: no word came from the sensor board.
+        NoWord = 4,
+        /// The steering board gave up following: there was no tape for too long.
+        NoTape = 5,
+    }
+}
+
+coded! {
+    /// Why the bridge does not carry an order out.
+    pub enum Refusal {
+        /// It does: nothing is refused.
+        None = 0,
+        /// Origin or command code have no meaning (AMB-52).
+        Undefined = 1,
+        /// Only logic may give this command (AMB-2, AMB-27).
+        LogicOnly = 2,
+        /// The arm is locked while the wheels move (T4, AMB-28).
+        ArmLocked = 3,
+        /// The id in force came again with another code.
+        CodeChanged = 4,
+        /// The mode gives the wheel to the other origin.
+        NotInCharge = 5,
+        /// A stop is latched.
+        StopLatched = 6,
+        /// The bridge is shutting down.
+        ShuttingDown = 7,
+        /// No steering board is connected.
+        NoBoard = 8,
+        /// The steering board has not reported for 200 ms.
+        BoardSilent = 9,
+        /// The steering board is an original one, and `original_boards` is not set.
+        OriginalBoard = 10,
+        /// A person gave it too long ago: it was held up on its way.
+        Stale = 11,
+        /// The steering board does not obey the arm's profile, so nothing limits the arm.
+        ArmUnlimited = 12,
+    }
+}
+
+impl fmt::Display for Refusal {
+    /// The reason as the end of a sentence, with what to do where something can be done.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::None => "nothing is refused",
+            Self::Undefined => "origin or command code have no meaning",
+            Self::LogicOnly => "only logic may give this command",
+            Self::ArmLocked => "the arm is locked while the wheels move",
+            Self::CodeChanged => "its number is in use for another command",
+            Self::NotInCharge => {
+                "somebody else steers in this mode; `lager mode` changes who steers"
+            }
+            Self::StopLatched => "the robot is stopped; `lager resume` releases the stop",
+            Self::ShuttingDown => "the bridge is shutting down",
+            Self::NoBoard => "no steering board is connected; `lager doctor` looks for the cause",
+            Self::BoardSilent => {
+                "the steering board does not report; look at its cable and its power"
+            }
+            Self::OriginalBoard => {
+                "the steering board is an original one, whose commands have no age limit; \
+                 `[serial] original_boards = true` accepts that"
+            }
+            Self::Stale => "it was held up for too long on its way; give it anew",
+            Self::ArmUnlimited => {
+                "the steering board has not taken [arm] of the configuration; flash the image of this program's version"
+            }
+        })
     }
 }
 
 payload! {
-    /// An order to the arbiter in the bridge.
-    pub struct SteeringOrder: 8 bytes {
+    /// An order to the arbiter in the bridge. A stop is none: it is a word in memory, see
+    /// [`StopCause`](super::StopCause).
+    pub struct SteeringOrder: 16 bytes {
+        /// When a person first gave the order of this id, in ns of `CLOCK_MONOTONIC`; renewals
+        /// repeat it. An order that is not in force is begun within a second of it or never.
+        /// Without meaning for logic's orders.
+        pub given_ns: u64,
         /// The same id renews the lease, a new id executes.
         pub id: u32,
         /// Who gives it.
         pub origin: Tag<Origin>,
-        /// What is asked.
-        pub kind: Tag<OrderKind>,
-        /// The firmware's command code; without meaning for a stop.
+        /// The firmware's command code.
         pub code: u8,
         /// 1 while logic stands at a pick station and lets the operator move the arm.
         pub arm_granted: u8,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: u8,
     }
 }
 
@@ -83,12 +147,18 @@ payload! {
         pub servo_errors: u8,
         /// Battery in tenths of a volt, 0 = unknown.
         pub battery_decivolts: u8,
-        /// Always 0.
-        #[serde(skip)]
-        pub reserved: [u8; 2],
+        /// How old the board's own words in this sample are, in ms of robot time: 0 = they have
+        /// just come, 65 535 = it has said nothing in this life of its link. An original board's
+        /// sample is the bridge's own word, and never old.
+        pub age_ms: u16 = Self::NEVER_HEARD,
         /// Position 0..=1023 of servo n at index n - 1, `0xFFFF` = not heard yet.
         pub servo_position: [u16; 8] = [SERVO_UNKNOWN; 8],
         /// Load -1023..=1023 of servo n at index n - 1.
         pub servo_load: [i16; 8],
     }
+}
+
+impl SteeringReport {
+    /// `age_ms` before the board has reported.
+    pub const NEVER_HEARD: u16 = u16::MAX;
 }

@@ -1,6 +1,7 @@
 //! The simulated world as it really is: `truth/pose`. Only a simulator publishes it.
 
 use super::SERVO_UNKNOWN;
+use super::nav::Heading;
 use crate::schema::payload;
 use crate::tag::{Tag, coded};
 
@@ -38,8 +39,22 @@ payload! {
 }
 
 payload! {
+    /// A thing that stands in the middle of an edge.
+    pub struct TruthObstacle: 4 bytes {
+        /// Column of the edge's left or lower node.
+        pub x: u8,
+        /// Row of the edge's left or lower node.
+        pub y: u8,
+        /// Where the edge leaves that node: right or up.
+        pub heading: Tag<Heading>,
+        /// 1 = it came by chance and goes again by itself.
+        pub by_chance: u8,
+    }
+}
+
+payload! {
     /// The world: enough to resume it in another process.
-    pub struct Truth: 1344 bytes {
+    pub struct Truth: 1616 bytes {
         /// Robot time since the start of the world in ns.
         pub time_ns: u64,
         /// Middle of the axle in mm.
@@ -62,9 +77,21 @@ payload! {
         pub right_duty: u8,
         /// Position 0..=1023 of servo n at index n - 1.
         pub servo_position: [u16; 8] = [SERVO_UNKNOWN; 8],
+        /// The part of the battery's charge that is left, 0 to 1.
+        pub battery_charge: f32 = 1.0,
+        /// How often the body has run into something since the start of the world.
+        pub collisions: u32,
         /// The goods.
         #[serde(with = "crate::list")]
         pub goods: [TruthGood; 64],
+        /// What stands on edges.
+        #[serde(with = "crate::list")]
+        pub obstacles: [TruthObstacle; 64],
+        /// How many of `obstacles` are used.
+        pub obstacle_count: u16,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 6],
     }
 }
 
@@ -72,5 +99,10 @@ impl Truth {
     /// The goods in use.
     pub fn goods(&self) -> &[TruthGood] {
         &self.goods[..usize::from(self.good_count).min(self.goods.len())]
+    }
+
+    /// What stands on edges.
+    pub fn obstacles(&self) -> &[TruthObstacle] {
+        &self.obstacles[..usize::from(self.obstacle_count).min(self.obstacles.len())]
     }
 }

@@ -36,6 +36,8 @@ pub struct BoardLink {
     gap_us: u32,
     decoder: Decoder,
     up: bool,
+    /// Whether it has ever been up.
+    was_up: bool,
     /// When the next SYN is due; `None` means at once.
     syn_due_us: Option<u32>,
     last_byte_us: u32,
@@ -56,6 +58,7 @@ impl BoardLink {
             gap_us,
             decoder: Decoder::new(Version::One),
             up: false,
+            was_up: false,
             syn_due_us: None,
             last_byte_us: 0,
             next_id: PacketId::new(0),
@@ -71,7 +74,14 @@ impl BoardLink {
             return None;
         }
         self.syn_due_us = Some(now_us.wrapping_add(SYN_PERIOD_US));
-        Some(handshake(SynAck::Syn, self.sign, self.reset, Version::One))
+        let (sign, reset) = (self.sign, self.reset);
+        Some(handshake(
+            SynAck::Syn,
+            sign,
+            reset,
+            Version::One,
+            self.was_up,
+        ))
     }
 
     /// How many microseconds until the next SYN is due; `None` while the link is up.
@@ -123,6 +133,7 @@ impl BoardLink {
                     return None;
                 }
                 self.up = true;
+                self.was_up = true;
                 self.next_id = PacketId::new(0);
                 Some(BoardEvent::Up)
             }

@@ -1,9 +1,10 @@
 //! What makes the Pi believe that a board is there: runs of SYNs, runs of data.
 //!
 //! A version-1 SYN proves itself by its check value. Nothing protects an original packet, so an
-//! original board is believed only by repetition, in a stream without stray bytes, and when no
-//! version-1 packet has come for a while. It is apart from the link because belief is all it
-//! knows: it holds no peer, counts no loss and answers nothing.
+//! original board is believed only by repetition, in a stream without stray bytes and without a
+//! version-1 packet in between, and when none of those has come for a while. Two of those in a row
+//! show that a board that was believed to be an original one is not. It is apart from the link
+//! because belief is all it knows: it holds no peer, counts no loss and answers nothing.
 
 use core::time::Duration;
 
@@ -60,6 +61,8 @@ pub(super) struct Evidence {
     data: Option<DataRun>,
     /// When listening began or a version-1 packet last came, whichever is later.
     without_one_since: Option<Duration>,
+    /// The id of the last version-1 packet.
+    last_one: Option<PacketId>,
 }
 
 impl Evidence {
@@ -68,9 +71,15 @@ impl Evidence {
         self.without_one_since.get_or_insert(now);
     }
 
-    /// A version-1 packet has come.
-    pub(super) fn heard_one(&mut self, now: Duration) {
+    /// A version-1 packet has come; whether it goes on where the one before it was. What looked
+    /// like an original board's packets before it was this board's: a hole in its stream must not
+    /// let the next damaged packet add to them.
+    pub(super) fn heard_one(&mut self, id: PacketId, now: Duration) -> bool {
         self.without_one_since = Some(now);
+        self.data = None;
+        self.syns = self.syns.filter(|run| run.last.version == Version::One);
+        let before = self.last_one.replace(id);
+        before.is_some_and(|before| before.next() == id)
     }
 
     /// Something has come that no waiting board sends.
@@ -157,8 +166,10 @@ impl Syn {
 fn is_damaged_one(bytes: &[u8; PACKET_LENGTH]) -> bool {
     let signs = [Callsign::Sensor, Callsign::Steering];
     signs.into_iter().any(|sign| {
-        ResetCause::ALL.iter().any(|reset| {
-            let whole = handshake(SynAck::Syn, sign, *reset, Version::One);
+        let causes = ResetCause::ALL.iter();
+        let mut starts = causes.flat_map(|reset| [(*reset, false), (*reset, true)]);
+        starts.any(|(reset, was_up)| {
+            let whole = handshake(SynAck::Syn, sign, reset, Version::One, was_up);
             (0..PACKET_LENGTH).any(|turn| {
                 let turned = whole.iter().cycle().skip(turn);
                 let wrong: u32 = turned

@@ -9,10 +9,14 @@
 //!   (SYN   original data, 8 ids in a row,                                (data, ids
 //!   every    300 ms without version 1                  -> Up             counted)
 //!  100 ms)
-//!          <- Silent: nothing for 1 s, or version-1 data of the other board
+//!          <- Silent: nothing for 1 s, version-1 data of the other board,
+//!             or two version-1 packets in a row of one taken for original
 //!
 //!  up:   SYN before any data since the ACK             -> SendAck: the ACK was lost
-//!        SYN after data, the second (original: third)  -> SendAck(up): the board rebooted
+//!        SYN after data, the second (original: third)  -> SendAck(up)
+//!
+//!  A version-1 board that comes up again has rebooted if it says that it has not been up since it
+//!  started, whether it was silent in between or not; an original one if it asked while it was up.
 //! ```
 //!
 //! Each time a board comes up a new epoch starts: counters begin at 0 and nothing from before
@@ -41,8 +45,10 @@ pub struct Up {
     pub epoch: u32,
     /// Why the board last started; `Unknown` from an original one.
     pub reset: ResetCause,
-    /// Whether it was up and asked again by itself: it has rebooted.
+    /// Whether it has rebooted since this link had it up before.
     pub rebooted: bool,
+    /// Whether it says that no link has had it up since it started.
+    pub fresh: bool,
 }
 
 /// What the receiving end asks for or tells.
@@ -59,8 +65,8 @@ pub enum HostEvent {
     Up(Up),
     /// A data packet.
     Packet(Packet),
-    /// The board has said nothing for a second, or what only the other board can say, and is no
-    /// longer up.
+    /// The board has said nothing for a second, or what only the other board or one of the other
+    /// version can say, and is no longer up.
     Silent,
 }
 
@@ -100,6 +106,8 @@ pub struct HostLink {
     one: Decoder,
     original: Decoder,
     peer: Option<Peer>,
+    /// The board that was up last.
+    known: Option<(Callsign, Version)>,
     evidence: Evidence,
     syn_due: Duration,
     counters: LinkCounters,
@@ -122,6 +130,7 @@ impl HostLink {
             one: Decoder::new(Version::One),
             original: Decoder::new(Version::Original),
             peer: None,
+            known: None,
             evidence: Evidence::default(),
             syn_due: Duration::ZERO,
             counters: LinkCounters::default(),
@@ -216,14 +225,14 @@ impl HostLink {
     fn take_one(&mut self, packet: Packet, end: u8, now: Duration) -> Option<HostEvent> {
         // An original packet's end byte is the right check value once in 256 times, so such a
         // packet says nothing about the version.
-        if end != END {
-            self.evidence.heard_one(now);
-        }
+        let in_a_row = end != END && self.evidence.heard_one(packet.id, now);
         match packet.payload {
             Payload::Handshake(handshake) => {
                 let bytes = packet.encode(Version::One);
                 self.take_handshake(handshake, bytes, now)
             }
+            // It was taken for an original board and is none. Asked again, it says what it is.
+            _ if in_a_row && self.version() == Some(Version::Original) => Some(self.go_down(now)),
             _ => self.take_data(packet, Version::One, now),
         }
     }
@@ -241,7 +250,7 @@ impl HostLink {
                 self.evidence.break_syns();
                 let callsign = self.evidence.believes_data(&packet, now)?;
                 let version = Version::Original;
-                let up = self.come_up(callsign, version, ResetCause::Unknown, false, now);
+                let up = self.come_up((callsign, version, ResetCause::Unknown), false, now);
                 if let Some(peer) = &mut self.peer {
                     peer.data_seen = true;
                     peer.last_id = Some(packet.id);
@@ -300,7 +309,13 @@ impl HostLink {
             skipped: self.original.counters().skipped_bytes,
         };
         self.evidence.believes_syn(syn, after_data, now).then(|| {
-            let up = self.come_up(callsign, version, handshake.reset, after_data, now);
+            let rebooted = match version {
+                Version::One => !handshake.was_up && self.known == Some((callsign, version)),
+                Version::Original => after_data,
+            };
+            let board = (callsign, version, handshake.reset);
+            let mut up = self.come_up(board, rebooted, now);
+            up.fresh = version == Version::One && !handshake.was_up;
             HostEvent::SendAck { up: Some(up) }
         })
     }
@@ -316,9 +331,7 @@ impl HostLink {
 
     fn come_up(
         &mut self,
-        callsign: Callsign,
-        version: Version,
-        reset: ResetCause,
+        (callsign, version, reset): (Callsign, Version, ResetCause),
         rebooted: bool,
         now: Duration,
     ) -> Up {
@@ -336,6 +349,7 @@ impl HostLink {
             last_id,
             last_heard: now,
         });
+        self.known = Some((callsign, version));
         self.evidence.break_syns();
         self.evidence.break_data();
         self.judged_by = version;
@@ -354,6 +368,7 @@ impl HostLink {
             epoch: self.counters.epoch,
             reset,
             rebooted,
+            fresh: false,
         }
     }
 }

@@ -11,6 +11,9 @@
 //!    | -- SYN/board at once ---------------> |   the board keeps running, only the ids restart
 //! ```
 //!
+//! A board's SYN says whether the link has been up since the board started. So a reset is told from
+//! a line that was cut, also after a silence in which the Pi has asked too.
+//!
 //! Handshake packets stand outside the id count and carry id 0. They live beside each other so
 //! that they are tested against each other; neither does input or output nor reads a clock.
 
@@ -33,12 +36,14 @@ fn handshake(
     sign: Callsign,
     reset: ResetCause,
     version: Version,
+    was_up: bool,
 ) -> [u8; PACKET_LENGTH] {
     let handshake = Handshake {
         kind,
         sign,
         version,
         reset,
+        was_up,
     };
     Packet {
         id: PacketId::default(),

@@ -28,14 +28,14 @@ impl HostTransmitter {
     /// board does not look at what is new in it.
     pub fn syn(&self) -> [u8; PACKET_LENGTH] {
         let (sign, reset) = (Callsign::Raspi, ResetCause::Unknown);
-        handshake(SynAck::Syn, sign, reset, Version::One)
+        handshake(SynAck::Syn, sign, reset, Version::One, false)
     }
 
     /// The answer to a board's SYN; data packets are numbered from 0 after it.
     pub fn ack(&mut self, version: Version) -> [u8; PACKET_LENGTH] {
         self.adopt(version);
         let (sign, reset) = (Callsign::Raspi, ResetCause::Unknown);
-        handshake(SynAck::Ack, sign, reset, version)
+        handshake(SynAck::Ack, sign, reset, version, false)
     }
 
     /// Starts sending to a board that was found running and takes no ACK.

@@ -70,6 +70,7 @@ fn the_decoder_gives_nothing_for_a_damaged_packet_alone() {
         sign: Callsign::Sensor,
         version: Version::One,
         reset: ResetCause::PowerOn,
+        was_up: false,
     });
     let steer = payloads()
         .into_iter()

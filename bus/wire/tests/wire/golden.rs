@@ -61,6 +61,7 @@ fn syn(sign: Callsign, version: Version, reset: ResetCause) -> Payload {
         sign,
         version,
         reset,
+        was_up: false,
     })
 }
 
@@ -140,6 +141,7 @@ fn all_8_handshake_bytes() {
             sign: Callsign::from_code(sign).unwrap(),
             version: Version::Original,
             reset: ResetCause::Unknown,
+            was_up: false,
         };
         assert_eq!(handshake.byte(), byte);
         let sent = packet(0, Payload::Handshake(handshake));
@@ -178,10 +180,32 @@ fn full_size_packets_of_the_original() {
 fn version_one_packets() {
     // The payload bytes are the layouts of this project's wire description; the last byte is
     // CRC-8/AUTOSAR of the ten before it, computed bit by bit with an independent routine.
-    let cases: [(Packet, [u8; 11]); 10] = [
+    let asking_again = Handshake {
+        kind: SynAck::Syn,
+        sign: Callsign::Steering,
+        version: Version::One,
+        reset: ResetCause::Watchdog,
+        was_up: true,
+    };
+    let cases: [(Packet, [u8; 11]); 12] = [
         (
             packet(0, syn(Callsign::Sensor, Version::One, ResetCause::PowerOn)),
             [0x00, 0x0b, 0x08, 1, 1, 0, 0, 0, 0, 0, 0x09],
+        ),
+        (
+            packet(0, Payload::Handshake(asking_again)),
+            [0x00, 0x0b, 0x0c, 1, 4, 1, 0, 0, 0, 0, 0x30],
+        ),
+        (
+            packet(
+                5,
+                Payload::Setting(Setting {
+                    key: SettingKey::ArmTorqueLimit,
+                    seq: 5,
+                    value: 700,
+                }),
+            ),
+            [0x65, 0x0b, 16, 5, 0xbc, 2, 0xef, 0xfa, 0, 0, 0xe9],
         ),
         (
             packet(15, Payload::Line(LineState::FourWay)),

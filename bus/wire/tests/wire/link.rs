@@ -19,6 +19,7 @@ fn a_board_comes_up_at_its_first_syn() {
         epoch: 1,
         reset: ResetCause::PowerOn,
         rebooted: false,
+        fresh: true,
     };
     assert_eq!(
         line.host_events,

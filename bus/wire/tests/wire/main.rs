@@ -1,5 +1,6 @@
 //! The wire protocol from outside: bytes in, packets and events out.
 
+mod arm;
 mod commands;
 mod errors;
 mod golden;

@@ -3,7 +3,7 @@
 //! The decoder has a fixed size and cannot allocate, so "no growth" holds by construction; what is
 //! shown here is that it never panics, how little noise passes, and that it comes back at once.
 
-use lager_wire::{Decoder, Version};
+use lager_wire::{Decoder, Packet, PacketId, Payload, SteerCommand, Version};
 
 use crate::sample::{Noise, distance};
 
@@ -136,5 +136,38 @@ fn a_lost_byte_costs_an_original_board_one_packet() {
         let missing = (0..16).filter(|id| !ids.contains(id)).count();
         assert!(missing <= 1, "byte {cut} lost: {ids:?}");
         assert_eq!(ids.last(), Some(&(19 % 16)));
+    }
+}
+
+/// What a stop leaves on the line: the driver's queue is thrown away wherever the packet in it was
+/// just being sent, and standby follows, again and again.
+///
+/// A command that lacks nothing but its check can find it in the standby's first byte: then it is
+/// whole, as it was given, and the next standby ends it.
+#[test]
+fn a_standby_behind_a_command_cut_in_two_is_taken() {
+    for code in 1..=11 {
+        for (id, seq) in (0..16).flat_map(|id| (1..=255).map(move |seq| (id, seq))) {
+            let packet = |id: u8, code: u8, seq: u8| Packet {
+                id: PacketId::new(id),
+                payload: Payload::SteerCommand(SteerCommand { code, seq }),
+            };
+            let cut = packet(id, code, seq).encode(Version::One);
+            let next = seq.wrapping_add(1).max(1);
+            let (standby, again) = (packet(id + 1, 1, next), packet(id + 2, 1, next));
+            let first = standby.encode(Version::One);
+            for sent in 0..cut.len() {
+                let mut decoder = Decoder::new(Version::One);
+                let line = cut[..sent].iter().copied().chain(first);
+                let line = line.chain(again.encode(Version::One));
+                let taken: Vec<_> = line.filter_map(|byte| decoder.push(byte)).collect();
+                let completed = sent + 1 == cut.len() && cut[sent] == first[0];
+                let before = match completed {
+                    true => packet(id, code, seq),
+                    false => standby,
+                };
+                assert_eq!(taken, [before, again], "{sent} bytes of command {code}");
+            }
+        }
     }
 }

@@ -74,6 +74,7 @@ fn an_original_board_comes_up_after_300_ms_of_syns_that_are_alike() {
                 epoch: 1,
                 reset: ResetCause::Unknown,
                 rebooted: false,
+                fresh: false,
             };
             assert_eq!(up, expected);
         }
@@ -248,6 +249,42 @@ fn a_running_version_one_board_is_never_taken_for_an_original_one() {
     assert!(!pi.host.is_up());
 }
 
+/// A bridge that is held up for longer than the system keeps bytes reads on in a damaged packet.
+#[test]
+fn a_hole_in_what_a_version_one_board_sends_does_not_make_it_an_original_one() {
+    let mut pi = Pi::new();
+    for id in 0..50 {
+        assert_eq!(pi.take(&distance(id, 80).encode(Version::One), 12), []);
+    }
+    pi.take(&[], 400);
+    for id in 50..53 {
+        let mut damaged = distance(id, 80).encode(Version::One);
+        damaged[5] ^= 0x10;
+        assert_eq!(pi.take(&damaged, 0), []);
+    }
+    for id in 53..100 {
+        assert_eq!(pi.take(&distance(id, 80).encode(Version::One), 12), []);
+    }
+    assert!(!pi.host.is_up());
+}
+
+#[test]
+fn a_version_one_board_that_was_taken_for_an_original_one_is_asked_again() {
+    let mut pi = Pi::new();
+    let mut id = 0;
+    while !pi.host.is_up() {
+        pi.take(&sensor_packet(id), 12);
+        id += 1;
+    }
+    assert_eq!(pi.host.version(), Some(Version::Original));
+    let mut asked = Vec::new();
+    for id in id..id + 3 {
+        asked.extend(pi.take(&distance(id, 80).encode(Version::One), 12));
+    }
+    assert!(asked.contains(&HostEvent::Silent), "{asked:?}");
+    assert_eq!(pi.host.poll(pi.now), Some(HostEvent::SendSyn));
+}
+
 #[test]
 fn an_end_that_fits_the_check_value_by_chance_does_not_hide_an_original_board() {
     // Distances for which the end byte 0xFF is the right check value, for every id.
@@ -270,8 +307,17 @@ fn an_end_that_fits_the_check_value_by_chance_does_not_hide_an_original_board() 
 fn no_version_one_handshake_ends_like_an_original_one() {
     for sign in [Callsign::Raspi, Callsign::Sensor, Callsign::Steering] {
         for reset in ResetCause::ALL {
-            let syn = board(sign, *reset).poll(0).unwrap();
+            let mut link = board(sign, *reset);
+            let syn = link.poll(0).unwrap();
             assert_ne!(syn[10], 0xFF, "{sign:?} {reset:?}");
+            // And when it has been up before.
+            let mut pi = HostTransmitter::new();
+            for byte in pi.ack(Version::One).into_iter().chain(pi.syn()) {
+                link.push(byte, 0);
+            }
+            let syn = link.poll(0).unwrap();
+            assert_eq!(syn[5], 1);
+            assert_ne!(syn[10], 0xFF, "{sign:?} {reset:?}, asked again");
         }
     }
 }

@@ -149,6 +149,66 @@ fn a_cut_line_is_noticed_after_a_second_and_taken_up_again() {
 }
 
 #[test]
+fn a_board_that_resets_after_a_second_of_silence_has_rebooted() {
+    // Cut both ways, and cut only where the Pi cannot hear: then the board hears the Pi ask.
+    for cut_to_board in [true, false] {
+        for down_ms in [1_100, 5_000] {
+            let mut line = Line::new(1);
+            line.run(500);
+            line.cut_to_board = cut_to_board;
+            line.cut_to_host = true;
+            line.run(down_ms);
+            assert!(!line.host.is_up());
+            line.board = board(Callsign::Steering, ResetCause::BrownOut);
+            line.cut_to_board = false;
+            line.cut_to_host = false;
+            line.run(1_000);
+            let ups = line.ups();
+            assert_eq!(ups.len(), 2);
+            assert!(ups[1].rebooted && ups[1].fresh);
+            assert_eq!((ups[1].reset, ups[1].epoch), (ResetCause::BrownOut, 2));
+            let health = line.host.health();
+            assert_eq!((health.epoch, health.lost, health.reboots), (2, 0, 1));
+            assert_eq!(line.board.lost_packets(), 0);
+        }
+    }
+}
+
+#[test]
+fn a_board_that_is_asked_again_has_not_rebooted() {
+    let mut line = Line::new(1);
+    line.run(500);
+    // Somebody else's question: the board answers it, and this end sees it ask.
+    for _ in 0..3 {
+        for byte in HostTransmitter::new().syn() {
+            let now = line.board_now();
+            line.board.push(byte, now);
+        }
+        line.run(500);
+    }
+    let ups = line.ups();
+    assert!(ups.len() > 1);
+    assert!(ups[1..].iter().all(|up| !up.rebooted && !up.fresh));
+    assert_eq!(line.host.health().reboots, 0);
+}
+
+#[test]
+fn a_restarted_pi_is_told_whether_the_board_has_restarted_too() {
+    for restarts in [false, true] {
+        let mut line = Line::new(1);
+        line.run(500);
+        line.host = HostLink::new();
+        line.transmitter = HostTransmitter::new();
+        line.host_events.clear();
+        if restarts {
+            line.board = board(Callsign::Steering, ResetCause::External);
+        }
+        line.run(500);
+        assert_eq!(line.ups()[0].fresh, restarts);
+    }
+}
+
+#[test]
 fn a_link_that_fell_silent_keeps_its_last_counts() {
     let mut line = Line::new(1);
     line.run(500);
@@ -220,7 +280,15 @@ fn a_version_one_syn_damaged_the_same_way_each_time_is_never_believed() {
         (Callsign::Sensor, ResetCause::Unknown),
         (Callsign::Steering, ResetCause::Watchdog),
     ] {
-        let whole = board(sign, reset).poll(0).unwrap();
+        let mut asking = board(sign, reset);
+        if reset == ResetCause::Unknown {
+            // One that has been up before.
+            let mut pi = HostTransmitter::new();
+            for byte in pi.ack(Version::One).into_iter().chain(pi.syn()) {
+                asking.push(byte, 0);
+            }
+        }
+        let whole = asking.poll(0).unwrap();
         for a in 0..88 {
             for b in a..88 {
                 for c in b..88 {

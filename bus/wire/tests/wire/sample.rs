@@ -62,6 +62,7 @@ pub(crate) fn payloads() -> Vec<Payload> {
                     sign,
                     version: Version::One,
                     reset,
+                    was_up: reset == ResetCause::BrownOut,
                 }));
             }
         }
@@ -89,6 +90,9 @@ pub(crate) fn payloads() -> Vec<Payload> {
         (SettingKey::GainD, 255, -1),
         (SettingKey::RawLine, 11, i16::MIN),
         (SettingKey::Calibrate, 1, i16::MAX),
+        (SettingKey::ArmTorqueLimit, 9, 1_023),
+        (SettingKey::ArmDropWrist, 10, 0),
+        (SettingKey::ArmProfile, 12, 255),
     ] {
         payloads.push(Payload::Setting(Setting { key, seq, value }));
         for status in SettingStatus::ALL {

@@ -20,19 +20,24 @@
 //! ```
 //!
 //! A missing servo never holds up the others: it is flagged, left out, and asked again in its turn.
+//!
+//! No command leads out of the limits of the profile: its poses lie inside by [`ArmProfile::validate`], a
+//! step ends at a limit and is refused there. An arm that stands outside, moved by hand or before the limits
+//! were told, may only be stepped back, and nothing moves it there by itself.
 
 mod config;
 mod program;
 mod servo;
 mod squeeze;
+mod task;
 
 use lager_ax12::ErrorBits;
-use lager_wire::{ArmCommand, ArmData};
+use lager_wire::{ArmCommand, ArmData, ArmLimits, ArmProfile};
 
-pub use config::{ArmConfig, Limits, Pose};
+pub use config::ArmConfig;
 pub use program::Outcome;
-use program::Program;
 use servo::{Servo, Setup};
+use task::Program;
 
 use crate::SteeringBoard;
 use crate::servo_bus::{Answer, ServoBus};
@@ -63,12 +68,36 @@ pub(crate) const fn partner(index: usize) -> Option<usize> {
     }
 }
 
+/// Where the joint of this servo may be sent.
+fn limits(profile: &ArmProfile, joint: usize) -> ArmLimits {
+    let limits = &profile.limits;
+    match joint {
+        BASE => limits.base,
+        SHOULDER => limits.shoulder,
+        ELBOW => limits.elbow,
+        WRIST => limits.wrist,
+        ROTATION => limits.rotation,
+        _ => limits.gripper,
+    }
+}
+
 const fn id(index: usize) -> u8 {
     index as u8 + 1
 }
 
 const fn bit(index: usize) -> u8 {
     1 << index
+}
+
+/// What became of the wish to begin a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// It runs.
+    Begun,
+    /// A command is under way or a servo is being brought into service; ask again.
+    NotYet,
+    /// It would lead out of the joint's limits; nothing has happened.
+    Outside,
 }
 
 /// One question to a servo.
@@ -98,6 +127,8 @@ pub struct Arm {
     asked: Option<(Job, bool)>,
     /// Servos the program has moved or tried to.
     touched: u8,
+    /// Whether servos in service have to be told another torque limit.
+    torque_untold: bool,
     /// Whether a servo the program needs has failed.
     failed: bool,
     finished: Option<Outcome>,
@@ -118,6 +149,7 @@ impl Arm {
             program: Program::Idle,
             asked: None,
             touched: 0,
+            torque_untold: false,
             failed: false,
             finished: None,
             untold: 0,
@@ -132,15 +164,31 @@ impl Arm {
         !matches!(self.program, Program::Idle) || self.finished.is_some()
     }
 
-    /// Begins a command; `false`, and nothing happens, while [`Arm::is_busy`].
-    pub fn start(&mut self, command: ArmCommand, now_us: u32) -> bool {
-        if self.is_busy() {
-            return false;
+    /// Begins a command, if it may.
+    pub fn start(&mut self, command: ArmCommand, now_us: u32) -> Start {
+        if self.is_busy() || self.is_settling() {
+            return Start::NotYet;
         }
         self.touched = 0;
         self.failed = false;
-        self.begin(command, now_us);
-        true
+        if self.begin(command, now_us) {
+            Start::Begun
+        } else {
+            Start::Outside
+        }
+    }
+
+    /// The profile that is obeyed.
+    #[must_use]
+    pub fn profile(&self) -> &ArmProfile {
+        &self.config.profile
+    }
+
+    /// Obeys another profile from now on. The caller has validated it. What moves goes on to where it was
+    /// sent; servos in service are told a new torque limit where they stand.
+    pub fn set_profile(&mut self, profile: ArmProfile) {
+        self.torque_untold |= profile.torque_limit != self.config.profile.torque_limit;
+        self.config.profile = profile;
     }
 
     /// Stops the command under way where it is. [`Arm::poll`] tells when that is done.
@@ -166,6 +214,9 @@ impl Arm {
             }
         }
         if self.bus.is_idle() {
+            if core::mem::take(&mut self.torque_untold) {
+                self.bring_in_again();
+            }
             self.asked = self.choose(now_us);
             if let Some((job, _)) = self.asked {
                 self.ask(job, board, now_us);
@@ -180,7 +231,7 @@ impl Arm {
         if let Some(due_us) = self.bus.next_due_us(now_us) {
             return due_us;
         }
-        let round_due_us = if self.unfinished_setup().is_some() {
+        let round_due_us = if self.is_settling() {
             now_us
         } else {
             self.round_due_us
@@ -239,6 +290,20 @@ impl Arm {
         (0..SERVOS).find(|index| self.untold & bit(*index) != 0 && self.servos[*index].is_seen())
     }
 
+    /// Whether a servo is being brought into service, or is to be.
+    fn is_settling(&self) -> bool {
+        self.torque_untold || self.unfinished_setup().is_some()
+    }
+
+    /// Brings servos in service into service once more, which tells them the torque limit.
+    fn bring_in_again(&mut self) {
+        for servo in &mut self.servos {
+            if matches!(servo.setup, Setup::Held | Setup::Ready) {
+                servo.setup = Setup::Seen;
+            }
+        }
+    }
+
     fn unfinished_setup(&self) -> Option<Job> {
         self.servos
             .iter()
@@ -275,7 +340,11 @@ impl Arm {
         match job {
             Job::Look(index) => self.bus.look(id(index), board, now_us),
             Job::Goal { index, speed } => {
-                let values = (self.servos[index].goal, speed, self.config.torque_limit);
+                let values = (
+                    self.servos[index].goal,
+                    speed,
+                    self.config.profile.torque_limit,
+                );
                 self.bus.set_goal(id(index), values, board, now_us);
             }
             Job::SwitchOn(index) => self.bus.switch_on(id(index), board, now_us),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   step, Release   Move
-//!   Drop            Move to the drop pose --> Move: open --> Move to the carry pose
+//!   Drop            Move to the drop pose --> Move: open --> Move to the neutral pose
 //!   Squeeze         write a step closer --> pause, look --> load, no movement, closed: over
 //!                        ^----------------------'
 //!
@@ -16,13 +16,13 @@
 //! Every state ends: each question has a time-out, each Move a deadline, and a squeeze has no more steps
 //! than the gripper has way.
 
-use lager_ax12::{ErrorBits, table};
-use lager_wire::ArmCommand;
+use lager_ax12::table;
+use lager_wire::{ArmCommand, ArmPose};
 
 use super::servo::NEAR_GOAL;
-use super::squeeze::Squeeze;
+use super::task::{Freeze, GIVES_UP, Move, Program, Then};
 use super::{
-    Arm, BASE, ELBOW, GRIPPER, Job, Pose, ROTATION, SERVOS, SHOULDER, WRIST, bit, partner,
+    Arm, BASE, ELBOW, GRIPPER, Job, ROTATION, SERVOS, SHOULDER, WRIST, bit, limits, partner,
 };
 use crate::time::reached;
 
@@ -35,67 +35,23 @@ pub enum Outcome {
     Aborted,
 }
 
-/// Errors with which a servo switches its torque off.
-pub(super) const GIVES_UP: ErrorBits = ErrorBits::OVERLOAD.union(ErrorBits::OVERHEATING);
-
-/// What a command is doing.
-#[derive(Debug, Clone)]
-pub(super) enum Program {
-    Idle,
-    Move(Move),
-    Squeeze(Squeeze),
-    Freeze(Freeze),
-}
-
-/// Servos under way to their goals.
-#[derive(Debug, Clone)]
-pub(super) struct Move {
-    /// Goals still to be written.
-    write: u8,
-    /// Servos not yet there.
-    wait: u8,
-    /// Servos that stood still when last looked at.
-    resting: u8,
-    last_looked: usize,
-    speed: u16,
-    tolerance: u16,
-    timeout_us: u32,
-    deadline_us: u32,
-    look_due_us: u32,
-    then: Then,
-}
-
-/// What follows a Move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Then {
-    Nothing,
-    Open,
-    Raise,
-}
-
-/// Moving servos being stopped where they are.
-#[derive(Debug, Clone)]
-pub(super) struct Freeze {
-    left: u8,
-    /// Whether the first of them was looked at and its goal set to where it is.
-    looked: bool,
-}
-
 impl Arm {
-    pub(super) fn begin(&mut self, command: ArmCommand, now_us: u32) {
+    /// Whether the command runs; one that does not would lead out of the limits.
+    pub(super) fn begin(&mut self, command: ArmCommand, now_us: u32) -> bool {
         match command {
-            ArmCommand::Left => self.step(BASE, true, now_us),
-            ArmCommand::Right => self.step(BASE, false, now_us),
-            ArmCommand::Up => self.step(SHOULDER, true, now_us),
-            ArmCommand::Down => self.step(SHOULDER, false, now_us),
-            ArmCommand::Out => self.step(ELBOW, true, now_us),
-            ArmCommand::In => self.step(ELBOW, false, now_us),
-            ArmCommand::CounterClockwise => self.step(ROTATION, true, now_us),
-            ArmCommand::Clockwise => self.step(ROTATION, false, now_us),
+            ArmCommand::Left => return self.step(BASE, true, now_us),
+            ArmCommand::Right => return self.step(BASE, false, now_us),
+            ArmCommand::Up => return self.step(SHOULDER, true, now_us),
+            ArmCommand::Down => return self.step(SHOULDER, false, now_us),
+            ArmCommand::Out => return self.step(ELBOW, true, now_us),
+            ArmCommand::In => return self.step(ELBOW, false, now_us),
+            ArmCommand::CounterClockwise => return self.step(ROTATION, true, now_us),
+            ArmCommand::Clockwise => return self.step(ROTATION, false, now_us),
             ArmCommand::Squeeze => self.squeeze(now_us),
             ArmCommand::Release => self.open(Then::Nothing, now_us),
-            ArmCommand::Drop => self.take_pose(self.config.drop, Then::Open, now_us),
+            ArmCommand::Drop => self.take_pose(self.config.profile.drop, Then::Open, now_us),
         }
+        true
     }
 
     /// Ends the command. `being_written` is the servo whose new goal is on the wire, as a bit.
@@ -186,8 +142,8 @@ impl Arm {
         });
     }
 
-    /// One small step of a joint.
-    fn step(&mut self, joint: usize, forward: bool, now_us: u32) {
+    /// One small step of a joint; whether there is way left.
+    fn step(&mut self, joint: usize, forward: bool, now_us: u32) -> bool {
         let partner = partner(joint);
         let base = match partner {
             Some(partner) if !self.servos[joint].is_ready() => {
@@ -196,17 +152,24 @@ impl Arm {
             _ => self.servos[joint].base(),
         };
         let step = self.config.step;
-        let goal = if forward {
-            base.saturating_add(step)
+        let limits = limits(&self.config.profile, joint);
+        let (way_left, goal) = if forward {
+            let goal = base.saturating_add(step).min(limits.highest);
+            (base < limits.highest, goal)
         } else {
-            base.saturating_sub(step)
+            let goal = base.saturating_sub(step).max(limits.lowest);
+            (base > limits.lowest, goal)
         };
+        // One that does not answer has no place; that it fails is told when it is asked.
+        if !way_left && self.servos[joint].is_ready() {
+            return false;
+        }
         let mut goals = Goals::default();
-        goals.joint(joint, self.config.limits[joint].clamp(goal));
+        goals.joint(joint, goal);
         let (speed, timeout_us) = (self.config.step_speed, self.config.step_timeout_us);
         self.go(
             &goals,
-            Way {
+            Manner {
                 speed,
                 timeout_us,
                 tolerance: 1,
@@ -214,9 +177,10 @@ impl Arm {
             },
             now_us,
         );
+        true
     }
 
-    fn take_pose(&mut self, pose: Pose, then: Then, now_us: u32) {
+    fn take_pose(&mut self, pose: ArmPose, then: Then, now_us: u32) {
         let mut goals = Goals::default();
         for (joint, position) in [
             (BASE, pose.base),
@@ -224,17 +188,14 @@ impl Arm {
             (ELBOW, pose.elbow),
             (WRIST, pose.wrist),
         ] {
-            goals.joint(joint, self.config.limits[joint].clamp(position));
+            goals.joint(joint, position);
         }
         self.go_softly(&goals, then, now_us);
     }
 
     fn open(&mut self, then: Then, now_us: u32) {
         let mut goals = Goals::default();
-        goals.joint(
-            GRIPPER,
-            self.config.limits[GRIPPER].clamp(self.config.gripper_open),
-        );
+        goals.joint(GRIPPER, self.config.profile.gripper_open);
         self.go_softly(&goals, then, now_us);
     }
 
@@ -242,7 +203,7 @@ impl Arm {
         let (speed, timeout_us) = (self.config.sequence_speed, self.config.sequence_timeout_us);
         self.go(
             goals,
-            Way {
+            Manner {
                 speed,
                 timeout_us,
                 tolerance: 6,
@@ -253,7 +214,7 @@ impl Arm {
     }
 
     /// Sends servos to their goals; those out of service are left out.
-    fn go(&mut self, goals: &Goals, way: Way, now_us: u32) {
+    fn go(&mut self, goals: &Goals, manner: Manner, now_us: u32) {
         let mut write = 0;
         for index in 0..SERVOS {
             let Some(goal) = goals.0[index] else { continue };
@@ -271,12 +232,12 @@ impl Arm {
             wait: write,
             resting: 0,
             last_looked: 0,
-            speed: way.speed,
-            tolerance: way.tolerance,
-            timeout_us: way.timeout_us,
-            deadline_us: now_us.wrapping_add(way.timeout_us),
+            speed: manner.speed,
+            tolerance: manner.tolerance,
+            timeout_us: manner.timeout_us,
+            deadline_us: now_us.wrapping_add(manner.timeout_us),
             look_due_us: now_us,
-            then: way.then,
+            then: manner.then,
         };
         self.go_on(movement, now_us);
     }
@@ -347,7 +308,7 @@ impl Arm {
         match movement.then {
             Then::Nothing => self.finish(),
             Then::Open => self.open(Then::Raise, now_us),
-            Then::Raise => self.take_pose(self.config.carry, Then::Nothing, now_us),
+            Then::Raise => self.take_pose(self.config.profile.neutral, Then::Nothing, now_us),
         }
     }
 
@@ -382,7 +343,7 @@ impl Goals {
 }
 
 /// How a Move goes.
-struct Way {
+struct Manner {
     speed: u16,
     timeout_us: u32,
     /// How near to its goal a resting servo has arrived.

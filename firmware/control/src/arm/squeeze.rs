@@ -9,21 +9,11 @@
 //! The goal stays where it is at the end, a little inside what is held: that is the grip. A squeeze has no
 //! more steps than the gripper has way, so it ends whatever the servo answers.
 
-use super::program::{GIVES_UP, Program};
+use super::task::{GIVES_UP, Program, Squeeze};
 use super::{Arm, GRIPPER, Job, bit};
 
 /// Steps of a squeeze without movement after which something is held (AMB-29).
 const STILL_STEPS: u8 = 4;
-
-/// The gripper closing.
-#[derive(Debug, Clone)]
-pub(super) struct Squeeze {
-    /// Whether the next thing is to write a step.
-    pub(super) stepping: bool,
-    pub(super) look_due_us: u32,
-    last_position: u16,
-    still: u8,
-}
 
 impl Arm {
     pub(super) fn squeeze(&mut self, now_us: u32) {
@@ -70,7 +60,7 @@ impl Arm {
             squeeze.last_position = position;
         }
         let gave_up = servo.errors.intersects(GIVES_UP);
-        let loaded = servo.look.load.unsigned_abs() >= self.config.squeeze_load;
+        let loaded = servo.look.load.unsigned_abs() >= self.config.profile.squeeze_load;
         let closed = servo.goal == self.closer(servo.goal) && servo.distance() <= self.config.step;
         if gave_up || loaded || closed || squeeze.still >= STILL_STEPS {
             self.failed |= gave_up;
@@ -84,13 +74,13 @@ impl Arm {
 
     /// One step towards the closed gripper and not beyond it.
     fn closer(&self, position: u16) -> u16 {
-        let (open, closed) = (self.config.gripper_open, self.config.gripper_closed);
+        let profile = &self.config.profile;
+        let (open, closed) = (profile.gripper_open, profile.gripper_closed);
         let step = self.config.step;
-        let closer = if closed < open {
+        if closed < open {
             position.saturating_sub(step).max(closed)
         } else {
             position.saturating_add(step).min(closed)
-        };
-        self.config.limits[GRIPPER].clamp(closer)
+        }
     }
 }

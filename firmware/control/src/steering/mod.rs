@@ -5,16 +5,19 @@
 //!   UART --> | register --> dispatch --> wheels ---.                      |
 //!   ExDe --> | line error --> PD ------------------+--> motors            | --> UART
 //!   servos ->| arm <-- lock: only in standby       |                      |   reports
-//!            | age of the command > 150 ms --> off-'                      |
+//!            | age of the command > 150 ms --> off-' scaled by the battery |
 //!            '-------------------------------------------------------------'
 //! ```
 //!
 //! Rules that hold whatever comes:
 //! - The motors stand still from boot until the first valid command, while the command is too old, while the
 //!   arm moves, and while the line to follow is not reported.
+//! - The arm is locked from boot until the first standby, and while the wheels have another command (T4).
 //! - What runs once (turns, arm commands) ends exactly once: done, aborted or refused, under its number.
-//!   Setpoints do not end; they are replaced.
+//!   Setpoints do not end; they are replaced. One does: following that has lost its words or its tape is
+//!   aborted with the failsafe's flag, and only another command turns the wheels again.
 //! - A refused command is counted and changes nothing: what was under way goes on and is not renewed by it.
+//! - Duties are those at 11.1 V, in orders and reports; the drivers get what gives the same voltage.
 //! - Of an arm command, the servos' states are told before its end is.
 
 mod ends;
@@ -23,15 +26,17 @@ mod telling;
 
 use ends::End;
 use lager_wire::link::BoardLink;
-use lager_wire::{ArmCommand, Callsign, LineBits, ResetCause};
+use lager_wire::{ArmCommand, ArmProfile, Callsign, LineBits, LineState, ResetCause};
 
-use crate::arm::{Arm, ArmConfig, Outcome};
+use crate::arm::{Arm, ArmConfig, Outcome, Start};
 use crate::failsafe::CommandAge;
 use crate::line::LineReader;
 use crate::load::Load;
 use crate::pd::{Gains, Pd};
 use crate::register::CommandRegister;
+use crate::sides::Sides;
 use crate::store::Store;
+use crate::supply::Supply;
 use crate::time::{first, reached};
 use crate::wheels::{Motors, STILL, Wheels};
 use crate::{Board, EEPROM_POLL_US, PACKET_GAP_US, SteeringBoard, outbox::Outbox};
@@ -81,6 +86,7 @@ const WORD_US: u32 = 300;
 struct Line {
     reader: LineReader,
     pd: Pd,
+    sides: Sides,
     /// The regulator's output for the last word.
     correction: i16,
     /// When the last word came, while it is not too old.
@@ -104,12 +110,19 @@ pub struct SteeringUnit {
     register: CommandRegister,
     age: CommandAge,
     refused: u8,
+    /// Whether a standby has ever come; before it the arm is locked (T4).
+    standby_seen: bool,
     line: Line,
     wheels: Wheels,
     arm: Arm,
     arm_waiting: Option<ArmOrder>,
     arm_running: Option<ArmOrder>,
+    /// The arm's profile as the Pi is telling it, not yet in force.
+    profile: [u16; ArmProfile::VALUES],
     motors: Option<Motors>,
+    /// What the drivers were given for them.
+    at_pins: Option<Motors>,
+    supply: Supply,
     reports: Reports,
     load: Load,
     /// The gains, P and D.
@@ -131,9 +144,11 @@ impl SteeringUnit {
             register: CommandRegister::new(),
             age: CommandAge::new(config.command_age_limit_us),
             refused: 0,
+            standby_seen: false,
             line: Line {
                 reader: LineReader::new(),
                 pd: Pd::new(gains),
+                sides: Sides::new(),
                 correction: 0,
                 fresh_since_us: None,
             },
@@ -141,7 +156,10 @@ impl SteeringUnit {
             arm: Arm::new(config.arm, now_us),
             arm_waiting: None,
             arm_running: None,
+            profile: config.arm.profile.values(),
             motors: None,
+            at_pins: None,
+            supply: Supply::new(),
             reports: Reports::new(now_us),
             load: Load::new(now_us),
             store,
@@ -188,8 +206,17 @@ impl SteeringUnit {
     /// Looks at the line: first of all, and between things that take long, so that the wheels do not wait for
     /// them.
     fn follow<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
-        if self.read_words(board) {
+        if let Some((state, at_us)) = self.read_words(board) {
             self.drive(board, now_us);
+            // What may be learnt can wait until the wheels have their duties.
+            let Line {
+                sides, correction, ..
+            } = &mut self.line;
+            if self.wheels.follows_forward() {
+                sides.observe(*correction, state, at_us);
+            } else {
+                sides.pause();
+            }
         }
     }
 
@@ -208,20 +235,24 @@ impl SteeringUnit {
         {
             self.line.fresh_since_us = None;
         }
+        if let Some(seq) = self.wheels.give_up(now_us) {
+            self.end(seq, End::Aborted, now_us);
+        }
     }
 
-    /// Takes in the words that have come; whether there were any.
-    fn read_words<B: SteeringBoard>(&mut self, board: &mut B) -> bool {
-        let mut came = false;
+    /// Takes in the words that have come; what the last of them showed, and when it came.
+    fn read_words<B: SteeringBoard>(&mut self, board: &mut B) -> Option<(LineState, u32)> {
+        let mut seen = None;
         while let Some((word, at_us)) = board.exde_word() {
-            came = true;
             let bits = LineBits::new(word);
             let reading = self.line.reader.read(bits, at_us);
-            self.line.correction = self.line.pd.update(reading.error, at_us);
+            let correction = self.line.pd.update(reading.error, at_us);
+            self.line.correction = correction + self.line.sides.bias();
             self.line.fresh_since_us = Some(at_us);
             self.wheels.on_word(bits, at_us);
+            seen = Some((reading.state, at_us));
         }
-        came
+        seen
     }
 
     fn line_due_us(&self) -> Option<u32> {
@@ -240,12 +271,23 @@ impl SteeringUnit {
             };
             self.end(order.seq, end, now_us);
         }
-        if !self.arm.is_busy()
-            && let Some(order) = self.arm_waiting.take()
-            && self.arm.start(order.command, now_us)
-        {
-            self.arm_running = Some(order);
+        let Some(order) = self.arm_waiting else {
+            return;
+        };
+        match self.arm.start(order.command, now_us) {
+            Start::NotYet => return,
+            Start::Begun => self.arm_running = Some(order),
+            Start::Outside => {
+                self.count_refused();
+                self.end(order.seq, End::Refused, now_us);
+            }
         }
+        self.arm_waiting = None;
+    }
+
+    /// Whether the wheels' command keeps the arm locked (T4).
+    fn arm_is_locked(&self) -> bool {
+        !(self.standby_seen && self.wheels.is_standby())
     }
 
     fn watch_age(&mut self, now_us: u32) {
@@ -261,13 +303,20 @@ impl SteeringUnit {
         }
         let correction = self.line.fresh_since_us.map(|_| self.line.correction);
         let motors = if may_turn {
-            self.wheels.motors(correction)
+            let motors = self.wheels.motors(correction);
+            if self.wheels.follows() {
+                motors
+            } else {
+                self.line.sides.alike(motors)
+            }
         } else {
             STILL
         };
-        if self.motors != Some(motors) {
-            self.motors = Some(motors);
-            board.set_motors(motors.0, motors.1);
+        self.motors = Some(motors);
+        let at_pins = self.supply.at_pins(motors);
+        if self.at_pins != Some(at_pins) {
+            self.at_pins = Some(at_pins);
+            board.set_motors(at_pins.0, at_pins.1);
         }
     }
 

@@ -5,16 +5,17 @@
 //!                 |           |                 '-> arm: only in standby, when the one before has ended
 //!                 |           '-- repeated: renews its age
 //!                 '-> setting --> gain, answered
+//!                             '-> arm's profile: value by value, answered --> in force as a whole
 //! ```
 
 use lager_wire::link::BoardEvent;
 use lager_wire::{
-    Command, Payload, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand,
+    ArmProfile, Command, Payload, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand,
+    WheelCommand,
 };
 
 use super::ends::{End, Finish};
 use super::{ArmOrder, SteeringUnit};
-use crate::pd::Gains;
 use crate::register::Receipt;
 use crate::{MOST_BYTES, SteeringBoard};
 
@@ -63,9 +64,10 @@ impl SteeringUnit {
         match command.command() {
             Some(Command::Wheel(wheel)) => {
                 self.accept(now_us);
-                self.wheels.start(wheel, command.seq);
+                self.standby_seen |= wheel == WheelCommand::Standby;
+                self.wheels.start(wheel, command.seq, now_us);
             }
-            Some(Command::Arm(arm)) if self.wheels.is_standby() => {
+            Some(Command::Arm(arm)) if !self.arm_is_locked() => {
                 self.accept(now_us);
                 self.arm_waiting = Some(ArmOrder {
                     command: arm,
@@ -102,43 +104,60 @@ impl SteeringUnit {
         self.reports.data_due_us = now_us;
     }
 
-    fn count_refused(&mut self) {
+    pub(super) fn count_refused(&mut self) {
         self.refused = self.refused.saturating_add(1);
     }
 
     fn set(&mut self, setting: Setting) -> SettingReply {
-        let gains = self.line.pd.gains();
-        let (in_force, changed) = match setting.key {
-            SettingKey::GainP => (
-                gains.p,
-                u8::try_from(setting.value).map(|p| (p, Gains { p, ..gains })),
-            ),
-            SettingKey::GainD => (
-                gains.d,
-                u8::try_from(setting.value).map(|d| (d, Gains { d, ..gains })),
-            ),
-            SettingKey::RawLine | SettingKey::Calibrate => {
-                return SettingReply {
-                    key: setting.key,
-                    seq: setting.seq,
-                    value: 0,
-                    status: SettingStatus::NotHere,
-                };
-            }
-        };
-        let (value, status) = match changed {
-            Ok((value, gains)) => {
-                self.line.pd.set_gains(gains);
-                self.store.save([gains.p, gains.d]);
-                (value, SettingStatus::Accepted)
-            }
-            Err(_) => (in_force, SettingStatus::OutOfRange),
+        let (value, status) = match setting.key {
+            SettingKey::GainP | SettingKey::GainD => self.set_gain(setting),
+            SettingKey::ArmProfile => self.put_profile_in_force(setting.value),
+            key => match ArmProfile::index(key) {
+                Some(index) => self.put_aside(index, setting.value),
+                None => (0, SettingStatus::NotHere),
+            },
         };
         SettingReply {
             key: setting.key,
             seq: setting.seq,
-            value: i16::from(value),
+            value,
             status,
         }
+    }
+
+    fn set_gain(&mut self, setting: Setting) -> (i16, SettingStatus) {
+        let mut gains = self.line.pd.gains();
+        let gain = match setting.key {
+            SettingKey::GainP => &mut gains.p,
+            _ => &mut gains.d,
+        };
+        let Ok(value) = u8::try_from(setting.value) else {
+            return (i16::from(*gain), SettingStatus::OutOfRange);
+        };
+        *gain = value;
+        self.line.pd.set_gains(gains);
+        self.store.save([gains.p, gains.d]);
+        (setting.value, SettingStatus::Accepted)
+    }
+
+    /// One value of a profile that is being told.
+    fn put_aside(&mut self, index: usize, value: i16) -> (i16, SettingStatus) {
+        match u16::try_from(value) {
+            Ok(told) => {
+                self.profile[index] = told;
+                (value, SettingStatus::Accepted)
+            }
+            Err(_) => (self.profile[index].cast_signed(), SettingStatus::OutOfRange),
+        }
+    }
+
+    /// The profile has been told; it is obeyed if it came whole and an arm can obey it.
+    fn put_profile_in_force(&mut self, check: i16) -> (i16, SettingStatus) {
+        if check == ArmProfile::check(&self.profile) && ArmProfile::is_sound(&self.profile) {
+            self.arm.set_profile(ArmProfile::from_values(&self.profile));
+            return (check, SettingStatus::Accepted);
+        }
+        let in_force = ArmProfile::check(&self.arm.profile().values());
+        (in_force, SettingStatus::OutOfRange)
     }
 }

@@ -13,6 +13,7 @@ use lager_wire::{BoardStatus, Command, Payload, SteerData, SteerFlags};
 
 use super::SteeringUnit;
 use super::ends::{End, Ends};
+use crate::follow::Lost;
 use crate::replies::Replies;
 use crate::time::{first, reached};
 use crate::wheels::STILL;
@@ -87,6 +88,8 @@ impl SteeringUnit {
     fn steer_data<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> SteerData {
         self.reports.data_due_us = now_us.wrapping_add(self.config.report_period_us);
         let (left, right) = self.motors.unwrap_or(STILL);
+        let battery_decivolts = board.battery_decivolts();
+        self.supply.observe(battery_decivolts);
         let finish = self.reports.ends.told();
         SteerData {
             code: self.code(),
@@ -96,7 +99,7 @@ impl SteeringUnit {
             line_error: self.line.reader.error(),
             finished_seq: finish.seq,
             servo_errors: self.arm.errors(),
-            battery_decivolts: board.battery_decivolts(),
+            battery_decivolts,
         }
     }
 
@@ -114,12 +117,17 @@ impl SteeringUnit {
     fn flags(&self, left: Motor, right: Motor, end: End) -> SteerFlags {
         let mut flags = SteerFlags::NONE;
         let busy = self.wheels.is_turning() || self.arm_is_active();
+        let lost = self.wheels.lost();
+        let words_come = self.line.fresh_since_us.is_some() && lost != Some(Lost::Words);
         for (holds, flag) in [
             (left.reverse, SteerFlags::LEFT_REVERSE),
             (right.reverse, SteerFlags::RIGHT_REVERSE),
-            (!self.wheels.is_standby(), SteerFlags::ARM_LOCKED),
-            (self.line.fresh_since_us.is_some(), SteerFlags::EXDE_OK),
-            (self.age.is_expired(), SteerFlags::FAILSAFE),
+            (self.arm_is_locked(), SteerFlags::ARM_LOCKED),
+            (words_come, SteerFlags::EXDE_OK),
+            (
+                self.age.is_expired() || lost.is_some(),
+                SteerFlags::FAILSAFE,
+            ),
             (end == End::Aborted, SteerFlags::ABORTED),
             (end == End::Refused, SteerFlags::REFUSED),
             (busy, SteerFlags::BUSY),

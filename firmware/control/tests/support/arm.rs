@@ -38,6 +38,14 @@ pub fn aborted(bench: &mut Bench, code: u8, limit_ms: u32) {
     );
 }
 
+/// The same, and the command has to be refused.
+pub fn refused(bench: &mut Bench, code: u8) {
+    assert!(
+        finish(bench, code, 100).contains(SteerFlags::REFUSED),
+        "code {code:#04x}"
+    );
+}
+
 /// Every servo's state the Pi was told.
 pub fn arm_data(bench: &Bench) -> Vec<(u32, ArmData)> {
     bench.pi.all(|payload| match payload {

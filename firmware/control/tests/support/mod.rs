@@ -13,10 +13,13 @@ pub mod servos;
 use std::collections::VecDeque;
 
 use lager_control::{Board, EEPROM_LENGTH, Motor, SteeringBoard, SteeringConfig, SteeringUnit};
-use lager_wire::{Payload, ResetCause, Setting, SettingKey, SteerCommand, SteerData};
+use lager_wire::{BoardStatus, Payload, ResetCause, Setting, SettingKey, SteerCommand, SteerData};
 pub use pi::{Pi, Uart};
 pub use sensor::SensorBench;
 use servos::Servos;
+
+/// What a bridge says first.
+const STANDBY: SteerCommand = SteerCommand { code: 1, seq: 255 };
 
 /// Pins and wires of a steering board.
 pub struct SteeringPins {
@@ -86,7 +89,7 @@ impl SteeringBoard for SteeringPins {
         self.servos.read(self.now_us)
     }
     fn battery_decivolts(&mut self) -> u8 {
-        118
+        111
     }
 }
 
@@ -135,7 +138,7 @@ impl Bench {
         }
     }
 
-    /// A board that is up, its servos in service, the line under its middle.
+    /// A board that is up and in standby, its servos in service, the line under its middle.
     pub fn ready() -> Self {
         Self::ready_with(SteeringConfig::default(), Servos::at([512; 8]))
     }
@@ -144,6 +147,7 @@ impl Bench {
         let mut bench = Self::boot(u32::MAX - 1_000_000, config, servos);
         bench.line = Some(0b000_0011_1000 << 1);
         bench.run_ms(200);
+        bench.send(Payload::SteerCommand(STANDBY));
         bench.pi.packets.clear();
         bench.pins.motor_log.clear();
         bench.run_ms(10);
@@ -160,6 +164,11 @@ impl Bench {
         self.renewed = Some(command);
         self.renew_us = self.pins.now_us.wrapping_add(40_000);
         self.send(Payload::SteerCommand(command));
+        self.seq
+    }
+
+    /// The number of the latest command.
+    pub fn seq(&self) -> u8 {
         self.seq
     }
 
@@ -255,6 +264,17 @@ impl Bench {
     /// The latest regular report.
     pub fn report(&self) -> SteerData {
         self.reports().last().expect("a report").1
+    }
+
+    /// The board status that the board tells next.
+    pub fn status(&mut self) -> BoardStatus {
+        self.pi.packets.clear();
+        self.run_ms(600);
+        let statuses = self.pi.all(|payload| match payload {
+            Payload::BoardStatus(status) => Some(status),
+            _ => None,
+        });
+        statuses.last().expect("a status").1
     }
 
     pub fn reports(&self) -> Vec<(u32, SteerData)> {

@@ -23,7 +23,7 @@ use std::rc::Rc;
 
 use lager_plant::arm::SERVOS;
 use lager_plant::noise::Noise;
-use lager_plant::{Warehouse, WarehouseError, World, WorldState};
+use lager_plant::{Make, Warehouse, WarehouseError, World, WorldState};
 use thiserror::Error;
 
 use crate::chip::{Chip, FREQUENCY, Image, ImageError, Pin, ResetLine, Wire, wire};
@@ -34,8 +34,6 @@ pub use servos::{ServoByte, ServoWire};
 use boards::{Motors, SensorInputs};
 use line::PiLine;
 
-/// The battery of a robot at rest: three lithium cells, in millivolts.
-const BATTERY: u32 = 11_100;
 /// The divider between battery and input.
 const BATTERY_DIVIDER: u32 = 4;
 /// Where the servos stand before anybody has moved them: the pose the arm is carried in, the claw
@@ -85,6 +83,8 @@ pub struct RigOptions {
     pub warehouse: Warehouse,
     /// Chooses every imperfection: the same seed is the same robot.
     pub seed: u64,
+    /// Which imperfections there are.
+    pub make: Make,
     /// Baud rate of the Pi's ends of both lines.
     pub baud: u32,
 }
@@ -162,12 +162,13 @@ impl Rig {
         let mut delay = || spread.bits() % START_SPREAD;
         let sensor = Chip::new(&images.sensor, delay(), options.seed)?;
         let steering = Chip::new(&images.steering, delay(), !options.seed)?;
-        let world = World::new(&options.warehouse, options.seed, RESTING_ARM)?;
+        let world = World::new(&options.warehouse, options.seed, options.make, RESTING_ARM)?;
         let world = Rc::new(RefCell::new(world));
         let epoch = Rc::new(Epoch::default());
         let inputs = boards::connect_inputs(&sensor, &world, &epoch);
-        steering.on_conversion(|channel, _| match channel {
-            0 => BATTERY / BATTERY_DIVIDER,
+        let battery = Rc::clone(&world);
+        steering.on_conversion(move |channel, _| match channel {
+            0 => (battery.borrow().battery_volts() * 1_000.0) as u32 / BATTERY_DIVIDER,
             _ => 0,
         });
         let motors = boards::connect_motors(&steering, &world, &epoch);

@@ -6,17 +6,22 @@ use lager_ax12::ErrorBits;
 use lager_emulator::chip::UsartId;
 use lager_emulator::rig::Board;
 use lager_plant::ServoFault;
-use lager_wire::{ArmCommand, Command, SteerFlags, WheelCommand};
+use lager_wire::{
+    ArmCommand, ArmProfile, Command, Payload, Setting, SettingKey, SettingStatus, SteerFlags,
+    WheelCommand,
+};
 
 use crate::support::Robot;
 
 /// The longest any arm command may take: its longest sequence has three parts of 4 s each.
 const LONGEST: Duration = Duration::from_secs(14);
 
-/// A robot whose servos are in service.
+/// A robot whose servos are in service and whose arm is unlocked.
 fn ready(seed: u64) -> Robot {
     let mut robot = Robot::up(seed);
-    robot.run(Duration::from_millis(1_000));
+    robot.run(Duration::from_millis(980));
+    robot.wheels(WheelCommand::Standby);
+    robot.run(Duration::from_millis(20));
     assert_eq!(robot.report().servo_errors, 0);
     robot
 }
@@ -53,6 +58,27 @@ fn packets(robot: &Robot) -> Vec<Vec<u8>> {
     }
     assert!(rest.is_empty(), "{rest:02X?} belongs to no packet");
     packets
+}
+
+/// Tells the board a setting; whether it takes it.
+fn set(robot: &mut Robot, key: SettingKey, seq: u8, value: i16) -> bool {
+    let setting = Setting { key, seq, value };
+    robot.steering.packets.clear();
+    robot
+        .steering
+        .send(&mut robot.rig, Payload::Setting(setting));
+    robot.run(Duration::from_millis(10));
+    robot
+        .steering
+        .packets
+        .iter()
+        .find_map(|arrived| match arrived.packet.payload {
+            Payload::SettingReply(reply) if (reply.key, reply.seq) == (key, seq) => {
+                Some(reply.status == SettingStatus::Accepted)
+            }
+            _ => None,
+        })
+        .expect("the board answers")
 }
 
 /// Packets that write something (instruction 3); the others are questions.
@@ -263,4 +289,56 @@ fn an_arm_command_is_broken_off_by_a_silent_pi() {
     let report = robot.report();
     assert_eq!(report.finished_seq, seq);
     assert!(report.flags.contains(SteerFlags::ABORTED));
+}
+
+#[test]
+fn at_power_up_the_arm_is_locked_until_the_first_standby() {
+    let mut robot = Robot::up(21);
+    robot.run(Duration::from_millis(1_000));
+    assert!(robot.report().flags.contains(SteerFlags::ARM_LOCKED));
+    robot.rig.servo_wire().record();
+    let flags = carry_out(&mut robot, ArmCommand::Up);
+    assert!(flags.contains(SteerFlags::REFUSED));
+    assert_eq!(writes(&robot), Vec::<Vec<u8>>::new(), "nothing moved");
+    robot.wheels(WheelCommand::Standby);
+    robot.run(Duration::from_millis(20));
+    let flags = carry_out(&mut robot, ArmCommand::Up);
+    assert!(!flags.contains(SteerFlags::REFUSED) && !flags.contains(SteerFlags::ABORTED));
+    assert!(!writes(&robot).is_empty());
+}
+
+#[test]
+fn the_board_obeys_the_profile_it_is_told() {
+    let mut robot = ready(22);
+    let mut profile = ArmProfile {
+        torque_limit: 0x0155,
+        squeeze_load: 200,
+        ..ArmProfile::default()
+    };
+    profile.limits.base.highest = 514;
+    robot.rig.servo_wire().record();
+    for (index, value) in profile.values().into_iter().enumerate() {
+        let key = ArmProfile::key(index).expect("a key");
+        assert!(set(&mut robot, key, index as u8, value.cast_signed()));
+    }
+    assert_eq!(writes(&robot), Vec::<Vec<u8>>::new(), "not yet in force");
+    let check = ArmProfile::check(&profile.values());
+    assert!(!set(&mut robot, SettingKey::ArmProfile, 98, check ^ 1));
+    assert!(set(&mut robot, SettingKey::ArmProfile, 99, check));
+    robot.run(Duration::from_millis(50));
+    let told = writes(&robot);
+    let torque = told
+        .iter()
+        .filter(|packet| packet[5] == 0x1E && packet[10..12] == [0x55, 0x01]);
+    assert_eq!(torque.count(), 8, "{told:02X?}");
+    let flags = carry_out(&mut robot, ArmCommand::Left);
+    assert!(!flags.contains(SteerFlags::REFUSED), "to the limit");
+    let refused = robot.steering_status().refused;
+    let _ = writes(&robot);
+    let flags = carry_out(&mut robot, ArmCommand::Left);
+    assert!(flags.contains(SteerFlags::REFUSED));
+    assert_eq!(writes(&robot), Vec::<Vec<u8>>::new());
+    assert_eq!(robot.steering_status().refused, refused + 1);
+    let flags = carry_out(&mut robot, ArmCommand::Right);
+    assert!(!flags.contains(SteerFlags::REFUSED), "back");
 }

@@ -76,17 +76,26 @@ fn words_are_whole_and_follow_the_tape() {
 fn a_cut_wire_stops_a_robot_that_follows_the_line() {
     let mut robot = Robot::up(3);
     robot.place(0.0);
-    robot.wheels(WheelCommand::ActiveForward);
+    let seq = robot.wheels(WheelCommand::ActiveForward);
     robot.run(Duration::from_millis(200));
     assert_ne!(robot.rig.duties(), [0, 0]);
     robot.rig.exde().sync.lose(u64::MAX);
     let cut = robot.rig.cycle();
     let off = robot.run_until_off(Duration::from_millis(300));
     assert!(off.expect("the motors went off") - cut <= milliseconds(200));
-    assert!(!robot.report().flags.contains(SteerFlags::EXDE_OK));
+    let report = robot.report();
+    let stopped = SteerFlags::FAILSAFE.with(SteerFlags::ABORTED);
+    assert!(report.flags.contains(stopped), "{report:?}");
+    assert!(!report.flags.contains(SteerFlags::EXDE_OK), "and why");
+    assert_eq!(report.finished_seq, seq);
     robot.rig.exde().sync.lose(0);
-    robot.run(Duration::from_millis(200));
-    assert_ne!(robot.rig.duties(), [0, 0], "mended");
+    robot.rig.take_motor_changes();
+    robot.run(Duration::from_millis(500));
+    assert_eq!(robot.rig.take_motor_changes(), [], "mended, and it stands");
+    robot.wheels(WheelCommand::ActiveForward);
+    robot.run(Duration::from_millis(100));
+    assert_ne!(robot.rig.duties(), [0, 0], "ordered anew");
+    assert!(robot.report().flags.contains(SteerFlags::EXDE_OK));
 }
 
 #[test]

@@ -113,11 +113,47 @@ fn the_sensor_boards_main_loop_hangs() {
     robot.run(Duration::from_millis(600));
     let (_, up) = robot.sensor.ups.last().copied().expect("it was up");
     assert_eq!((up.rebooted, up.reset), (true, ResetCause::Watchdog));
-    assert_ne!(
+    assert_eq!(
         robot.rig.duties(),
         [0, 0],
-        "with the line the motion comes back"
+        "the words are back, but following was given up"
     );
+    robot.wheels(WheelCommand::ActiveForward);
+    robot.run(Duration::from_millis(100));
+    assert_ne!(robot.rig.duties(), [0, 0]);
+}
+
+#[test]
+fn the_tape_is_gone() {
+    let mut robot = Robot::up(9);
+    robot.place(0.0);
+    let seq = robot.wheels(WheelCommand::ActiveForward);
+    robot.run(Duration::from_millis(500));
+    assert_ne!(robot.rig.duties(), [0, 0]);
+    // Bare floor for more than the way it drives.
+    robot.place(200.0);
+    let gone = robot.rig.cycle();
+    let off = robot.run_until_off(Duration::from_millis(2_500));
+    let took = off.expect("the motors went off") - gone;
+    assert!(
+        (milliseconds(2_000)..=milliseconds(2_200)).contains(&took),
+        "{took} cycles"
+    );
+    let report = robot.report();
+    let stopped = SteerFlags::FAILSAFE
+        .with(SteerFlags::ABORTED)
+        .with(SteerFlags::EXDE_OK);
+    assert!(report.flags.contains(stopped), "{report:?}");
+    assert_eq!(report.finished_seq, seq);
+    // Renewed and on tape again: only another command counts.
+    robot.place(0.0);
+    robot.rig.take_motor_changes();
+    robot.run(Duration::from_millis(1_000));
+    assert_eq!(robot.rig.take_motor_changes(), []);
+    robot.wheels(WheelCommand::ActiveForward);
+    robot.run(Duration::from_millis(100));
+    assert_ne!(robot.rig.duties(), [0, 0]);
+    assert!(!robot.report().flags.contains(SteerFlags::FAILSAFE));
 }
 
 #[test]

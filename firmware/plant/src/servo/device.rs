@@ -26,6 +26,15 @@ pub(super) struct Servo {
     pub(super) position: f64,
     /// The lowest position the joint can get to now, when something is in the way.
     pub(super) stop: f64,
+    /// Where the joint sinks to without torque, and how many units in a second.
+    pub(super) sags: Option<Sag>,
+}
+
+/// How a joint gives way without torque.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sag {
+    pub(super) to: f64,
+    pub(super) units_per_s: f64,
 }
 
 impl Servo {
@@ -36,6 +45,7 @@ impl Servo {
             registered: None,
             position: f64::from(position),
             stop: 0.0,
+            sags: None,
         };
         for (address, value) in [
             (MODEL_NUMBER_L, MODEL_AX12),
@@ -70,14 +80,36 @@ impl Servo {
         self.table[at..at + 2].copy_from_slice(&value.to_le_bytes());
     }
 
+    /// Has torque and its goal where it is.
+    pub(super) fn hold(&mut self, position: u16) {
+        self.set_word(GOAL_POSITION_L, position);
+        self.table[usize::from(TORQUE_ENABLE)] = 1;
+        self.publish(0.0, 0.0);
+    }
+
+    pub(super) fn has_torque(&self) -> bool {
+        self.table[usize::from(TORQUE_ENABLE)] != 0
+    }
+
+    /// Sinks for `seconds` under what hangs on the joint.
+    pub(super) fn sag(&mut self, seconds: f64) {
+        let Some(Sag { to, units_per_s }) = self.sags else {
+            return;
+        };
+        let most = units_per_s * seconds;
+        let before = self.position;
+        self.position += (to - before).clamp(-most, most);
+        self.publish((self.position - before) / seconds, 0.0);
+    }
+
     pub(super) fn step(&mut self, seconds: f64) {
-        if self.table[usize::from(TORQUE_ENABLE)] == 0 {
-            self.publish(0.0, 0.0);
+        if !self.has_torque() {
+            self.rest();
             return;
         }
         let goal = f64::from(self.word(GOAL_POSITION_L));
         if goal == self.position && self.position >= self.stop {
-            self.publish(0.0, 0.0);
+            self.rest();
             return;
         }
         let speed = match self.word(GOAL_SPEED_L) & 0x03FF {
@@ -97,6 +129,14 @@ impl Servo {
             (missing.signum() * 60.0).clamp(-torque, torque)
         };
         self.publish((self.position - before) / seconds, load);
+    }
+
+    /// It stands, and pushes against nothing; nothing to tell if the table says so already.
+    fn rest(&mut self) {
+        let moves = self.table[usize::from(MOVING)] != 0;
+        if moves || self.word(PRESENT_LOAD_L) != 0 {
+            self.publish(0.0, 0.0);
+        }
     }
 
     /// Writes what was measured into the table.

@@ -3,7 +3,7 @@
 //! Each servo has the control table of the original's listing (A3) and answers the bytes it is
 //! sent as the real one does: after its return delay, at 1 Mbit/s, and not at all when it is
 //! broadcast to or its return level forbids it. It moves at its goal speed, and pushes harder
-//! the farther it is kept from its goal.
+//! the farther it is kept from its goal. Without torque, shoulder and elbow sink.
 //!
 //! ```text
 //!  board  | FF FF id .. sum |
@@ -18,12 +18,20 @@ mod device;
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use device::Servo;
-use lager_ax12::table::{GOAL_POSITION_L, ID, RETURN_DELAY_TIME};
+use device::{Sag, Servo};
+use lager_ax12::table::{ID, MAX_POSITION, RETURN_DELAY_TIME};
 use lager_ax12::{BROADCAST_ID, ErrorBits, Frame, Instruction, InstructionDecoder, Packet};
 
 use crate::arm::SERVOS;
+use crate::make::Make;
+use crate::noise::Noise;
 
+/// The joints that carry weight, as the indices of their two mirrored servos.
+const PAIRS: [[usize; 2]; 2] = [[1, 2], [3, 4]];
+/// Where such a joint comes to lie, as the position of its first servo.
+const LYING: f64 = 300.0;
+/// How fast it sinks, in units of position a second.
+const SAGS: [f64; 2] = [10.0, 80.0];
 /// Time of one byte at 1 Mbit/s.
 const BYTE_NS: u64 = 10_000;
 
@@ -60,6 +68,19 @@ impl ServoBus {
             free_ns: 0,
             collisions: 0,
         }
+    }
+
+    /// Servos whose joints sink without torque, as those of a worn arm do.
+    pub fn sagging(positions: [u16; SERVOS], mut noise: Noise, make: Make) -> Self {
+        let mut bus = Self::new(positions);
+        for [servo, mirrored] in PAIRS {
+            let units_per_s = make.draw(&mut noise, 0.0, SAGS[0], SAGS[1]);
+            let to = LYING;
+            bus.servos[servo].sags = Some(Sag { to, units_per_s });
+            let to = f64::from(MAX_POSITION) - LYING;
+            bus.servos[mirrored].sags = Some(Sag { to, units_per_s });
+        }
+        bus
     }
 
     /// The board sends `bytes` from `now` on.
@@ -110,11 +131,19 @@ impl ServoBus {
             .map(|(at, _)| Duration::from_nanos(*at))
     }
 
-    /// Moves all servos for `seconds`; the claw cannot close beyond `claw_stop`.
+    /// Moves all servos for `seconds`; the claw cannot close beyond `claw_stop`. A joint sinks
+    /// when neither of its two servos has torque.
     pub fn step(&mut self, seconds: f64, claw_stop: f64) {
         self.servos[SERVOS - 1].stop = claw_stop;
         for servo in &mut self.servos {
             servo.step(seconds);
+        }
+        for pair in PAIRS {
+            if pair.iter().all(|servo| !self.servos[*servo].has_torque()) {
+                for servo in pair {
+                    self.servos[servo].sag(seconds);
+                }
+            }
         }
     }
 
@@ -123,12 +152,11 @@ impl ServoBus {
         core::array::from_fn(|index| self.servos[index].position)
     }
 
-    /// Puts the servos somewhere; those with torque then hold that position.
+    /// Puts the servos somewhere, where they hold themselves with torque.
     pub fn set_positions(&mut self, positions: [u16; SERVOS]) {
         for (servo, position) in self.servos.iter_mut().zip(positions) {
             servo.position = f64::from(position);
-            servo.set_word(GOAL_POSITION_L, position);
-            servo.publish(0.0, 0.0);
+            servo.hold(position);
         }
     }
 
@@ -205,7 +233,9 @@ fn nanoseconds(time: Duration) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lager_ax12::table::{CCW_ANGLE_LIMIT_L, PRESENT_LOAD_L, PRESENT_POSITION_L, RETURN_LEVEL};
+    use lager_ax12::table::{
+        CCW_ANGLE_LIMIT_L, GOAL_POSITION_L, PRESENT_LOAD_L, PRESENT_POSITION_L, RETURN_LEVEL,
+    };
 
     fn bus() -> ServoBus {
         ServoBus::new([512; SERVOS])
@@ -374,6 +404,25 @@ mod tests {
         let answer = ask(&mut bus, &Frame::ping(2));
         assert_eq!(answer, [0xFF, 0xFF, 0x02, 0x02, 0x00, !0xFB]);
         assert_eq!(ask(&mut bus, &Frame::ping(3))[4], 0);
+    }
+
+    #[test]
+    fn a_joint_without_torque_sinks_until_one_of_its_servos_has_it() {
+        let mut bus = ServoBus::sagging([512; SERVOS], Noise::new(1, 1), Make::Varied);
+        run(&mut bus, 1_000, 0.0);
+        let [base, shoulder, mirrored, ..] = bus.positions();
+        assert_eq!(base, 512.0);
+        assert!(shoulder < 505.0 && shoulder > 430.0, "{shoulder}");
+        assert!((512.0 - shoulder - (mirrored - 512.0)).abs() < 1e-6);
+        let goal = 500_u16.to_le_bytes();
+        ask(&mut bus, &Frame::write(2, GOAL_POSITION_L, &goal).unwrap());
+        let held = bus.positions()[2];
+        run(&mut bus, 1_000, 0.0);
+        assert_eq!(bus.positions()[1], 500.0);
+        assert_eq!(bus.positions()[2], held);
+        // The elbow goes on to where it lies.
+        run(&mut bus, 30_000, 0.0);
+        assert_eq!(bus.positions()[3], LYING);
     }
 
     #[test]

@@ -19,23 +19,40 @@
 //!   never carried out again, its end is told again.
 //! * **Lease**: [`LEASE`] from the moment given with the order. Only the order's own renewals
 //!   extend it.
-//! * **Setpoints and one-shots**: a setpoint (drive, standby) is a level. When it lapses, is
-//!   stopped or loses its mode, a later renewal of the same id is taken up again once it is
-//!   allowed. A one-shot (turn, arm step) is an event: however it ended, its id is used up.
+//! * **Setpoints and one-shots**: a setpoint (drive, standby) is a level. A one-shot (turn, arm
+//!   step) is an event: however it ended, its id is used up.
+//! * **Nothing comes back by itself.** A person's order counts when it is given or never: if it is
+//!   not allowed then, or ends by whatever (lease, stop, mode, a board that was reset or away),
+//!   its id is used up and a renewal moves nothing. Logic, which knows what it does when it goes
+//!   on, has its setpoint taken up again once it is allowed.
+//! * **No motion unseen**: unless the steering board has reported within [`REPORT_DEADLINE`],
+//!   whatever moves ends and nobody may move anything. An original board does not report, nor has
+//!   it a limit on a command's age, so it is told standby only, unless that was accepted
+//!   ([`Arbiter::drive_original_boards`]).
 //! * **The newest order takes over**, as the board's command register has it (T2). A one-shot
 //!   that is replaced while it runs is reported as aborted; queueing is the external computer's
 //!   task (C5).
-//! * **Stop** latches, whoever sent it, until [`Arbiter::resume_from_stop`].
+//! * **Stop** latches until [`Arbiter::resume_from_stop`]; standby is repeated meanwhile, to an
+//!   original board as well.
 //! * **Mode**: in manual mode the operator drives and logic is ignored; in autonomous mode logic
 //!   drives and the operator may stop, and may move the arm while logic's order in force is a
 //!   standby with `arm_granted` (L10). Quarter turns and the drop are logic's alone (AMB-2,
 //!   AMB-27). An arm order while a wheel command moves the robot is refused (AMB-28).
+//! * **The arm waits for its profile**: until the steering board obeys the limits it was told, an
+//!   arm order is held, and refused where the board does not take them.
+//! * **Following may end**: the board gives it up by itself when it has lost its line. That is the
+//!   end of the order; only a new id follows again.
 //! * **Sequence bytes** are 1..=255; a one-shot never gets the one the board last reported as
 //!   finished. The board tells the same sequence byte from a new one, so a re-sent command renews
 //!   and does not repeat.
 
+mod driven;
+mod ending;
+mod kept;
+mod lease;
 mod ledger;
 mod orders;
+mod silence;
 #[cfg(test)]
 mod tests;
 mod verdict;
@@ -43,56 +60,36 @@ mod wire;
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Health, Mode, Origin, SteeringReport};
+use lager_topics::{Mode, Refusal};
 use lager_wire::{Command, SteerCommand, Version, WheelCommand};
 
+use driven::Driven;
+pub use lease::LEASE;
+use lease::Lease;
 use ledger::Ledger;
 pub use ledger::{Ended, OrderKey};
-pub use verdict::{Ignored, Refused, Verdict};
+pub use verdict::Verdict;
 
-/// How long an order holds after its origin's last word, in robot time.
-pub const LEASE: Duration = Duration::from_millis(120);
+/// How long the steering board may be unheard before nobody may move anything, in robot time.
+pub const REPORT_DEADLINE: Duration = Duration::from_millis(200);
+
+/// Within what time of being given a person's order is begun or never, in robot time: a process
+/// that was held up for longer must not move the robot when it goes on.
+pub const STALE: Duration = Duration::from_secs(1);
 
 /// How often the command in force is written again to a version-1 board, so that its age stays
 /// below the board's limit of 150 ms.
 pub const RESEND: Duration = Duration::from_millis(40);
 
-/// How long an order in force still holds.
+/// Whether the arm may be moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Lease {
-    /// Until this moment.
-    Until(Duration),
-    /// Taken up from an earlier life of the bridge: nothing is written for it until its origin
-    /// renews it, and it lapses at this moment (known after the first `advance`).
-    Unclaimed(Option<Duration>),
-}
-
-impl Lease {
-    fn is_over(self, now: Duration) -> bool {
-        self.end().is_some_and(|end| end <= now)
-    }
-
-    fn end(self) -> Option<Duration> {
-        match self {
-            Self::Until(end) => Some(end),
-            Self::Unclaimed(end) => end,
-        }
-    }
-
-    fn renew(&mut self, received: Duration) {
-        let end = received + LEASE;
-        *self = match *self {
-            Self::Until(earlier) => Self::Until(earlier.max(end)),
-            Self::Unclaimed(_) => Self::Until(end),
-        };
-    }
-
-    /// Gives an unclaimed lease its end, counted from the first moment the arbiter is told.
-    fn start(&mut self, now: Duration) {
-        if *self == Self::Unclaimed(None) {
-            *self = Self::Unclaimed(Some(now + LEASE));
-        }
-    }
+pub enum ArmGate {
+    /// It may.
+    Open,
+    /// Not yet: the board is being told its limits.
+    Held,
+    /// No: the board does not take them.
+    Shut,
 }
 
 /// The order in force.
@@ -137,13 +134,26 @@ pub struct Arbiter {
     grant: Option<Grant>,
     last: Option<Ended>,
     ledger: Ledger,
-    /// The orders last ignored, by origin, so that each is counted once.
-    ignored: [Option<OrderKey>; 2],
+    /// Logic's order that was ignored last, and why, so that it is counted once.
+    ignored: Option<(OrderKey, Refusal)>,
     orders_refused: u32,
+    /// The order refused or ignored last, and why.
+    refused: Option<(OrderKey, Refusal)>,
     leases_expired: u32,
+    driven: Driven,
     revision: u32,
 
+    original_boards: bool,
     board: Option<Version>,
+    /// A board has been up in this life of the arbiter.
+    has_met_board: bool,
+    /// When the board last came up or reported.
+    reported: Option<Duration>,
+    /// The board is up and has not reported in time.
+    silent: bool,
+    /// What the board has against anybody's moving, when it was last looked at.
+    objection: Refusal,
+    arm: ArmGate,
     /// Some earlier life of this link is known, so the board knows our last sequence byte.
     acquainted: bool,
     /// A standby to be written before anything else.
@@ -179,11 +189,19 @@ impl Arbiter {
             grant: None,
             last: None,
             ledger: Ledger::default(),
-            ignored: [None; 2],
+            ignored: None,
             orders_refused: 0,
+            refused: None,
             leases_expired: 0,
+            driven: Driven::default(),
             revision: 0,
+            original_boards: false,
             board: None,
+            has_met_board: false,
+            reported: None,
+            silent: false,
+            objection: Refusal::NoBoard,
+            arm: ArmGate::Open,
             acquainted: false,
             prelude: None,
             wire_seq: 0,
@@ -196,68 +214,23 @@ impl Arbiter {
         }
     }
 
-    /// Goes on where an earlier life of the bridge ended: mode, latch, counters, and which order
-    /// belongs to which sequence byte.
-    ///
-    /// Nothing is written for the order in force until its origin renews it; if nobody does
-    /// within [`LEASE`], it lapses. Until then the board's own limit of 150 ms protects.
-    pub fn resume(kept: &Health) -> Self {
-        let mut arbiter = Self {
-            mode: kept.mode.get().unwrap_or(Mode::Manual),
-            stopped: kept.stopped != 0,
-            orders_refused: kept.orders_refused,
-            leases_expired: kept.leases_expired,
-            acquainted: kept.wire_seq != 0,
-            wire_seq: kept.wire_seq,
-            ..Self::new()
-        };
-        // One setpoint may have been written and not told: its sequence byte is not used again.
-        arbiter.next_seq();
-        arbiter.idle_seq = arbiter.wire_seq;
-        let finish = kept.finish.get().unwrap_or(Finish::None);
-        if let (Some(origin), false) = (kept.finished_origin.get(), finish == Finish::None) {
-            let key = OrderKey {
-                origin,
-                id: kept.finished_id,
-            };
-            let ended = Ended { key, finish };
-            arbiter.last = Some(ended);
-            arbiter.ledger.enter(ended);
-        }
-        let current = Command::from_code(kept.current_code).zip(kept.current_origin.get());
-        if let (Some((command, origin)), false) = (current, arbiter.stopped) {
-            let key = OrderKey {
-                origin,
-                id: kept.current_id,
-            };
-            arbiter.running = Some(Running {
-                key,
-                command,
-                seq: kept.wire_seq,
-                arm_granted: false,
-                lease: Lease::Unclaimed(None),
-                held_until: None,
-                written: Some(Duration::ZERO),
-                search: None,
-            });
-            if arbiter.mode == Mode::Autonomous && origin == Origin::Operator {
-                arbiter.grant = Some(Grant {
-                    key: None,
-                    lease: Lease::Unclaimed(None),
-                });
-            }
-        }
-        arbiter
+    /// Lets an original steering board be driven, which has no limit on a command's age: if this
+    /// process dies, such a board goes on with what it was told last.
+    pub fn drive_original_boards(&mut self, accepted: bool) {
+        self.original_boards = accepted;
     }
 
     /// Latches the stop: whatever runs is aborted, and nothing drives until
     /// [`Arbiter::resume_from_stop`].
+    ///
+    /// Standby is due at once, also where a stop is latched already or the driver took nothing.
     pub fn stop(&mut self) {
-        if self.stopped {
-            return;
+        self.retry_at = None;
+        self.next_send = Duration::ZERO;
+        if !self.stopped {
+            self.stopped = true;
+            self.quiet();
         }
-        self.stopped = true;
-        self.quiet();
     }
 
     /// Releases the latch. Nothing moves by that alone: an origin must renew or give an order.
@@ -274,6 +247,31 @@ impl Arbiter {
             self.mode = mode;
             self.quiet();
         }
+    }
+
+    /// Lets time pass, once in each turn, after all that has come was handed in and before
+    /// [`Arbiter::poll`]: leases and the report's deadline end, and what the board's side waits for.
+    pub fn advance(&mut self, now: Duration) {
+        self.count_driven(now);
+        self.watch_board(now);
+        if let Some(running) = &mut self.running {
+            running.lease.start(now);
+        }
+        if let Some(grant) = &mut self.grant {
+            grant.lease.start(now);
+        }
+        self.expire(now);
+        self.advance_board(now);
+    }
+
+    /// Counts what a person has driven until `now`.
+    fn count_driven(&mut self, now: Duration) {
+        self.driven.advance(now, self.mode == Mode::Manual);
+    }
+
+    /// Says whether the arm may be moved, from the next order on.
+    pub fn set_arm_gate(&mut self, arm: ArmGate) {
+        self.arm = arm;
     }
 
     /// Shuts down: whatever runs is aborted, and only standby is written from now on, at short
@@ -293,6 +291,17 @@ impl Arbiter {
     /// Whether a stop is latched.
     pub fn is_stopped(&self) -> bool {
         self.stopped
+    }
+
+    /// Why nobody may move anything at present; of the board as of the last [`Arbiter::advance`].
+    pub fn blocked(&self) -> Refusal {
+        if self.parked {
+            Refusal::ShuttingDown
+        } else if self.stopped {
+            Refusal::StopLatched
+        } else {
+            self.objection
+        }
     }
 
     /// The order in force and its command.
@@ -318,95 +327,6 @@ impl Arbiter {
     /// replaced a setpoint and nothing else has changed, one write may come before.
     pub fn revision(&self) -> u32 {
         self.revision
-    }
-
-    /// Writes the arbiter's part of `link/health`: all that [`Arbiter::resume`] needs.
-    pub fn fill(&self, now: Duration, health: &mut Health) {
-        health.mode = self.mode.into();
-        health.stopped = self.stopped.into();
-        health.orders_refused = self.orders_refused;
-        health.leases_expired = self.leases_expired;
-        health.wire_seq = self.wire_seq;
-        let none = OrderKey {
-            origin: Origin::Logic,
-            id: 0,
-        };
-        let running = self.running;
-        let current = running.map_or(none, |running| running.key);
-        health.current_id = current.id;
-        health.current_origin = current.origin.into();
-        health.current_code = running.map_or(0, |running| running.command.code());
-        health.next_lease_ms = running
-            .and_then(|running| running.lease.end())
-            .map_or(0, |end| {
-                let left = end.saturating_sub(now).as_millis();
-                u16::try_from(left).unwrap_or(u16::MAX)
-            });
-        let last = self.last.unwrap_or(Ended {
-            key: none,
-            finish: Finish::None,
-        });
-        health.finished_id = last.key.id;
-        health.finished_origin = last.key.origin.into();
-        health.finish = last.finish.into();
-    }
-
-    /// Writes the arbiter's part of `steering/state`: which order runs and which ended last.
-    pub fn fill_report(&self, report: &mut SteeringReport) {
-        let mut health = Health::default();
-        self.fill(Duration::ZERO, &mut health);
-        report.current_id = health.current_id;
-        report.current_origin = health.current_origin;
-        report.finished_id = health.finished_id;
-        report.finished_origin = health.finished_origin;
-        report.finish = health.finish;
-    }
-
-    /// Ends what runs, with nothing in its place.
-    fn quiet(&mut self) {
-        self.grant = None;
-        if self.running.is_some() {
-            self.finish_running(Finish::Aborted);
-        }
-        self.idle_seq = self.next_seq();
-        self.revision = self.revision.wrapping_add(1);
-    }
-
-    /// Ends the order in force; logic's standby below it comes back if there is one.
-    fn finish_running(&mut self, finish: Finish) {
-        let Some(over) = self.running.take() else {
-            return;
-        };
-        if over.command.is_one_shot() || finish == Finish::Refused {
-            let key = over.key;
-            self.ledger.enter(Ended { key, finish });
-        }
-        if over.command == STANDBY && finish != Finish::Refused {
-            self.idle_seq = over.seq;
-        } else {
-            self.last = Some(Ended {
-                key: over.key,
-                finish,
-            });
-            self.idle_seq = self.next_seq();
-        }
-        if let Some(Grant {
-            key: Some(key),
-            lease,
-        }) = self.grant.take()
-        {
-            self.running = Some(Running {
-                key,
-                command: STANDBY,
-                seq: self.idle_seq,
-                arm_granted: true,
-                lease,
-                held_until: None,
-                written: None,
-                search: None,
-            });
-        }
-        self.revision = self.revision.wrapping_add(1);
     }
 }
 

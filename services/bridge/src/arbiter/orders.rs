@@ -5,34 +5,35 @@
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Mode, OrderKind, Origin, SteeringOrder};
+use lager_topics::{Finish, Mode, Origin, Refusal, SteeringOrder};
 use lager_wire::{ArmCommand, Command, WheelCommand};
 
-use super::{Arbiter, Ended, Grant, Ignored, Lease, OrderKey, Refused, STANDBY, Verdict, moves};
+use super::lease::Lease;
+use super::ledger::{Ended, OrderKey};
+use super::verdict::Verdict;
+use super::{Arbiter, ArmGate, Grant, Running, STALE, STANDBY, moves};
 
 impl Arbiter {
-    /// Takes one order that its origin gave at `received` (robot time, at most the present).
+    /// Takes one order that its origin sent at `sent` and, if it is a person's, first gave at
+    /// `given` (robot time, at most the present).
     ///
     /// Hand in everything that has arrived before asking [`Arbiter::poll`] for what to write:
-    /// then a stop anywhere in the batch wins, and of several setpoints only the last is written.
-    pub fn order(&mut self, received: Duration, order: &SteeringOrder) -> Verdict {
-        self.advance(received);
-        let (Some(origin), Some(kind)) = (order.origin.get(), order.kind.get()) else {
+    /// then of several setpoints only the last is written.
+    pub fn order(&mut self, sent: Duration, given: Duration, order: &SteeringOrder) -> Verdict {
+        // It finds in force what was in force when it was sent.
+        self.expire(sent);
+        let Some(origin) = order.origin.get() else {
             self.count_refused();
-            return Verdict::Refused(Refused::Undefined);
+            return Verdict::Refused(Refusal::Undefined);
         };
-        if kind == OrderKind::Stop {
-            self.stop();
-            return Verdict::Stopped;
-        }
         let key = OrderKey {
             origin,
             id: order.id,
         };
         if self.parked {
-            return Verdict::Ignored(Ignored::ShuttingDown);
+            return Verdict::Ignored(Refusal::ShuttingDown);
         }
-        if let Some(verdict) = self.renew(received, key, order) {
+        if let Some(verdict) = self.renew(sent, key, order) {
             return verdict;
         }
         if let Some(ended) = self.ledger.find(key) {
@@ -40,9 +41,15 @@ impl Arbiter {
             return Verdict::Ended(ended.finish);
         }
         let Some(command) = Command::from_code(order.code) else {
-            return self.refuse(key, Refused::Undefined);
+            return self.refuse(key, Refusal::Undefined);
         };
-        self.judge(received, key, command, order.arm_granted != 0)
+        if let Some(verdict) = self.objection(sent, given, key, command) {
+            return verdict;
+        }
+        let as_guest = self.mode == Mode::Autonomous && origin == Origin::Operator;
+        self.make_way(as_guest);
+        self.begin(sent, key, command, order.arm_granted != 0);
+        Verdict::Executes
     }
 
     /// Renews the order in force or the grant below it; `None` if `key` is neither.
@@ -54,8 +61,8 @@ impl Arbiter {
     ) -> Option<Verdict> {
         if let Some(running) = self.running.as_mut().filter(|running| running.key == key) {
             if running.command.code() != order.code {
-                self.count_refused();
-                return Some(Verdict::Refused(Refused::CodeChanged));
+                self.note_refusal(key, Refusal::CodeChanged);
+                return Some(Verdict::Refused(Refusal::CodeChanged));
             }
             running.arm_granted = order.arm_granted != 0;
             let claimed = matches!(running.lease, Lease::Unclaimed(_));
@@ -85,37 +92,56 @@ impl Arbiter {
         Some(Verdict::Renewed)
     }
 
-    /// Decides on an order that is not in force and has not ended.
-    fn judge(
+    /// What is to be said against an order that is not in force and has not ended.
+    fn objection(
         &mut self,
-        received: Duration,
+        sent: Duration,
+        given: Duration,
         key: OrderKey,
         command: Command,
-        arm_granted: bool,
-    ) -> Verdict {
+    ) -> Option<Verdict> {
         let logic_only = matches!(
             command,
             Command::Wheel(WheelCommand::LeftPerp | WheelCommand::RightPerp)
                 | Command::Arm(ArmCommand::Drop)
         );
-        if logic_only && key.origin == Origin::Operator {
-            return self.refuse(key, Refused::LogicOnly);
-        }
         let is_arm = matches!(command, Command::Arm(_));
-        let as_guest = match (self.mode, key.origin) {
-            (Mode::Manual, Origin::Operator) | (Mode::Autonomous, Origin::Logic) => false,
-            (Mode::Autonomous, Origin::Operator) if is_arm && self.arm_is_granted() => true,
-            _ => return self.ignore(key, Ignored::NotInCharge),
+        let by_person = key.origin == Origin::Operator;
+        let in_charge = match self.mode {
+            Mode::Manual => by_person,
+            Mode::Autonomous => !by_person || (is_arm && self.arm_is_granted()),
         };
-        if self.stopped {
-            return self.ignore(key, Ignored::StopLatched);
-        }
-        if is_arm && self.running.is_some_and(|running| moves(running.command)) {
-            return self.refuse(key, Refused::ArmLocked);
-        }
-        self.make_way(as_guest);
-        self.begin(received, key, command, arm_granted);
-        Verdict::Executes
+        let board = self.board_objection(sent).filter(|_| command != STANDBY);
+        // What a person may not do now he must want again; logic's renewals may count later.
+        let why = if logic_only && by_person {
+            Refusal::LogicOnly
+        } else if !in_charge {
+            Refusal::NotInCharge
+        } else if self.stopped {
+            Refusal::StopLatched
+        } else if by_person && sent.saturating_sub(given) > STALE {
+            Refusal::Stale
+        } else if let Some(why) = board {
+            why
+        } else if is_arm && self.running.is_some_and(|running| moves(running.command)) {
+            return Some(self.refuse(key, Refusal::ArmLocked));
+        } else if is_arm && self.arm == ArmGate::Shut {
+            return Some(self.refuse(key, Refusal::ArmUnlimited));
+        } else {
+            return None;
+        };
+        Some(if by_person {
+            self.refuse(key, why)
+        } else {
+            self.ignore(key, why)
+        })
+    }
+
+    /// Whether the order in force ends when the steering board comes up again: a person's does,
+    /// unless it was taken up from an earlier life of the bridge and the board has not been reset.
+    pub(super) fn ends_with_the_link(&self, rebooted: bool) -> bool {
+        let by_person = |running: Running| running.key.origin == Origin::Operator;
+        (rebooted || self.has_met_board) && self.running.is_some_and(by_person)
     }
 
     /// Whether logic stands and lets the operator move the arm.
@@ -132,7 +158,7 @@ impl Arbiter {
     fn make_way(&mut self, for_guest: bool) {
         if for_guest && self.grant.is_none() {
             if let Some(base) = self.running.take() {
-                self.idle_seq = base.seq;
+                self.stand_on(&base);
                 self.grant = Some(Grant {
                     key: Some(base.key),
                     lease: base.lease,
@@ -162,9 +188,7 @@ impl Arbiter {
                     finish,
                 });
             }
-            if old.command == STANDBY {
-                self.idle_seq = old.seq;
-            }
+            self.stand_on(&old);
         }
     }
 
@@ -176,8 +200,8 @@ impl Arbiter {
         }
     }
 
-    fn refuse(&mut self, key: OrderKey, why: Refused) -> Verdict {
-        self.count_refused();
+    fn refuse(&mut self, key: OrderKey, why: Refusal) -> Verdict {
+        self.note_refusal(key, why);
         let ended = Ended {
             key,
             finish: Finish::Refused,
@@ -187,13 +211,18 @@ impl Arbiter {
         Verdict::Refused(why)
     }
 
-    fn ignore(&mut self, key: OrderKey, why: Ignored) -> Verdict {
-        let slot = &mut self.ignored[usize::from(key.origin == Origin::Operator)];
-        if *slot != Some(key) {
-            *slot = Some(key);
-            self.count_refused();
+    /// Counts an ignored order once.
+    fn ignore(&mut self, key: OrderKey, why: Refusal) -> Verdict {
+        if self.ignored != Some((key, why)) {
+            self.ignored = Some((key, why));
+            self.note_refusal(key, why);
         }
         Verdict::Ignored(why)
+    }
+
+    fn note_refusal(&mut self, key: OrderKey, why: Refusal) {
+        self.refused = Some((key, why));
+        self.count_refused();
     }
 
     fn count_refused(&mut self) {

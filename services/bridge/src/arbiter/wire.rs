@@ -1,14 +1,16 @@
 //! The arbiter's other side: what is written to the steering board, and what its reports mean.
 //!
 //! It is apart from the judgement of orders because it knows the board (its version, its flags,
-//! its sequence byte) and nothing of origins and modes.
+//! its sequence bytes) and nothing of origins and modes.
 
 use core::time::Duration;
 
 use lager_topics::Finish;
 use lager_wire::{ArmCommand, Command, SteerCommand, SteerData, SteerFlags, Version, WheelCommand};
 
-use super::{Arbiter, LEASE, Lease, RESEND, Running, STANDBY, Search, moves};
+use super::lease::{LEASE, Lease};
+use super::ledger::OrderKey;
+use super::{Arbiter, ArmGate, RESEND, Running, STANDBY, Search, moves};
 
 /// How long the wheels are in standby on the wire before an arm command follows: the board
 /// unlocks its arm in standby only (T4), and one pass of its loop must have seen it.
@@ -32,18 +34,23 @@ const PARKED_RESEND: Duration = Duration::from_millis(20);
 impl Arbiter {
     /// The steering board's link is up. `rebooted`: the board has lost what it was told.
     ///
-    /// A setpoint goes on under a new sequence byte. A one-shot that was written is not written
-    /// again: it is looked for in the board's reports and is aborted if it is not there.
+    /// Logic's setpoint goes on under a new sequence byte; a person's ends, unless it was taken up
+    /// from an earlier life of the bridge and the board has not been reset. A one-shot that was
+    /// written is not written again: it is looked for in the board's reports and is aborted if it
+    /// is not there.
     pub fn board_up(&mut self, now: Duration, version: Version, rebooted: bool) {
-        self.advance(now);
+        let ends = self.ends_with_the_link(rebooted);
+        self.has_met_board = true;
         self.board = Some(version);
+        self.reported = Some(now);
         self.board_finished = None;
         self.written = None;
         self.halted_at = None;
         self.next_send = now;
-        if !self.acquainted && version == Version::One {
+        if (!self.acquainted || rebooted) && version == Version::One {
             // The board may be executing any sequence byte of a bridge nobody remembers: of two
-            // different ones, at least one is new to it.
+            // different ones, at least one is new to it. One that has just started keeps its arm
+            // locked until it has been told a standby (T4).
             self.acquainted = true;
             self.prelude = Some(standby(self.next_seq()));
         }
@@ -56,12 +63,14 @@ impl Arbiter {
                     self.search(now);
                 }
             }
+            Some(_) if ends => self.finish_running(Finish::Aborted),
             Some(_) => {
                 self.idle_seq = self.next_seq();
                 self.reseat();
             }
             None => self.idle_seq = self.next_seq(),
         }
+        self.watch_board(now);
         self.revision = self.revision.wrapping_add(1);
     }
 
@@ -73,24 +82,38 @@ impl Arbiter {
     }
 
     /// Takes a report of the steering board: its last finished sequence byte becomes the end of
-    /// an order. The reports of an original board mean nothing that is documented and are
-    /// ignored.
+    /// an order. The reports of an original board show that it is there; what they say is not
+    /// documented and is ignored.
     pub fn observe(&mut self, now: Duration, report: &SteerData) {
-        self.advance(now);
+        if self.board.is_none() {
+            return;
+        }
+        // What was over before the report came is not saved by it.
+        self.watch_board(now);
+        self.expire(now);
+        self.reported = self.reported.max(Some(now));
         if self.board != Some(Version::One) {
             return;
         }
+        self.count_driven(now);
+        self.driven.report(now, report.left_duty, report.right_duty);
         self.board_finished = Some(report.finished_seq);
         let Some(running) = self.running else {
             return;
         };
         let refused = report.flags.contains(SteerFlags::REFUSED);
+        let gave_up = SteerFlags::ABORTED.with(SteerFlags::FAILSAFE);
+        let given_up = !running.command.is_one_shot() && report.flags.contains(gave_up);
         if report.finished_seq == running.seq
             && running.written.is_some()
-            && (refused || running.command.is_one_shot())
+            && (refused || given_up || running.command.is_one_shot())
         {
             let finish = if refused {
                 Finish::Refused
+            } else if given_up && report.flags.contains(SteerFlags::EXDE_OK) {
+                Finish::NoTape
+            } else if given_up {
+                Finish::NoWord
             } else if report.flags.contains(SteerFlags::ABORTED) {
                 Finish::Aborted
             } else {
@@ -111,33 +134,9 @@ impl Arbiter {
         }
     }
 
-    /// Lets time pass: leases end, held arm orders are released, one-shots of an original board
-    /// are taken for done.
-    pub fn advance(&mut self, now: Duration) {
-        if let Some(running) = self.running.as_mut() {
-            running.lease.start(now);
-        }
-        if let Some(grant) = self.grant.as_mut() {
-            grant.lease.start(now);
-            if grant.lease.is_over(now) {
-                // What the operator moved, he moved by logic's leave.
-                self.grant = None;
-                self.lapse();
-            }
-        }
-        if self
-            .running
-            .is_some_and(|running| running.lease.is_over(now))
-        {
-            self.lapse();
-            // The standby below a guest may have lapsed as well.
-            if self
-                .running
-                .is_some_and(|running| running.lease.is_over(now))
-            {
-                self.lapse();
-            }
-        }
+    /// Lets time pass on the board's side: held arm orders are released, one-shots of an original
+    /// board are taken for done, those looked for in vain for lost.
+    pub(super) fn advance_board(&mut self, now: Duration) {
         let Some(running) = self.running.as_mut() else {
             return;
         };
@@ -153,12 +152,13 @@ impl Arbiter {
         }
     }
 
-    /// What to write now, if anything; ask again until there is nothing.
+    /// What to write now, if anything; ask again until there is nothing. Time has passed before, by
+    /// [`Arbiter::advance`].
     ///
     /// A version-1 board is told a change at once and the command in force every [`RESEND`]; a
-    /// version-0 board, which would carry out a repetition, is told each command once.
+    /// version-0 board, which would carry out a repetition, is told each command once, and standby
+    /// as often as the other, since it has no other reason to stand.
     pub fn poll(&mut self, now: Duration) -> Option<SteerCommand> {
-        self.advance(now);
         let version = self.board?;
         if self.retry_at.is_some_and(|at| at > now) {
             return None;
@@ -171,7 +171,7 @@ impl Arbiter {
             return None;
         }
         let command = self.register();
-        let repeat = (version == Version::One || self.parked) && self.next_send <= now;
+        let repeat = self.repeats(command) && self.next_send <= now;
         if self.written == Some(command) && !repeat && !retry {
             return None;
         }
@@ -179,10 +179,14 @@ impl Arbiter {
         if moved && !code_moves(command.code) {
             self.halted_at = Some(now);
         }
+        if version == Version::Original {
+            self.driven.told(code_moves(command.code));
+        }
         self.written = Some(command);
         self.next_send = now + if self.parked { PARKED_RESEND } else { RESEND };
+        let held = self.is_held();
         if let Some(running) = self.running.as_mut()
-            && running.held_until.is_none()
+            && !held
         {
             running.written.get_or_insert(now);
         }
@@ -201,7 +205,7 @@ impl Arbiter {
         let writes = self.board.is_some() && self.may_write();
         let unwritten = writes && self.written != Some(self.register());
         let at_once = unwritten || (self.prelude.is_some() && self.board.is_some());
-        let repeats = self.board == Some(Version::One) || (self.parked && self.board.is_some());
+        let repeats = self.repeats(self.register());
         let write = if self.retry_at.is_some() {
             self.retry_at
         } else if at_once {
@@ -218,6 +222,7 @@ impl Arbiter {
                 (self.board == Some(Version::Original)).then_some(done)
             }),
             self.grant.and_then(|grant| grant.lease.end()),
+            self.silence_due(),
             write,
         ]
         .into_iter()
@@ -229,7 +234,7 @@ impl Arbiter {
     pub(super) fn begin(
         &mut self,
         received: Duration,
-        key: super::OrderKey,
+        key: OrderKey,
         command: Command,
         arm_granted: bool,
     ) {
@@ -254,6 +259,32 @@ impl Arbiter {
             search: None,
         });
         self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// Puts a standby of `key` in force that the board has been told, or is about to be.
+    pub(super) fn stand_for(&mut self, key: OrderKey, lease: Lease) {
+        self.running = Some(Running {
+            key,
+            command: STANDBY,
+            seq: self.idle_seq,
+            arm_granted: true,
+            lease,
+            held_until: None,
+            written: None,
+            search: None,
+        });
+    }
+
+    /// Nothing runs any more: the board is told a standby that is new to it.
+    pub(super) fn stand_anew(&mut self) {
+        self.idle_seq = self.next_seq();
+    }
+
+    /// The standby that is over is the one that the board goes on being told.
+    pub(super) fn stand_on(&mut self, over: &Running) {
+        if over.command == STANDBY {
+            self.idle_seq = over.seq;
+        }
     }
 
     /// The origin of an order taken up from an earlier life of the bridge has spoken.
@@ -318,31 +349,32 @@ impl Arbiter {
         }
     }
 
-    /// Nobody has renewed the order in force.
-    fn lapse(&mut self) {
-        if self
-            .running
-            .is_some_and(|running| running.command != STANDBY)
-        {
-            self.leases_expired = self.leases_expired.wrapping_add(1);
-        }
-        self.finish_running(Finish::Aborted);
-    }
-
     /// The command that belongs on the wire.
     fn register(&self) -> SteerCommand {
         match self.running {
-            Some(Running {
-                held_until: None,
-                command,
-                seq,
-                ..
-            }) => SteerCommand {
+            Some(Running { command, seq, .. }) if !self.is_held() => SteerCommand {
                 code: command.code(),
                 seq,
             },
             _ => standby(self.idle_seq),
         }
+    }
+
+    /// Whether the board is told a command again and again.
+    fn repeats(&self, command: SteerCommand) -> bool {
+        match self.board {
+            None => false,
+            Some(Version::One) => true,
+            Some(Version::Original) => command.code == STANDBY.code(),
+        }
+    }
+
+    /// Whether a standby goes out in place of the order in force, an arm order that has to wait.
+    fn is_held(&self) -> bool {
+        self.running.is_some_and(|running| {
+            let is_arm = matches!(running.command, Command::Arm(_));
+            running.held_until.is_some() || (is_arm && self.arm != ArmGate::Open)
+        })
     }
 
     /// Whether it is known what belongs on the wire.

@@ -1,8 +1,11 @@
 //! The way of an order: bus, arbiter, packet, board, and back as a report.
 
 use lager_ports::Cause;
-use lager_topics::{AskKind, Finish, Input, InputKind, Mode, OperatorInput, Origin, Outcome, Role};
-use lager_wire::{ArmCommand, Command, LineState, SteerFlags};
+use lager_topics::{
+    AskKind, Calibration, Finish, Health, Input, InputKind, Mode, OperatorInput, Outcome, Refusal,
+    Role, SteeringReport,
+};
+use lager_wire::{ArmCommand, Command, LineState, SettingStatus, SteerFlags};
 
 use crate::harness::{
     FOLLOW, FORWARD, LEFT_PERP, Robot, STANDBY, SensorBoard, SteeringBoard, logic, operator,
@@ -171,27 +174,21 @@ fn a_stop_latches_until_a_resume() {
 #[test]
 fn two_equal_turns_are_two_and_a_refresh_is_none() {
     let mut robot = Robot::autonomous();
-    for id in 1..=2 {
-        robot
-            .hands
-            .give_until(logic(id, LEFT_PERP), "the turn is done", |hands| {
-                hands.state.look().is_some_and(|state| {
-                    state.finished_id == id
-                        && state.finish.get() == Some(Finish::Done)
-                        && state.finished_origin.get() == Some(Origin::Logic)
-                })
-            });
+    let (mut id, mut turns) = (0, 0);
+    for _ in 0..2 {
+        let before = (id, turns);
+        id = robot.hands.carry_out(logic(id + 1, LEFT_PERP));
         let steering = &robot.steering;
         let commands = steering.with(|board| board.commands);
+        turns = steering.with(|board| board.count(LEFT_PERP));
+        let (tries, done) = ((id - before.0) as usize, turns - before.1);
+        assert!((1..=tries).contains(&done), "{done} turns for {tries}");
         robot
             .hands
             .give_until(logic(id, LEFT_PERP), "it is refreshed", |_| {
                 steering.with(|board| board.commands > commands + 5)
             });
-        assert_eq!(
-            robot.steering.with(|board| board.count(LEFT_PERP)),
-            id as usize
-        );
+        assert_eq!(robot.steering.with(|board| board.count(LEFT_PERP)), turns);
     }
 }
 
@@ -254,13 +251,29 @@ fn gains_are_set_and_refused_by_the_board() {
 
 #[test]
 fn a_calibration_is_answered_by_the_sensor_board_or_given_up() {
-    let robot = Robot::up();
+    let mut robot = Robot::up();
     let ask = Ask {
         kind: AskKind::Calibrate.into(),
         ..Ask::default()
     };
     assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::Done));
     assert_eq!(robot.sensor.with(|board| board.calibrations), 1);
+    for (sensors, status, end) in [
+        (11, SettingStatus::Accepted, Calibration::Done),
+        (4, SettingStatus::OutOfRange, Calibration::Partly),
+    ] {
+        assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::Done));
+        let running = |health: &Health| health.calibration == Calibration::Running;
+        let before = robot.hands.wait_for_health("it runs", running);
+        robot
+            .sensor
+            .with(|board| board.end_calibration(sensors, status));
+        let after = robot.hands.wait_for_health("its end is told", |health| {
+            health.calibrations_ended != before.calibrations_ended
+        });
+        assert_eq!(after.calibration, end);
+        assert_eq!(i16::from(after.calibrated_sensors), sensors);
+    }
     robot.sensor.with(|board| board.deaf = true);
     assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::NoBoard));
 }
@@ -317,30 +330,136 @@ fn settings_without_a_board_are_answered_so() {
 }
 
 #[test]
-fn the_switch_button_changes_the_mode() {
+fn each_press_of_the_switch_changes_the_mode_once() {
     let mut robot = Robot::up();
     let buttons = robot
         .isolation
         .open(Role::Operator)
         .publisher::<OperatorInput>()
         .unwrap();
-    for mode in [Mode::Autonomous, Mode::Manual] {
-        let kind = InputKind::SwitchPressed.into();
-        buttons
-            .send(
-                Cause::OWN,
-                Input {
-                    kind,
-                    ..Input::default()
-                },
-            )
-            .unwrap();
+    let press = |id| {
+        let input = Input {
+            kind: InputKind::SwitchPressed.into(),
+            id,
+            ..Input::default()
+        };
+        buttons.send(Cause::OWN, input).unwrap();
+    };
+    for (id, mode) in [(7, Mode::Autonomous), (8, Mode::Manual)] {
+        press(id);
         robot
             .hands
             .wait_for_health("the mode has changed", |health| {
                 health.mode.get() == Some(mode)
             });
+        // A repeated sample is no second press, nor is one without a number.
+        for repeated in [id, 7, 0] {
+            press(repeated);
+        }
+        let health = robot
+            .hands
+            .wait_for_health("it is known", |health| health.switch_ids[0] == id);
+        assert_eq!(health.mode.get(), Some(mode));
     }
+    press(9);
+    robot
+        .hands
+        .wait_for_health("the last press has come", |health| {
+            health.switch_ids[0] == 9
+        });
+    let health = robot.hands.health.look().unwrap();
+    assert_eq!(health.mode.get(), Some(Mode::Autonomous), "three presses");
+    assert_eq!(health.switch_ids, [9, 8, 7, 0]);
+}
+
+#[test]
+fn a_board_that_does_not_report_is_not_driven_and_its_last_report_grows_old() {
+    for logic_drives in [false, true] {
+        let mut robot = if logic_drives {
+            Robot::autonomous()
+        } else {
+            Robot::up()
+        };
+        let steering = &robot.steering;
+        let order = if logic_drives {
+            logic(1, FOLLOW)
+        } else {
+            operator(1, FORWARD)
+        };
+        let fresh = |state: &SteeringReport| state.left_duty == 100 && state.age_ms < 200;
+        robot.hands.give_until(order, "the wheels turn", |hands| {
+            hands.state.look().is_some_and(|state| fresh(&state))
+        });
+        robot.hands.state.drain();
+        steering.with(|board| board.mute = true);
+        robot.hands.give_until(order, "the wheels stand", |_| {
+            steering.with(|board| !board.moves())
+        });
+        assert!(
+            steering.with(|board| !board.failsafe),
+            "the bridge halted the robot, not the board"
+        );
+        let health = robot.hands.wait_for_health("people see why", |health| {
+            health.blocked.get() == Some(Refusal::BoardSilent)
+        });
+        assert_eq!(health.steering.up, 1, "its link is up all the same");
+        let executed = steering.with(|board| board.executed.len());
+        let commands = steering.with(|board| board.commands);
+        robot.hands.give_until(order, "standby goes on", |_| {
+            steering.with(|board| board.commands > commands + 10)
+        });
+        assert!(steering.with(|board| {
+            let mut since = board.executed[executed..].iter();
+            since.all(|code| *code == STANDBY.code())
+        }));
+        let frozen = robot.hands.state.drain();
+        let last = frozen.last().expect("the end of the order was told");
+        assert_eq!(last.left_duty, 100, "as last heard");
+        assert!(last.age_ms >= 200, "{}", last.age_ms);
+
+        steering.with(|board| board.mute = false);
+        if logic_drives {
+            robot.hands.give_until(order, "logic's order goes on", |_| {
+                steering.with(|board| board.moves())
+            });
+        } else {
+            robot
+                .hands
+                .give_until(order, "the person is told that it is over", |hands| {
+                    hands.health.look().is_some_and(|health| {
+                        health.blocked.get() == Some(Refusal::None) && health.finished_id == 1
+                    })
+                });
+            let commands = steering.with(|board| board.commands);
+            robot.hands.give_until(order, "standby goes on", |_| {
+                steering.with(|board| board.commands > commands + 10)
+            });
+            assert!(!steering.with(|board| board.moves()));
+            robot
+                .hands
+                .give_until(operator(2, FORWARD), "a new order drives", |_| {
+                    steering.with(|board| board.moves())
+                });
+        }
+    }
+}
+
+#[test]
+fn a_board_that_keeps_resetting_stops_the_robot() {
+    let mut robot = Robot::up();
+    for reboots in 0..3 {
+        // A board that asks again before it has sent anything has only missed the answer.
+        let health = robot.hands.wait_for_health("data comes", |health| {
+            health.steering.reboots == reboots && health.steering.packets > 5
+        });
+        assert_eq!(health.stopped, 0);
+        robot
+            .steering
+            .with(|board| board.restart(lager_wire::ResetCause::BrownOut));
+    }
+    robot
+        .hands
+        .wait_for_health("the robot is stopped", |health| health.stopped == 1);
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::realtime::{CoreSet, CoreSetError, HIGHEST_PRIORITY, Wanted};
 #[command(next_help_heading = "Real time")]
 pub struct RealtimeArgs {
     /// Run under SCHED_FIFO at this priority, 1..99; 0 is the normal scheduler
-    #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(0..=i64::from(HIGHEST_PRIORITY)))]
+    #[arg(long, value_name = "PRIORITY", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=i64::from(HIGHEST_PRIORITY)))]
     pub realtime: Option<u8>,
     /// Keep all memory from being paged out
     #[arg(long)]

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::{Body, Config, Waiting};
+use lager_wire::{ArmPose, JointLimits};
+
+use super::{Body, Config, PickBy, Waiting};
 use crate::realtime::CoreSet;
 
 impl Config {
@@ -33,11 +35,15 @@ body = {body}
 # A built-in warehouse (small, curved, large) or the path of a warehouse file.
 warehouse = {warehouse}
 
+[log]
+# File that all processes of the robot append their traces to: those that RUST_LOG asks for, or
+# \"info\". Unset, nothing is traced unless RUST_LOG asks for it, and then on standard error.
+{log}
+
 [bus]
-# Only to keep a bus apart from others on the machine: prefix of its shared-memory files ...
-{prefix}
-# ... and folder of its bookkeeping files.
-{root}
+# The folder in which all of the bus lives, at most 37 bytes; unset, it is /run/lager where that is
+# this user's, else /dev/shm/lager-UID. Robots in different folders never meet.
+{folder}
 # How bridge and logic wait for samples: \"block\" (sleep), \"spin\" (a core for each) or \"adaptive\"
 # (look without pause while samples come fast, sleep when they do not) ...
 waiting = {waiting}
@@ -70,16 +76,62 @@ steering = {steering}
 baud = {baud}
 # Whether the sensor board sends the raw reading of all eleven sensors as well.
 raw_line = {raw_line}
+# Whether an original steering board is driven. Its commands have no age limit: where boards of this
+# project stop the wheels within 200 ms of whatever dies, it drives on with what it was told last
+# until the bridge, or its power switch, tells it to stand. If false it is told standby only.
+original_boards = {original_boards}
+
+[arm]
+# What the arm may do; the steering board is told at every start, and the arm stands until the board
+# has taken it. Positions are those of the servos, 0 to 1023, 0.29 degrees each; torque and load are
+# 1 to 1023 of full. Torque limit of all servos ...
+torque_limit = {torque_limit}
+# ... and load that ends a squeeze.
+squeeze_load = {squeeze_load}
+# Positions of the gripper when open, and when closed on nothing.
+gripper_open = {gripper_open}
+gripper_closed = {gripper_closed}
+
+# Where each joint may be sent, [lowest, highest]. A step that would lead outside is refused. Of the
+# shoulder and the elbow the first servo counts (2 and 4); the other one faces it.
+[arm.limits]
+{limits}
+
+# Where the arm goes when it has let go of goods, ...
+[arm.neutral]
+{neutral}
+
+# ... where it lets go, ...
+[arm.drop]
+{drop}
+
+# ... and where it is while the robot drives with goods.
+[arm.carry]
+{carry}
 
 [logic]
 # Speed in mm/s when both motors run at the standard duty of 100.
 cruise_mm_per_s = {cruise:?}
 # How far the line sensors are ahead of the wheels' axle, in mm.
 sensor_ahead_mm = {ahead:?}
+# Battery, in tenths of a volt, below which the robot stands at the next crossing until it is
+# charged or a person has put it down anew; 0 = never.
+low_battery_decivolts = {low_battery}
+# How far the ranger at the front sees, in cm: from 11 to 255, or 0 where there is none, and the robot
+# looks at no way. What is 10 cm nearer than that, and than the next crossing, blocks a way.
+ranger_cm = {ranger}
+# After how many seconds ways that the robot has found blocked are tried again, before it calls a goal
+# unreachable.
+try_again_s = {try_again}
+# Who picks the goods up: \"manual\" (a person moves the arm and says when it is done) or \"auto\" (the
+# robot by itself). Where the script plays the operator the robot picks by itself.
+pick = {pick}
 
 [simulator]
 # Seed of all noise: the same seed is the same robot.
 seed = {seed}
+# So many things come and go on the ways of the simulated floor, at random: 0 to 64.
+obstacles = {obstacles}
 
 [chip]
 # The emulator's program and the boards' images, built for [serial] baud. Unset, they are looked for
@@ -87,11 +139,20 @@ seed = {seed}
 {emulator}
 {sensor_elf}
 {steering_elf}
-# Folder that keeps both boards' EEPROM, and so their settings; unset, as long as the robot is up.
+# Folder that keeps both boards' EEPROM, and so their settings. Unset, it lies with the bus: the
+# settings outlive the robot until the machine restarts.
 {eeprom}
 # The page in which an emulator at the ports of [serial] publishes the robot's time; body = \"chip\"
 # has its own.
 {clock}
+
+[station]
+# Whether the robot talks to an external computer, which tells it its warehouse and what to fetch.
+# If not, `lager up` tells it its warehouse.
+wanted = {station_wanted}
+# Host and port of one that runs already. Unset, `lager up` starts one at 127.0.0.1:7420, or at
+# another port where that is taken.
+{station_address}
 ",
             name = quoted(&self.name),
             speed = self.speed,
@@ -101,12 +162,13 @@ seed = {seed}
                 Body::Serial => "\"serial\"",
             },
             warehouse = quoted(&self.warehouse),
-            prefix = unset("prefix", self.bus.prefix.as_deref()),
-            root = unset_path("root", &self.bus.root),
+            log = unset_path("file", &self.log.file),
+            folder = unset_path("folder", &self.bus.folder),
             sensor = quoted(&self.serial.sensor.to_string_lossy()),
             steering = quoted(&self.serial.steering.to_string_lossy()),
             baud = self.serial.baud,
             raw_line = self.serial.raw_line,
+            original_boards = self.serial.original_boards,
             waiting = match self.bus.waiting {
                 Waiting::Block => "\"block\"",
                 Waiting::Spin => "\"spin\"",
@@ -118,23 +180,67 @@ seed = {seed}
             bridge = cores(&self.realtime.cores.bridge),
             logic_cores = cores(&self.realtime.cores.logic),
             simulator = cores(&self.realtime.cores.simulator),
+            torque_limit = self.arm.torque_limit,
+            squeeze_load = self.arm.squeeze_load,
+            gripper_open = self.arm.gripper_open,
+            gripper_closed = self.arm.gripper_closed,
+            limits = limits(&self.arm.limits),
+            neutral = pose(&self.arm.neutral),
+            drop = pose(&self.arm.drop),
+            carry = pose(&self.arm.carry),
             cruise = self.logic.cruise_mm_per_s,
             ahead = self.logic.sensor_ahead_mm,
+            low_battery = self.logic.low_battery_decivolts,
+            ranger = self.logic.ranger_cm,
+            try_again = self.logic.try_again_s,
+            pick = match self.logic.pick {
+                PickBy::Manual => "\"manual\"",
+                PickBy::Auto => "\"auto\"",
+            },
             seed = self.simulator.seed,
+            obstacles = self.simulator.obstacles,
             emulator = unset_path("emulator", &self.chip.emulator),
             sensor_elf = unset_path("sensor_elf", &self.chip.sensor_elf),
             steering_elf = unset_path("steering_elf", &self.chip.steering_elf),
             eeprom = unset_path("eeprom", &self.chip.eeprom),
             clock = unset_path("clock", &self.chip.clock),
+            station_wanted = self.station.wanted,
+            station_address = unset("address", self.station.address.as_deref()),
         )
     }
+}
+
+/// The keys of `[arm.limits]`.
+fn limits(limits: &JointLimits) -> String {
+    [
+        ("base", limits.base),
+        ("shoulder", limits.shoulder),
+        ("elbow", limits.elbow),
+        ("wrist", limits.wrist),
+        ("rotation", limits.rotation),
+        ("gripper", limits.gripper),
+    ]
+    .map(|(joint, limits)| format!("{joint} = [{}, {}]", limits.lowest, limits.highest))
+    .join("\n")
+}
+
+/// The keys of a pose.
+fn pose(pose: &ArmPose) -> String {
+    let ArmPose {
+        base,
+        shoulder,
+        elbow,
+        wrist,
+    } = pose;
+    format!("base = {base}\nshoulder = {shoulder}\nelbow = {elbow}\nwrist = {wrist}")
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::realtime::CoresSection;
-    use super::super::{BusSection, ChipSection, RealtimeSection};
+    use super::super::{BusSection, ChipSection, LogSection, RealtimeSection, StationSection};
     use super::*;
+    use lager_wire::{ArmLimits, ArmProfile};
 
     #[test]
     fn the_documented_file_reads_back_with_every_key() {
@@ -143,9 +249,11 @@ mod tests {
             speed: 2.5,
             body: Body::Serial,
             warehouse: "a \"quoted\" name".into(),
+            log: LogSection {
+                file: Some("/var/log/lager".into()),
+            },
             bus: BusSection {
-                prefix: Some("p_".into()),
-                root: Some("/tmp/root".into()),
+                folder: Some("/run/warehouse".into()),
                 waiting: Waiting::Adaptive,
                 longest_spin_us: 700,
             },
@@ -157,12 +265,27 @@ mod tests {
                     ..CoresSection::default()
                 },
             },
+            arm: ArmProfile {
+                torque_limit: 700,
+                limits: JointLimits {
+                    elbow: ArmLimits {
+                        lowest: 100,
+                        highest: 900,
+                    },
+                    ..JointLimits::default()
+                },
+                ..ArmProfile::default()
+            },
             chip: ChipSection {
                 emulator: Some("/opt/emulator".into()),
                 sensor_elf: Some("sensor.elf".into()),
                 steering_elf: Some("steering.elf".into()),
                 eeprom: Some("/var/eeprom".into()),
                 clock: Some("/run/clock".into()),
+            },
+            station: StationSection {
+                wanted: false,
+                address: Some("192.168.1.5:7420".into()),
             },
             ..Config::default()
         };

@@ -1,7 +1,6 @@
-//! The map against the plane, and the law that every open way leads back.
+//! The map against the plane.
 
 use lager_topics::MapProduct;
-use proptest::prelude::*;
 
 use super::*;
 
@@ -32,7 +31,7 @@ fn with_product(square: (u8, u8), side: Side) -> WarehouseMap {
 #[test]
 fn border_nodes_have_only_the_ways_that_exist() {
     let map = Map::new(&published(2, 2, (0, 0))).unwrap();
-    let ways = |x, y| HEADINGS.map(|heading| map.is_open(Node::new(x, y), heading));
+    let ways = |x, y| HEADINGS.map(|heading| map.neighbour(Node::new(x, y), heading).is_some());
     assert_eq!(ways(0, 0), [false, true, true, false]);
     assert_eq!(ways(1, 0), [true, true, true, false]);
     assert_eq!(ways(2, 2), [true, false, false, true]);
@@ -78,68 +77,68 @@ fn the_way_out_leaves_each_corner_outwards_along_x() {
         let map = Map::new(&published(3, 2, corner)).unwrap();
         assert_eq!(map.exit(), exit);
         assert!(map.has_tape(map.delivery(), exit));
-        assert!(!map.is_open(map.delivery(), exit));
+        assert_eq!(map.neighbour(map.delivery(), exit), None);
         assert!(map.has_tape(map.delivery(), exit.back()));
     }
 }
 
 #[test]
 fn what_cannot_be_driven_in_is_refused() {
-    let refused = |map: &WarehouseMap| Map::new(map).unwrap_err();
+    let refused = |map: &WarehouseMap| {
+        let Failure {
+            kind,
+            expected,
+            seen,
+            ..
+        } = Map::new(map).unwrap_err();
+        (kind.get().unwrap(), expected, seen)
+    };
+    let map = |width, height, corner| published(width, height, corner);
+    assert_eq!(refused(&map(0, 2, (0, 0))), (FailureKind::MapEmpty, 1, 0));
     assert_eq!(
-        refused(&published(0, 2, (0, 0))),
-        MapError::NoSquares {
-            width: 0,
-            height: 2
-        }
+        refused(&map(100, 2, (0, 0))),
+        (FailureKind::MapTooLarge, 100, 101)
     );
-    assert_eq!(
-        refused(&published(255, 255, (0, 0))),
-        MapError::TooLarge {
-            width: 255,
-            height: 255
-        }
-    );
-    assert_eq!(
-        refused(&published(3, 2, (1, 0))),
-        MapError::DeliveryNotAtCorner { x: 1, y: 0 }
-    );
-    let mut map = published(1, 1, (0, 0));
+    let crowded = WarehouseMap {
+        product_count: 257,
+        ..map(3, 2, (0, 0))
+    };
+    assert_eq!(refused(&crowded), (FailureKind::TooManyProducts, 256, 257));
+    let beside = Map::new(&map(3, 2, (1, 0))).unwrap_err();
+    assert_eq!(beside.kind, FailureKind::DeliveryOffCorner);
+    assert_eq!((beside.x, beside.y), (1, 0));
+    let mut map = map(1, 1, (0, 0));
     map.side_length_cm = 0;
-    assert_eq!(refused(&map), MapError::NoSideLength);
+    assert_eq!(refused(&map), (FailureKind::SideUnknown, 40, 0));
     map.side_length_cm = 39;
-    assert_eq!(refused(&map), MapError::SideTooShort(39));
+    assert_eq!(refused(&map), (FailureKind::SideTooShort, 40, 39));
     assert_eq!(
         refused(&with_product((3, 0), Side::Left)),
-        MapError::ProductOutside(7)
+        (FailureKind::ProductOutside, 0, 7)
     );
     let mut twice = with_product((0, 0), Side::Left);
     twice.products[1] = twice.products[0];
     twice.product_count = 2;
-    assert_eq!(refused(&twice), MapError::ProductTwice(7));
+    assert_eq!(refused(&twice), (FailureKind::ProductTwice, 0, 7));
 }
 
-proptest! {
-    #[test]
-    fn every_open_way_leads_back_whatever_is_blocked(
-        (width, height) in (1u8..8, 1u8..8),
-        blocks in prop::collection::vec((0u8..9, 0u8..9, 0usize..4), 0..40),
-    ) {
-        let mut map = Map::new(&published(width, height, (0, 0))).unwrap();
-        for (x, y, heading) in blocks {
-            let was_open = map.is_open(Node::new(x, y), HEADINGS[heading]);
-            prop_assert_eq!(map.block(Node::new(x, y), HEADINGS[heading]), was_open);
-            prop_assert!(!map.is_open(Node::new(x, y), HEADINGS[heading]));
-        }
-        for index in 0..map.node_count() {
-            let node = map.node(index);
-            prop_assert_eq!(map.index(node), index);
-            for heading in HEADINGS {
-                if map.is_open(node, heading) {
-                    let next = map.neighbour(node, heading).unwrap();
-                    prop_assert!(map.is_open(next, heading.back()));
-                }
-            }
-        }
+#[test]
+fn the_largest_floor_and_the_most_products_are_taken() {
+    let mut map = published(99, 99, (99, 99));
+    map.product_count = 256;
+    for (index, product) in map.products.iter_mut().enumerate() {
+        *product = MapProduct {
+            id: index as i32,
+            x: (index % 99) as u8,
+            y: (index / 99) as u8,
+            side: Side::Up.into(),
+            ..MapProduct::default()
+        };
+    }
+    let map = Map::new(&map).unwrap();
+    assert_eq!(map.node_count(), MAX_NODES);
+    assert!(map.station(255).is_some());
+    for index in 0..map.node_count() {
+        assert_eq!(map.index(map.node(index)), index);
     }
 }

@@ -1,167 +1,79 @@
 //! The navigator: events in, one steering order and a few announcements out, time an argument.
 //!
 //! ```text
-//!                       map                order
-//!   WaitingForMap ----------> WaitingForOrder ----> Turning <----> Driving
-//!                                   ^                  |   at each node (L6)
-//!                                   |                  v
-//!      Returning <- TurningRound    |             Approaching -> Positioning -> Picking
-//!          |            ^           |                                              | picked (L7)
-//!          |        BackingOff      |                Turning/Driving <-- Leaving <-+
-//!          |            ^           |                       |
-//!          +--> corner -|-----------+                       v  at the delivery corner (L8)
-//!                    Dropping <--------------------------- Exiting
-//!
-//!   any -> Stuck: lost line, missing node, moved by hand (AMB-49); only a reset leads out
+//!   Input --> Navigator::handle --> manoeuvre --Outcome--> mission
+//!                  |                    ^                     |
+//!                  |                    +---- the next one ---+
+//!                  +--> holding (standing all the same) --> the order in force
 //! ```
+//!
+//! It joins three things that do not know each other: the mission (what to do next), the manoeuvre
+//! (line, marks and way) and what keeps the robot standing all the same.
 //!
 //! The state is a handful of plain values, nearly all of them in the published status, because
 //! the process may be killed at any moment and the next one must end the mission. The order in
 //! force follows from the state and is never state itself: [`Navigator::handle`] changes the
-//! state and then settles what the order must be.
+//! state and then settles what the order must be, once.
 //!
-//! **Invariant:** nothing here reads a clock, allocates, or knows of the bus. The parts are
-//! `mission` (what to do next at a node), `driving` (line, marks and way), `turning` (turns and
-//! the drop: orders that run once) and `status` (out to the bus and back after a restart).
+//! **Invariant:** nothing here reads a clock, allocates, or knows of the bus.
 
-mod driving;
-mod mission;
+mod board;
+mod input;
 mod status;
-mod turning;
+mod words;
 
 use core::time::Duration;
 
 use lager_topics::{
-    Event, EventKind, Goal, Heading, Mode, NavigatorStatus, Order, Phase, Role, Route,
-    SteeringOrder, SteeringReport, Step, Text, Thought, WarehouseMap,
+    BlockedWays, Hold, Mode, OrderQueue, Phase, Route, SteeringOrder, Step, ThoughtKind,
 };
 use lager_wire::{Command, LineState};
 
-use crate::command::{News, Standing};
+pub use input::Input;
+
+use crate::by_hand::ByHand;
+use crate::command::Standing;
 use crate::config::LogicConfig;
-use crate::map::{Map, Node};
-use crate::marks::MarkReader;
-use crate::odometer::Odometer;
+use crate::holding::Holding;
+use crate::manoeuvre::{Helm, Manoeuvre, Outcome, STANDBY, Senses};
+use crate::marks::Sides;
+use crate::mission::Mission;
+use crate::output::Output;
 
-/// Way of the wheels in manual mode, in mm, after which the known position is worth nothing.
-/// Rolling out after the change of mode is less.
-const DISPLACED_MM: f32 = 15.0;
-
-/// What the navigator is told.
-#[derive(Clone, Copy, Debug)]
-pub enum Input<'a> {
-    /// A line frame has come.
-    Line(LineState),
-    /// A distance frame has come: cm to what is in front, 255 = nothing seen.
-    Distance(u8),
-    /// The steering board has reported.
-    Steering(&'a SteeringReport),
-    /// The warehouse is known, or known anew.
-    Map(&'a WarehouseMap),
-    /// A product is to be fetched.
-    Order(&'a Order),
-    /// The operator has the goods in the gripper; 0 = whatever order it is.
-    PickupDone {
-        /// The order the operator worked for.
-        order_id: u32,
-    },
-    /// The robot has been put on the delivery node, looking into the warehouse (AMB-50).
-    Reset,
-    /// Who may drive, and whether a stop is latched, as the bridge has it.
-    Mode {
-        /// Who may drive.
-        mode: Mode,
-        /// A stop is latched.
-        stopped: bool,
-    },
-    /// Nothing but time has passed.
-    Tick,
-}
-
-/// What the navigator has to say after an input.
-#[derive(Clone, Debug, Default)]
-pub struct Output {
-    /// What has happened on the mission, in order.
-    pub events: heapless::Vec<Event, 4>,
-    /// A sentence for a person; the last one if there were several.
-    pub thought: Option<Thought>,
-    /// [`Navigator::route`] is another one now.
-    pub route_changed: bool,
-}
-
-impl Output {
-    fn say(&mut self, sentence: core::fmt::Arguments<'_>) {
-        let mut text = Text::default();
-        // Appending to a `Text` cuts what does not fit and cannot fail.
-        let _ = core::fmt::Write::write_fmt(&mut text, sentence);
-        self.thought = Some(Thought {
-            text,
-            from: Role::Logic.into(),
-        });
-    }
-}
-
-/// Says a sentence, formatted.
-macro_rules! say {
-    ($out:expr, $($sentence:tt)+) => {
-        $out.say(format_args!($($sentence)+))
-    };
-}
-use say;
-
-/// A standstill before a turn or a drop is judged or begun.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Pause {
-    /// None: the robot does what its phase says.
-    None,
-    /// It is to begin.
-    Wanted,
-    /// It ends then.
-    Until(Duration),
-}
+/// How long a robot that has to look ahead waits for a distance before it says so.
+const DISTANCE_LATE: Duration = Duration::from_secs(1);
 
 /// The navigator's whole state.
 #[derive(Clone, Debug)]
 pub struct Navigator {
     config: LogicConfig,
-    map: Option<Map>,
     mode: Option<Mode>,
     stopped: bool,
+    /// It may drive (L1, L2), which follows from the mode, the stop and the map.
+    active: bool,
 
-    node: Node,
-    heading: Heading,
-    odometer: Odometer,
-    exit_mm: f32,
-
-    phase: Phase,
-    step: Step,
-    goal: Goal,
-    /// The order it is on; after the delivery still the last one.
-    order: Order,
-    pending: Option<Order>,
-    delivered: u32,
-    misses: u8,
-
-    marks: MarkReader,
-    /// The mark under the sensors was begun by a predecessor: perhaps one frame of noise.
-    mark_cut_short: bool,
-    /// The line state last seen, and when.
-    sight: Option<(Duration, LineState)>,
-    /// The line state that two frames in a row have shown, which one frame of noise cannot be.
-    sure_sight: Option<LineState>,
-    /// No line frame for too long: stand until one comes.
-    blind: bool,
-    /// Where the line went out of sight, in the odometer's mm.
-    line_lost_at: Option<f32>,
-
-    target: Heading,
-    tries: u8,
-    pause: Pause,
+    mission: Mission,
+    manoeuvre: Manoeuvre,
+    senses: Senses,
+    holding: Holding,
+    by_hand: ByHand,
     command: Standing,
 
-    route: Route,
     frames: u64,
-    distance_cm: u8,
+    /// When the last input came.
+    now: Duration,
+    /// What was true after it.
+    steady: Steady,
+}
+
+/// What of the status changes with a frame, a report or a tick without a new manoeuvre: compared
+/// with what it was after the input before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Steady {
+    order_id: u32,
+    marks: u8,
+    step: Step,
+    hold: Hold,
 }
 
 impl Navigator {
@@ -169,109 +81,282 @@ impl Navigator {
     pub fn new(config: LogicConfig) -> Self {
         Self {
             config,
-            map: None,
             mode: None,
             stopped: false,
-            node: Node::default(),
-            heading: Heading::Right,
-            odometer: Odometer::default(),
-            exit_mm: 0.0,
-            phase: Phase::WaitingForMap,
-            step: Step::Seeking,
-            goal: Goal::None,
-            order: Order::default(),
-            pending: None,
-            delivered: 0,
-            misses: 0,
-            marks: MarkReader::default(),
-            mark_cut_short: false,
-            sight: None,
-            sure_sight: None,
-            blind: false,
-            line_lost_at: None,
-            target: Heading::Right,
-            tries: 0,
-            pause: Pause::None,
+            active: false,
+            mission: Mission::new(config),
+            manoeuvre: Manoeuvre::Stand,
+            senses: Senses::default(),
+            holding: Holding::default(),
+            by_hand: ByHand::default(),
             command: Standing::after(0),
-            route: Route::default(),
             frames: 0,
-            distance_cm: NavigatorStatus::default().distance_cm,
+            now: Duration::ZERO,
+            steady: Steady {
+                order_id: 0,
+                marks: 0,
+                step: Step::Seeking,
+                hold: Hold::None,
+            },
         }
+    }
+
+    /// A navigator in the place of one that nobody kept the state of: the robot may be anywhere.
+    pub fn lost(config: LogicConfig) -> Self {
+        let mut navigator = Self::new(config);
+        navigator.mission.lose_place();
+        navigator
     }
 
     /// Takes one input at `now` (robot time) and goes on as far as it allows.
     pub fn handle(&mut self, now: Duration, input: Input<'_>) -> Output {
         let mut out = Output::default();
-        let was_active = self.is_active();
-        self.odometer.advance(now);
+        self.now = now;
+        self.mission.now = now;
+        self.senses.odometer.advance(now);
         match input {
-            Input::Line(state) => self.line(now, state, &mut out),
-            Input::Distance(centimetres) => self.distance_cm = centimetres,
-            Input::Steering(report) => self.steering(now, report, &mut out),
-            Input::Map(map) => self.take_map(map, &mut out),
-            Input::Order(order) => self.take_order(order, &mut out),
-            Input::PickupDone { order_id } => self.picked(order_id, &mut out),
-            Input::Reset => self.reset(&mut out),
-            Input::Mode { mode, stopped } => self.set_mode(mode, stopped),
-            Input::Tick => {}
+            Input::Line(state) => {
+                self.watch_board(now, &mut out);
+                if let Some(outcome) = self.line(now, state, &mut out) {
+                    self.conclude(now, outcome, &mut out);
+                    self.go_on(now, &mut out);
+                }
+            }
+            other => {
+                self.take(now, other, &mut out);
+                self.watch_board(now, &mut out);
+                if self.manoeuvre.line().is_some() {
+                    self.watch_frames(now, &mut out);
+                }
+                self.go_on(now, &mut out);
+            }
         }
-        if self.is_active() && !was_active {
-            self.begin_to_speak(now);
-        }
-        self.proceed(now, &mut out);
-        let (command, arm_granted) = self.wanted();
+        self.begin_what_waits(now, &mut out);
+        let hold = self.hold();
+        let (command, arm_granted) = self.wanted(hold);
         self.command.settle(now, command, arm_granted);
+        let steady = self.steady_now(hold);
+        out.status_changed |= steady != self.steady;
+        self.steady = steady;
         out
     }
 
     /// The order to renew, `None` while the navigator may not or cannot drive (L1, L2).
     pub fn current_order(&self) -> Option<SteeringOrder> {
-        self.is_active().then(|| self.command.order())
+        self.active.then(|| self.command.order())
     }
 
     /// The nodes it means to pass, the next one first.
     pub fn route(&self) -> &Route {
-        &self.route
+        &self.mission.route
     }
 
-    fn is_active(&self) -> bool {
-        self.mode == Some(Mode::Autonomous) && !self.stopped && self.map.is_some()
+    /// The order under way and those that wait, as they are published: what a successor needs
+    /// beside the status.
+    pub fn queue(&self) -> OrderQueue {
+        self.mission.order_queue()
+    }
+
+    /// The ways on which something stands, as they are published: what a successor needs beside
+    /// the status.
+    pub fn blocks(&self) -> BlockedWays {
+        self.mission.blocked_ways()
+    }
+
+    fn steady_now(&self, hold: Hold) -> Steady {
+        Steady {
+            order_id: self.command.id(),
+            marks: self.senses.marks.to_bits(),
+            step: self.manoeuvre.step(),
+            hold,
+        }
+    }
+
+    /// Takes anything but a line frame.
+    fn take(&mut self, now: Duration, input: Input<'_>, out: &mut Output) {
+        match input {
+            Input::Line(_) | Input::Tick => {}
+            Input::Distance(centimetres) => self.range(now, centimetres, out),
+            Input::Steering(report) => self.steering(now, report, out),
+            word => {
+                let was_active = self.active;
+                self.take_word(now, word, out);
+                if self.active && !was_active {
+                    self.begin_to_speak(now);
+                }
+            }
+        }
+    }
+
+    /// Takes a line frame: what has come under the sensors and how far the axle has come are one
+    /// decision.
+    fn line(&mut self, now: Duration, state: LineState, out: &mut Output) -> Option<Outcome> {
+        self.frames = self.frames.wrapping_add(1);
+        let seen_before = self.senses.sight.is_some();
+        self.senses.see(now, state);
+        if core::mem::take(&mut self.holding.blind) && seen_before && self.active {
+            out.think(ThoughtKind::SeesAgain);
+        }
+        if self.mode == Some(Mode::Manual) || self.manoeuvre.line().is_none() {
+            self.senses.marks.clear();
+            return self.steer(now, out, Manoeuvre::go_on);
+        }
+        if self.mission.map.is_none() {
+            // A successor that is not introduced yet; the mark is judged when it is.
+            self.senses.marks.hold(state);
+            return self.steer(now, out, Manoeuvre::go_on);
+        }
+        let mark = self.senses.marks.push(state);
+        if let Some(mark) = mark {
+            self.ask_mark(mark.sides, out);
+        }
+        self.steer(now, out, |manoeuvre, helm| {
+            let seen = manoeuvre.see(state, mark, helm);
+            seen.or_else(|| manoeuvre.go_on(helm))
+        })
+    }
+
+    /// Takes a distance.
+    fn range(&mut self, now: Duration, centimetres: u8, out: &mut Output) {
+        self.senses.distance = Some((now, centimetres));
+        let outcome = self.steer(now, out, |manoeuvre, helm| {
+            manoeuvre.range(centimetres, helm)
+        });
+        if let Some(outcome) = outcome {
+            self.conclude(now, outcome, out);
+        }
+    }
+
+    /// Where a disturbed turn has left a doubt, a mark may show that the robot is elsewhere.
+    fn ask_mark(&mut self, sides: Sides, out: &mut Output) {
+        let Mission { map, place, .. } = &mut self.mission;
+        let sought = self.manoeuvre.line().and_then(|follow| follow.sought());
+        let (Some(map), Some(edge), false) = (map, sought, place.doubt.is_none()) else {
+            return;
+        };
+        let at_mm = self.senses.mark_at(&self.config);
+        out.status_changed = true;
+        if place.ask_mark(map, edge, sides, at_mm, self.config.tolerance) {
+            self.mission.believe_other_place(out);
+            self.manoeuvre = self.mission.manoeuvre(self.senses.exit_mm);
+        }
+    }
+
+    /// Lets the manoeuvre decide on something.
+    fn steer<T>(
+        &mut self,
+        now: Duration,
+        out: &mut Output,
+        decide: impl FnOnce(&mut Manoeuvre, &mut Helm<'_>) -> T,
+    ) -> T {
+        let active = self.active && !self.holding.unheard;
+        let mut helm = Helm {
+            now,
+            config: &self.config,
+            active,
+            senses: &mut self.senses,
+            heading: &mut self.mission.place.heading,
+            order: &mut self.command,
+            out,
+        };
+        decide(&mut self.manoeuvre, &mut helm)
+    }
+
+    /// A manoeuvre that has ended leads to the next one.
+    fn conclude(&mut self, now: Duration, outcome: Outcome, out: &mut Output) {
+        self.mission.next(outcome, out);
+        self.begin(now, out);
+    }
+
+    /// Begins the manoeuvre of the mission's phase.
+    fn begin(&mut self, now: Duration, out: &mut Output) {
+        out.status_changed = true;
+        if self.mission.phase.needs_reset() {
+            self.holding.forget();
+        }
+        self.manoeuvre = self.mission.manoeuvre(self.senses.exit_mm);
+        self.steer(now, out, Manoeuvre::begin);
     }
 
     /// Goes on where the state allows it without a further input.
-    fn proceed(&mut self, now: Duration, out: &mut Output) {
-        match self.pause {
-            Pause::Wanted => self.pause = Pause::Until(now + self.config.settle),
-            Pause::Until(end) if now >= end && self.is_active() => {
-                self.pause = Pause::None;
-                self.end_pause(out);
-            }
-            _ => {}
+    fn go_on(&mut self, now: Duration, out: &mut Output) {
+        // A drive ends, the way ahead is seen to be open, and the next drive begins: at once.
+        for _ in 0..3 {
+            let Some(outcome) = self.steer(now, out, Manoeuvre::go_on) else {
+                break;
+            };
+            self.conclude(now, outcome, out);
         }
-        self.drive_on(now, out);
-        if self.phase == Phase::WaitingForOrder && self.mode == Some(Mode::Autonomous) {
-            self.begin_pending(out);
+    }
+
+    /// Begins what had to wait: the ways that were blocked are tried again, or the next order is.
+    fn begin_what_waits(&mut self, now: Duration, out: &mut Output) {
+        if self.active && self.mission.try_again(out) {
+            self.begin(now, out);
         }
+        if self.mission.phase == Phase::WaitingForOrder
+            && self.mode == Some(Mode::Autonomous)
+            && self.mission.begin_next(out)
+        {
+            self.begin(now, out);
+        }
+    }
+
+    /// Stands still while the steering board does not report.
+    fn watch_board(&mut self, now: Duration, out: &mut Output) {
+        let falls_silent = self.holding.watch_board(now, &self.config);
+        if falls_silent && self.active && self.manoeuvre.turns_wheels() {
+            out.think(ThoughtKind::BoardUnheard);
+        }
+    }
+
+    /// Stands still while no line frames come (AMB-49: a silent board).
+    fn watch_frames(&mut self, now: Duration, out: &mut Output) {
+        let seen = self.senses.sight.map(|(at, _)| at);
+        let blind = seen.is_none_or(|at| now.saturating_sub(at) > self.config.blind_after);
+        if blind && !self.holding.blind && seen.is_some() && self.active {
+            out.think(ThoughtKind::Blind);
+        }
+        self.holding.blind |= blind;
+    }
+
+    /// What the manoeuvre needs now, whatever keeps the robot standing.
+    fn needed(&self) -> Command {
+        self.manoeuvre
+            .wanted(&self.senses, self.mission.place.heading, &self.config)
     }
 
     /// The command that the state asks for, and whether the operator may move the arm.
-    fn wanted(&self) -> (Command, bool) {
-        let command = if self.pause == Pause::None {
-            self.driving_command()
-                .or_else(|| self.one_shot_command())
-                .unwrap_or(STANDBY)
-        } else {
-            STANDBY
+    fn wanted(&self, hold: Hold) -> (Command, bool) {
+        let command = match self.needed() {
+            Command::Wheel(_) if hold != Hold::None => STANDBY,
+            command => command,
         };
-        (command, self.phase == Phase::Picking)
+        let waits =
+            self.mission.phase == Phase::Picking && matches!(self.manoeuvre, Manoeuvre::Stand);
+        let arm_granted = waits || hold == Hold::Arm;
+        (command, arm_granted)
     }
 
-    fn set_mode(&mut self, mode: Mode, stopped: bool) {
-        if self.mode != Some(mode) {
-            self.odometer.stirred_mm = 0.0;
+    /// It has to look ahead, and no distances come.
+    fn misses_distances(&self) -> bool {
+        let is_late = |(heard, _)| self.now.saturating_sub(heard) > DISTANCE_LATE;
+        matches!(self.manoeuvre, Manoeuvre::Look(_)) && self.senses.distance.is_none_or(is_late)
+    }
+
+    /// Why it stands although its phase would turn the wheels.
+    fn hold(&self) -> Hold {
+        if self.holding.unheard {
+            Hold::Unheard
+        } else if self.mission.parked {
+            Hold::Battery
+        } else if self.holding.joint_off.is_some() {
+            Hold::Arm
+        } else if self.holding.blind && self.manoeuvre.line().is_some() || self.misses_distances() {
+            Hold::Blind
+        } else {
+            Hold::None
         }
-        self.mode = Some(mode);
-        self.stopped = stopped;
     }
 
     /// The orders may go out (again): a setpoint from before has ended by now, while a turn or a
@@ -282,68 +367,4 @@ impl Navigator {
             self.command.give_anew();
         }
     }
-
-    fn steering(&mut self, now: Duration, report: &SteeringReport, out: &mut Output) {
-        self.odometer.report(now, report, &self.config);
-        if self.mode == Some(Mode::Manual) {
-            self.watch_manual_driving(out);
-            return;
-        }
-        let one_shot = self.command.command().is_one_shot();
-        let patience = if one_shot {
-            self.config.unheard_one_shot
-        } else {
-            self.config.unheard_setpoint
-        };
-        match self.command.news(now, report, patience) {
-            News::None => {}
-            News::Ended(finish) if one_shot => self.one_shot_ended(finish, out),
-            News::Unheard if one_shot && self.is_active() => self.pause = Pause::Wanted,
-            // A setpoint ends by a stop, a lease that ran out or a board that restarted. It is
-            // given anew, but not faster than the bridge can answer.
-            News::Ended(_) | News::Unheard => {
-                if self.is_active()
-                    && self
-                        .command
-                        .is_older_than(now, self.config.unheard_setpoint)
-                {
-                    self.command.give_anew();
-                }
-            }
-        }
-    }
-
-    fn watch_manual_driving(&mut self, out: &mut Output) {
-        let has_a_place = !matches!(self.phase, Phase::WaitingForMap | Phase::Stuck);
-        if has_a_place && self.odometer.stirred_mm > DISPLACED_MM {
-            self.get_stuck("I have been driven by hand", out);
-        }
-    }
-
-    /// Gives up until somebody helps (AMB-49).
-    fn get_stuck(&mut self, why: &str, out: &mut Output) {
-        self.phase = Phase::Stuck;
-        self.pause = Pause::None;
-        self.blind = false;
-        say!(
-            out,
-            "{why}. Put me on the delivery node, looking into the warehouse, and press reset."
-        );
-    }
-
-    fn announce(&self, kind: EventKind, order: Order, out: &mut Output) {
-        let event = Event {
-            kind: kind.into(),
-            x: self.node.x,
-            y: self.node.y,
-            order_id: order.id,
-            product: order.product,
-            ..Event::default()
-        };
-        // One input leads to at most three: a node, a refusal and a new order.
-        let _ = out.events.push(event);
-    }
 }
-
-/// Standing still.
-const STANDBY: Command = Command::Wheel(lager_wire::WheelCommand::Standby);

@@ -1,113 +1,142 @@
 //! The state on its way out to `nav/status`, and back into a navigator after a restart.
 //!
 //! What is not in the status is either told again by others (map, mode), or begins anew without
-//! harm (which line state was seen last, how long the robot has stood). The map's blocked ways
-//! are what has been seen and are seen again.
+//! harm (which line state was seen last, how long the robot has stood). The ways that are blocked
+//! and the orders that wait are published beside it.
 
-use lager_topics::{Mode, NavigatorStatus, Order};
+use lager_topics::{BlockedWays, Hold, Mode, NavigatorStatus, Order, OrderQueue, Remedy};
 use lager_wire::{Command, WheelCommand};
 
-use super::{Navigator, Pause, STANDBY};
+use super::Navigator;
+use crate::battery::Battery;
+use crate::by_hand::ByHand;
 use crate::command::Standing;
 use crate::config::LogicConfig;
 use crate::heading::Spin;
-use crate::map::Node;
+use crate::manoeuvre::STANDBY;
 use crate::marks::MarkReader;
+use crate::node::Node;
+use crate::place::{Doubt, Place};
 
 impl Navigator {
     /// The state as it is published.
     pub fn status(&self) -> NavigatorStatus {
-        let pending = self.pending.unwrap_or_default();
-        NavigatorStatus {
+        let (mission, senses) = (&self.mission, &self.senses);
+        let Place { node, heading, .. } = mission.place;
+        let mut status = NavigatorStatus {
             frames: self.frames,
-            order_id: self.order.id,
-            product: self.order.product,
-            pending_id: pending.id,
-            pending_product: pending.product,
+            order_id: mission.order.id,
+            product: mission.order.product,
             command_id: self.command.id(),
-            delivered: self.delivered,
-            travelled_mm: self.odometer.travelled_mm.round() as i32,
-            exit_mm: self.exit_mm.round() as i32,
-            x: self.node.x.into(),
-            y: self.node.y.into(),
-            turned_deg: self.odometer.turned_deg.round() as i16,
-            phase: self.phase.into(),
-            step: self.step.into(),
-            heading: self.heading.into(),
-            target: self.target.into(),
-            goal: self.goal.into(),
-            mark: self.marks.to_bits(),
+            delivered: mission.delivered,
+            travelled_mm: senses.odometer.travelled_mm.round() as i32,
+            exit_mm: senses.exit_mm.round() as i32,
+            failure: mission.failure,
+            x: node.x.into(),
+            y: node.y.into(),
+            turned_deg: senses.odometer.turned_deg.round() as i16,
+            phase: mission.phase.into(),
+            heading: heading.into(),
+            target: mission.target.into(),
+            goal: mission.goal.into(),
+            mark: senses.marks.to_bits(),
             code: self.command.command().code(),
-            tries: self.tries,
-            misses: self.misses,
-            pending: self.pending.is_some().into(),
-            distance_cm: self.distance_cm,
+            misses: mission.misses,
+            waiting: mission.queue.waiting().len() as u8,
             mode: self.mode.unwrap_or(Mode::Manual).into(),
             stopped: self.stopped.into(),
+            driven_by_hand: self.by_hand.to_status(),
+            hold: self.steady.hold.into(),
+            forced: mission.forced.into(),
+            remedy: self.remedy().into(),
             ..NavigatorStatus::default()
+        };
+        if let Some((heard, distance_cm)) = senses.distance {
+            let age_ms = self.now.saturating_sub(heard).as_millis();
+            status.distance_cm = distance_cm;
+            status.distance_age_ms = age_ms.try_into().unwrap_or(u16::MAX);
         }
+        self.manoeuvre.fill(&mut status);
+        mission.place.doubt.fill(&mut status);
+        status
     }
 
-    /// Whether a status has to go out at once: anything but what changes all the time is another.
-    pub fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
-        let steady = |status: &NavigatorStatus| NavigatorStatus {
-            frames: 0,
-            frames_lost: 0,
-            travelled_mm: 0,
-            turned_deg: 0,
-            distance_cm: 0,
-            ..*status
-        };
-        steady(before) != steady(after)
+    /// What would end that it stands, if anything has to.
+    fn remedy(&self) -> Remedy {
+        let hold = self.steady.hold;
+        match self.mission.failure.remedy.get() {
+            Some(remedy) if remedy != Remedy::None => remedy,
+            _ if hold != Hold::None => hold.remedy(),
+            _ if self.stopped => Remedy::Resume,
+            _ if self.mode != Some(Mode::Autonomous) => Remedy::Mode,
+            _ => Remedy::None,
+        }
     }
 
     /// Goes on from the last status of a navigator that was killed.
     ///
     /// The robot moved on until the lease of its order ended; that way is added. A status that
-    /// makes no sense (a foreign writer's) yields a fresh navigator.
-    pub fn resume(config: LogicConfig, status: &NavigatorStatus) -> Self {
-        Self::from_status(config, status).unwrap_or_else(|| Self::new(config))
+    /// makes no sense (a foreign writer's) is as good as none: the robot may be anywhere.
+    pub fn resume(
+        config: LogicConfig,
+        status: &NavigatorStatus,
+        blocks: &BlockedWays,
+        queue: &OrderQueue,
+    ) -> Self {
+        let mut navigator = Self::from_status(config, status).unwrap_or_else(|| Self::lost(config));
+        navigator.mission.restore_blocks(blocks);
+        navigator.mission.restore_queue(queue);
+        navigator
     }
 
     fn from_status(config: LogicConfig, status: &NavigatorStatus) -> Option<Self> {
         let mut navigator = Self::new(config);
-        navigator.node = Node::new(u8::try_from(status.x).ok()?, u8::try_from(status.y).ok()?);
-        navigator.phase = status.phase.get()?;
-        navigator.step = status.step.get()?;
-        navigator.heading = status.heading.get()?;
-        navigator.target = status.target.get()?;
-        navigator.goal = status.goal.get()?;
-        navigator.order = Order {
+        let node = Node::new(u8::try_from(status.x).ok()?, u8::try_from(status.y).ok()?);
+        let mission = &mut navigator.mission;
+        mission.place = Place {
+            doubt: Doubt::of(status),
+            ..Place::at(node, status.heading.get()?)
+        };
+        mission.phase = status.phase.get()?;
+        mission.target = status.target.get()?;
+        mission.goal = status.goal.get()?;
+        mission.order = Order {
             id: status.order_id,
             product: status.product,
         };
-        navigator.pending = (status.pending != 0).then_some(Order {
-            id: status.pending_id,
-            product: status.pending_product,
-        });
-        navigator.delivered = status.delivered;
-        navigator.misses = status.misses;
-        navigator.tries = status.tries;
-        navigator.marks = MarkReader::from_bits(status.mark);
-        navigator.exit_mm = status.exit_mm as f32;
+        mission.delivered = status.delivered;
+        mission.misses = status.misses;
+        mission.forced = status.forced != 0;
+        mission.failure = status.failure;
+        if status.hold == Hold::Battery {
+            mission.parked = true;
+            mission.battery = Battery::LOW;
+        }
         navigator.frames = status.frames;
-        navigator.odometer.travelled_mm = status.travelled_mm as f32;
-        navigator.odometer.turned_deg = f32::from(status.turned_deg);
+        navigator.by_hand = ByHand::from_status(status.driven_by_hand);
+        let senses = &mut navigator.senses;
+        senses.marks = MarkReader::from_bits(status.mark);
+        senses.exit_mm = status.exit_mm as f32;
+        senses.odometer.travelled_mm = status.travelled_mm as f32;
+        senses.odometer.turned_deg = f32::from(status.turned_deg);
+        navigator.manoeuvre = navigator.mission.manoeuvre(senses.exit_mm);
         let command = Command::from_code(status.code).unwrap_or(STANDBY);
+        navigator
+            .manoeuvre
+            .restore(status.step.get()?, status, command, &navigator.config);
         navigator.command = Standing::resumed(status.command_id, command);
         let was_driving = status.mode == Mode::Autonomous && status.stopped == 0;
         if was_driving {
-            navigator.mark_cut_short = navigator.marks.has_begun();
-            navigator.marks.believe();
+            let senses = &mut navigator.senses;
+            senses.mark_cut_short = senses.marks.has_begun();
+            senses.marks.believe();
             navigator.reckon_outage(command);
         }
         // A turn or drop whose order is out is read from the reports; else it begins anew.
-        if navigator
-            .one_shot_command()
-            .is_some_and(|wanted| wanted != command)
-        {
-            navigator.pause = Pause::Wanted;
+        if navigator.needed() != command {
+            navigator.manoeuvre.interrupt();
         }
+        navigator.steady = navigator.steady_now(navigator.hold());
         Some(navigator)
     }
 
@@ -118,14 +147,16 @@ impl Navigator {
         let angle = self.config.turn_deg_per_s * seconds;
         match command {
             Command::Wheel(WheelCommand::ActiveForward | WheelCommand::ManualForward) => {
-                self.odometer.travelled_mm += way;
+                self.senses.odometer.travelled_mm += way;
             }
-            Command::Wheel(WheelCommand::ManualBackward) => self.odometer.travelled_mm -= way,
+            Command::Wheel(WheelCommand::ManualBackward) => {
+                self.senses.odometer.travelled_mm -= way;
+            }
             Command::Wheel(WheelCommand::LeftPerp) => {
-                self.odometer.turned_deg += angle * Spin::Left.sign();
+                self.senses.odometer.turned_deg += angle * Spin::Left.sign();
             }
             Command::Wheel(WheelCommand::RightPerp) => {
-                self.odometer.turned_deg += angle * Spin::Right.sign();
+                self.senses.odometer.turned_deg += angle * Spin::Right.sign();
             }
             _ => {}
         }

@@ -1,24 +1,32 @@
 //! A stand-in for everything below logic: a robot on the same grid, moved by the orders, and a
 //! bridge with leases. Geometry decides what the sensors see; the constants are the document's.
 //!
-//! It is small on purpose: 5 ms steps, tape with sharp edges, wheels with lag and a wrong gain.
+//! It is small on purpose: 5 ms steps, tape with sharp edges, wheels with lag and a wrong gain. It
+//! follows its line by the regulator of the steering board, and learns as that does how unlike its
+//! wheels are.
 
 use std::time::Duration;
 
+use lager_control::pd::{Gains, Pd};
+use lager_control::sides::Sides;
 use lager_topics::{Finish, Heading, Origin, SteeringOrder, SteeringReport, WarehouseMap};
 use lager_wire::{ArmCommand, Command, LineState, SteerFlags, WheelCommand};
 
-use crate::floor::{Exit, Floor, Point};
+use crate::floor::{Exit, Floor, Obstacle, Point};
 
 /// One step of the world.
 pub(crate) const STEP: Duration = Duration::from_millis(5);
 const LEASE: Duration = Duration::from_millis(120);
 const QUARTER: Duration = Duration::from_millis(3000);
 const DROP: Duration = Duration::from_millis(1500);
+const ARM_STEP: Duration = Duration::from_millis(40);
 const AHEAD: f64 = 160.0;
 const CRUISE: f64 = 73.3;
 const TRACK: f64 = 280.0;
 const LAG: f64 = 0.06;
+
+/// The arm where it is carried, something in the claw.
+pub(crate) const CARRYING: [u16; 8] = [512, 600, 423, 400, 623, 512, 512, 399];
 
 /// What happens to a line frame on its way.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +66,12 @@ struct Work {
 pub(crate) struct Body {
     pub(crate) floor: Floor,
     pub(crate) trouble: Trouble,
+    /// What stands on the floor.
+    pub(crate) obstacles: Vec<Obstacle>,
+    /// How far the ranger sees, in cm; none that is dead.
+    pub(crate) sees_cm: Option<u8>,
+    /// The body has run into one of them.
+    pub(crate) touched: bool,
     random: u64,
     pub(crate) now: Duration,
     pub(crate) x: f64,
@@ -69,14 +83,27 @@ pub(crate) struct Body {
     work: Option<Work>,
     finished: (u32, Finish),
     replaced: u32,
-    errors: [f64; 3],
+    /// The last error, in half sensor steps, positive = the line is to the right.
+    error: i8,
+    pd: Pd,
+    sides: Sides,
     after_bar: bool,
     pub(crate) autonomous: bool,
     pub(crate) stopped: bool,
     /// The next one-shot orders to refuse.
     pub(crate) refuse: u32,
+    /// The board's reports do not reach the bridge.
+    pub(crate) silent: bool,
+    /// Positions of the servos, and the load of the claw.
+    pub(crate) servos: [u16; 8],
+    pub(crate) claw_load: i16,
+    pub(crate) battery: u8,
+    /// Where the base has to aim for the claw to close on the goods.
+    pub(crate) goods_at: Option<u16>,
     /// A duty the operator drives with in manual mode.
     pub(crate) manual_duty: f64,
+    /// What the bridge has summed of it: duty × µs of both motors.
+    pub(crate) driven_by_hand: u64,
     /// Turns and drops begun, by code.
     pub(crate) begun: Vec<u8>,
     pub(crate) frames_sent: u64,
@@ -91,6 +118,9 @@ impl Body {
             angle: if map.delivery_x == 0 { 0.0 } else { 180.0 },
             floor,
             trouble,
+            obstacles: Vec::new(),
+            sees_cm: Some(80),
+            touched: false,
             random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
             now: Duration::ZERO,
             wheels: (0.0, 0.0),
@@ -98,12 +128,20 @@ impl Body {
             work: None,
             finished: (0, Finish::None),
             replaced: 0,
-            errors: [0.0; 3],
+            error: 0,
+            pd: Pd::new(Gains::default()),
+            sides: Sides::new(),
             after_bar: false,
             autonomous: true,
             stopped: false,
             refuse: 0,
+            silent: false,
+            servos: CARRYING,
+            claw_load: -311,
+            battery: 111,
+            goods_at: None,
             manual_duty: 0.0,
+            driven_by_hand: 0,
             begun: Vec::new(),
             frames_sent: 0,
         }
@@ -135,8 +173,10 @@ impl Body {
             order.id
         );
         if let Some(work) = self.work.take() {
+            // A turn is waited for, unless nobody can hear its end.
+            let given_up = self.silent && command == Command::Wheel(WheelCommand::Standby);
             assert!(
-                !work.command.is_one_shot(),
+                !work.command.is_one_shot() || given_up,
                 "a one-shot order was not waited for"
             );
             self.replaced = work.id;
@@ -165,15 +205,10 @@ impl Body {
         }
     }
 
-    fn bits(&self) -> [bool; 11] {
-        let (sin, cos) = self.angle.to_radians().sin_cos();
+    pub(crate) fn bits(&self) -> [bool; 11] {
         core::array::from_fn(|index| {
             let right = (index as f64 - 5.0) * 7.0;
-            let point = (
-                self.x + AHEAD * cos + right * sin,
-                self.y + AHEAD * sin - right * cos,
-            );
-            self.floor.is_tape(point)
+            self.floor.is_tape(self.point(AHEAD, right))
         })
     }
 
@@ -182,7 +217,7 @@ impl Body {
         self.now += STEP;
         let bits = self.bits();
         let state = self.classify(&bits);
-        self.control(&bits);
+        self.control(&bits, state);
         self.roll();
         if !(self.now.as_millis() as u64 / 5).is_multiple_of(self.trouble.frame_ms / 5) {
             return None;
@@ -223,7 +258,7 @@ impl Body {
             .collect();
         let (left, right) = (run(true), run(false));
         if seen.is_empty() {
-            self.errors[0] = if self.errors[0] >= 0.0 { 10.0 } else { -10.0 };
+            self.error = if self.error >= 0 { 10 } else { -10 };
             return if self.after_bar {
                 LineState::DropStation
             } else {
@@ -237,7 +272,7 @@ impl Body {
             (false, true) => LineState::StationToRight,
             (false, false) => {
                 let error = seen.iter().sum::<f64>() / seen.len() as f64;
-                self.errors[0] = error;
+                self.error = error.round() as i8;
                 match error {
                     error if error.abs() <= 2.0 => LineState::OnLine,
                     error if error > 0.0 => LineState::LeftOfLine,
@@ -247,24 +282,37 @@ impl Body {
         }
     }
 
-    fn control(&mut self, bits: &[bool; 11]) {
+    fn control(&mut self, bits: &[bool; 11], state: LineState) {
         if let Some(work) = self.work
             && (work.lease < self.now || self.stopped || !self.autonomous)
         {
             self.end_work(Finish::Aborted);
         }
-        let change = self.errors[0] - self.errors[2];
-        let adjust = 2.0 * self.errors[0] + 2.0 * change;
-        self.errors.copy_within(0..2, 1);
+        let now_us = self.now.as_micros() as u32;
+        let correction = self.pd.update(self.error, now_us) + self.sides.bias();
         let Some(work) = &mut self.work else {
+            self.sides.pause();
             self.duties = (self.manual_duty, self.manual_duty);
+            if !self.autonomous {
+                self.driven_by_hand += 2 * self.manual_duty.abs() as u64 * STEP.as_micros() as u64;
+            }
             return;
         };
+        match work.command {
+            Command::Wheel(WheelCommand::ActiveForward) => {
+                self.sides.observe(correction, state, now_us);
+            }
+            _ => self.sides.pause(),
+        }
+        let correction = f64::from(correction);
+        let bias = f64::from(self.sides.bias());
+        let alike =
+            |left: f64, right: f64| (left + bias * left.signum(), right - bias * right.signum());
         let age = self.now - work.since;
         self.duties = match work.command {
-            Command::Wheel(WheelCommand::ActiveForward) => (100.0 + adjust, 100.0 - adjust),
-            Command::Wheel(WheelCommand::ManualForward) => (100.0, 100.0),
-            Command::Wheel(WheelCommand::ManualBackward) => (-100.0, -100.0),
+            Command::Wheel(WheelCommand::ActiveForward) => (100.0 + correction, 100.0 - correction),
+            Command::Wheel(WheelCommand::ManualForward) => alike(100.0, 100.0),
+            Command::Wheel(WheelCommand::ManualBackward) => alike(-100.0, -100.0),
             Command::Wheel(turn @ (WheelCommand::LeftPerp | WheelCommand::RightPerp)) => {
                 let on_tape = bits[4] || bits[5] || bits[6];
                 let was_clear = work.clear >= 2;
@@ -273,9 +321,9 @@ impl Body {
                     self.end_work(Finish::Done);
                     (0.0, 0.0)
                 } else if turn == WheelCommand::LeftPerp {
-                    (-100.0, 100.0)
+                    alike(-100.0, 100.0)
                 } else {
-                    (100.0, -100.0)
+                    alike(100.0, -100.0)
                 }
             }
             Command::Arm(ArmCommand::Drop) => {
@@ -284,8 +332,36 @@ impl Body {
                 }
                 (0.0, 0.0)
             }
-            _ => (0.0, 0.0),
+            Command::Arm(step) => {
+                if age >= ARM_STEP {
+                    self.end_work(Finish::Done);
+                    self.move_arm(step);
+                }
+                (0.0, 0.0)
+            }
+            Command::Wheel(_) => (0.0, 0.0),
         };
+    }
+
+    /// One step of the arm has been made.
+    fn move_arm(&mut self, step: ArmCommand) {
+        let [base, shoulder, elbow, claw] = [0, 1, 3, 7];
+        match step {
+            ArmCommand::Left => self.servos[base] += 4,
+            ArmCommand::Right => self.servos[base] -= 4,
+            ArmCommand::Up => self.servos[shoulder] += 4,
+            ArmCommand::Down => self.servos[shoulder] -= 4,
+            ArmCommand::Out => self.servos[elbow] += 4,
+            ArmCommand::In => self.servos[elbow] -= 4,
+            ArmCommand::Release => (self.servos[claw], self.claw_load) = (512, 0),
+            ArmCommand::Squeeze => {
+                let aimed = |at: u16| at.abs_diff(self.servos[base]) <= 10;
+                let low = self.servos[shoulder] < 320 && self.servos[elbow] > 480;
+                let holds = low && self.goods_at.is_some_and(aimed);
+                (self.servos[claw], self.claw_load) = if holds { (399, -311) } else { (210, -20) };
+            }
+            _ => {}
+        }
     }
 
     fn roll(&mut self) {
@@ -302,6 +378,39 @@ impl Body {
         self.x += forward * cos;
         self.y += forward * sin;
         self.angle += ((self.wheels.1 - self.wheels.0) / TRACK * seconds).to_degrees();
+        self.touched |= !self.obstacles.is_empty() && self.touches();
+    }
+
+    /// A place in the robot's coordinates as one on the floor.
+    fn point(&self, ahead: f64, right: f64) -> Point {
+        let (sin, cos) = self.angle.to_radians().sin_cos();
+        (
+            self.x + ahead * cos + right * sin,
+            self.y + ahead * sin - right * cos,
+        )
+    }
+
+    fn is_in_an_obstacle(&self, (x, y): Point) -> bool {
+        let within = |low: Point, high: Point| {
+            (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&y)
+        };
+        self.obstacles.iter().any(|(low, high)| within(*low, *high))
+    }
+
+    /// Whether the robot would touch something that stands so far around it.
+    fn touches(&self) -> bool {
+        [170.0, 30.0, -110.0]
+            .into_iter()
+            .flat_map(|ahead| [-90.0, 0.0, 90.0].map(|right| (ahead, right)))
+            .any(|(ahead, right)| self.is_in_an_obstacle(self.point(ahead, right)))
+    }
+
+    /// What the ranger says: cm to what is in front, 255 where nothing is in sight.
+    pub(crate) fn range_cm(&self) -> Option<u8> {
+        let is_there =
+            |cm: &u8| self.is_in_an_obstacle(self.point(100.0 + 10.0 * f64::from(*cm), 0.0));
+        let reach = self.sees_cm?;
+        Some((0..reach).find(is_there).unwrap_or(255))
     }
 
     /// The steering board's report as the bridge publishes it.
@@ -322,6 +431,10 @@ impl Body {
             left_duty: self.duties.0.abs() as u8,
             right_duty: self.duties.1.abs() as u8,
             flags: flags.0,
+            battery_decivolts: self.battery,
+            age_ms: 0,
+            servo_position: self.servos,
+            servo_load: [0, 0, 0, 0, 0, 0, 0, self.claw_load],
             ..SteeringReport::default()
         }
     }

@@ -100,6 +100,24 @@ impl Floor {
     }
 }
 
+/// A thing in the middle of the edge between two neighbouring nodes: its smallest and its largest
+/// coordinates.
+pub(crate) type Obstacle = (Point, Point);
+
+impl Floor {
+    /// A thing in the middle of the edge between two nodes, 80 mm along it and 160 mm across.
+    pub(crate) fn obstacle(&self, a: (u8, u8), b: (u8, u8)) -> Obstacle {
+        let middle = |a: u8, b: u8| (f64::from(a) + f64::from(b)) / 2.0 * self.side;
+        let (x, y) = (middle(a.0, b.0), middle(a.1, b.1));
+        let (dx, dy) = if a.1 == b.1 {
+            (40.0, 80.0)
+        } else {
+            (80.0, 40.0)
+        };
+        ((x - dx, y - dy), (x + dx, y + dy))
+    }
+}
+
 fn is_on((from, to): (Point, Point), (x, y): Point) -> bool {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let length = dx.hypot(dy);

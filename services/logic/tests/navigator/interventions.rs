@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use lager_logic::map::Node;
+use lager_logic::node::Node;
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{EventKind, Phase, Side, WarehouseMap};
+use lager_topics::{EventKind, FailureKind, Phase, Side, WarehouseMap};
 
 use crate::double::{Body, Trouble};
 use crate::floor::{Exit, Floor};
@@ -114,6 +114,17 @@ fn a_robot_driven_by_hand_asks_for_a_reset_and_fetches_again_after_it() {
 }
 
 #[test]
+fn a_robot_driven_by_hand_while_its_navigator_was_away_asks_for_a_reset() {
+    let mut trial = run_to(Phase::Exiting);
+    set_autonomous(&mut trial, false);
+    trial.run_for(SECOND / 10);
+    trial.body.manual_duty = 100.0;
+    trial.kill(SECOND);
+    assert_eq!(trial.phase(), Phase::Stuck);
+    assert!(said(&trial, "driven by hand"), "{}", trial.story());
+}
+
+#[test]
 fn an_order_in_manual_mode_waits_for_the_autonomous_one() {
     let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Down)]);
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
@@ -121,7 +132,7 @@ fn an_order_in_manual_mode_waits_for_the_autonomous_one() {
     trial.order(1, 1);
     trial.run_for(SECOND);
     assert_eq!(
-        (trial.phase(), trial.status.pending),
+        (trial.phase(), trial.status.waiting),
         (Phase::WaitingForOrder, 1)
     );
     set_autonomous(&mut trial, true);
@@ -176,18 +187,26 @@ fn orders_that_cannot_be_carried_out_are_refused() {
     );
     trial.order(3, 2);
     trial.order(3, 2);
-    assert_eq!(refused(&trial), [2], "one order may wait");
-    trial.order(4, 2);
-    assert_eq!(refused(&trial), [2, 4]);
+    assert_eq!(
+        refused(&trial),
+        [2],
+        "an order that waits, repeated, is no new one"
+    );
     trial.deliver(2);
 }
 
 #[test]
 fn the_signal_for_another_order_does_not_end_the_picking() {
     let mut trial = run_to(Phase::Picking);
-    trial.tell(Input::PickupDone { order_id: 77 });
+    trial.tell(Input::PickupDone {
+        order_id: 77,
+        forced: false,
+    });
     assert_eq!(trial.phase(), Phase::Picking);
-    trial.tell(Input::PickupDone { order_id: 0 });
+    trial.tell(Input::PickupDone {
+        order_id: 0,
+        forced: false,
+    });
     assert_eq!(trial.phase(), Phase::Leaving);
 }
 
@@ -229,8 +248,89 @@ fn a_station_without_a_mark_is_looked_for_from_both_ends_and_given_up() {
         .iter()
         .map(|(.., node)| (node.x, node.y))
         .collect();
-    // The start, the near end, the far end, the near end, the far end.
-    assert_eq!(nodes, [(0, 0), (1, 0), (1, 1), (1, 0), (1, 1)]);
+    // The start, the near end, the far end, the near end, the far end, where it gives up.
+    assert_eq!(nodes, [(0, 0), (1, 0), (1, 1), (1, 0), (1, 1), (1, 1)]);
+}
+
+#[test]
+fn a_turn_past_the_pick_stations_mark_is_noticed_and_the_mark_looked_for() {
+    let mut trial = run_to(Phase::Positioning);
+    // The mark ends 170 mm from the edge, and the sensors are 160 mm ahead of the axle.
+    trial.body.x -= 20.0;
+    let seen = |trial: &Trial| said(trial, "turned past the pick station's mark");
+    assert!(trial.run_until(SECOND * 10, seen), "{}", trial.story());
+    trial.body.x += 20.0;
+    trial.deliver(1);
+    assert_eq!(trial.count(EventKind::InPosition), 1, "{}", trial.story());
+}
+
+/// Half way round to the goods, and standing.
+fn stopped_in_the_turn_to_the_station() -> Trial {
+    let mut trial = run_to(Phase::Positioning);
+    trial.run_for(SECOND);
+    stop(&mut trial, true);
+    trial.run_for(SECOND / 2);
+    trial
+}
+
+#[test]
+fn a_disturbed_turn_that_passed_the_stations_mark_goes_back_to_it_or_comes_from_the_other_end() {
+    let mut trial = stopped_in_the_turn_to_the_station();
+    // The mark ends 170 mm from the edge, and the sensors are 160 mm ahead of the axle.
+    trial.body.x -= 30.0;
+    stop(&mut trial, false);
+    let has_turned = |trial: &Trial| trial.status.heading == trial.status.target;
+    assert!(
+        trial.run_until(SECOND * 10, has_turned),
+        "{}",
+        trial.story()
+    );
+    assert_eq!(trial.phase(), Phase::Positioning, "{}", trial.story());
+    let mut without = trial.clone();
+
+    trial.body.x += 30.0;
+    trial.deliver(1);
+    assert_eq!(trial.count(EventKind::InPosition), 1, "{}", trial.story());
+
+    // Still there it is not found: from the other end it is looked for anew.
+    let goes_past = |trial: &Trial| trial.phase() == Phase::Driving;
+    assert!(
+        without.run_until(SECOND * 40, goes_past),
+        "{}",
+        without.story()
+    );
+    assert!(said(&without, "mark did not come"), "{}", without.story());
+    without.deliver(1);
+    assert_eq!(
+        without.count(EventKind::InPosition),
+        1,
+        "{}",
+        without.story()
+    );
+}
+
+#[test]
+fn a_station_out_of_sight_after_a_disturbed_turn_is_a_failure_that_says_so() {
+    let mut trial = stopped_in_the_turn_to_the_station();
+    // Carried away: there is no tape all round.
+    (trial.body.x, trial.body.y) = (1_000.0, 1_000.0);
+    stop(&mut trial, false);
+    assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Stuck));
+    let failure = trial.navigator.status().failure;
+    assert_eq!(
+        failure.kind.get(),
+        Some(FailureKind::MarkUnseen),
+        "{failure}"
+    );
+    assert!(
+        said(&trial, "do not see its mark in 8 turns"),
+        "{}",
+        trial.story()
+    );
+    assert_eq!(trial.count(EventKind::InPosition), 0, "{}", trial.story());
+    carry_to_start(&mut trial);
+    trial.order(3, 2);
+    trial.deliver(1);
 }
 
 #[test]
@@ -255,16 +355,11 @@ fn without_a_usable_map_nothing_is_done() {
     let mut hear = |map: &WarehouseMap| {
         let output = navigator.handle(SECOND, Input::Map(map));
         let phase = navigator.status().phase.get();
-        (
-            output
-                .thought
-                .map(|thought| thought.text.as_str().to_owned()),
-            phase,
-        )
+        (output.thought.map(|thought| thought.failure), phase)
     };
     let (thought, phase) = hear(&map);
     assert_eq!(phase, Some(Phase::WaitingForMap));
-    assert!(thought.unwrap().contains("side length"));
+    assert_eq!(thought.unwrap().kind, FailureKind::SideUnknown);
     map.side_length_cm = 50;
     assert_eq!(hear(&map).1, Some(Phase::WaitingForOrder));
 }

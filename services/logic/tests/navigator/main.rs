@@ -2,7 +2,12 @@
 
 mod double;
 mod floor;
+mod holds;
 mod interventions;
 mod missions;
+mod obstacles;
+mod picking;
+mod queue;
 mod restarts;
 mod trial;
+mod ways;

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::double::Trouble;
 use crate::floor::Exit;
-use crate::trial::{SIDES, Trial, corners, warehouse};
+use crate::trial::{SIDES, Trial, corners, missions, warehouse};
 
 const STRAIGHT: Exit = Exit::Straight(600.0);
 
@@ -154,7 +154,7 @@ fn a_waiting_order_is_begun_at_the_corner() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(missions(60))]
 
     #[test]
     fn any_mission_under_any_trouble_ends(

@@ -3,14 +3,13 @@
 use std::time::Duration;
 
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{EventKind, NavigatorStatus, Phase, Side};
-use lager_wire::Command;
+use lager_topics::{BlockedWays, EventKind, NavigatorStatus, OrderQueue, Phase, Remedy, Side};
+use lager_wire::{Command, LineState};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 use crate::double::{STEP, Trouble};
 use crate::floor::Exit;
-use crate::trial::{SIDES, Trial, corners, warehouse};
+use crate::trial::{SIDES, Trial, corners, missions, warehouse};
 
 const EXIT: Exit = Exit::Straight(450.0);
 
@@ -19,6 +18,12 @@ fn mission(size: (u8, u8), delivery: (u8, u8), product: (u8, u8, Side)) -> Trial
     let mut trial = Trial::new(map, EXIT, Trouble::NONE, 3);
     trial.order(1, 1);
     trial
+}
+
+/// A successor with nothing but the status.
+fn resumed(status: &NavigatorStatus) -> Navigator {
+    let (blocks, queue) = (BlockedWays::default(), OrderQueue::default());
+    Navigator::resume(LogicConfig::default(), status, &blocks, &queue)
 }
 
 /// Ends the mission and checks that it came to what it was to come to.
@@ -79,10 +84,11 @@ fn a_status_goes_through_a_navigator_unchanged() {
         let status = NavigatorStatus {
             stopped: 1,
             mode: lager_topics::Mode::Manual.into(),
+            remedy: Remedy::Mode.into(),
             distance_cm: 255,
             ..trial.navigator.status()
         };
-        let again = Navigator::resume(LogicConfig::default(), &status).status();
+        let again = resumed(&status).status();
         // Of a setpoint the number is not sure.
         let order = Command::from_code(status.code).unwrap();
         let left_out = u32::from(!order.is_one_shot());
@@ -124,8 +130,13 @@ fn an_order_that_waits_for_its_mode_survives_whatever_is_told_first() {
         trial.body.autonomous = false;
         trial.tell_mode();
         trial.order(4, 1);
-        assert_eq!((trial.status.pending, trial.status.order_id), (1, 0));
-        trial.navigator = Navigator::resume(LogicConfig::default(), &trial.status);
+        assert_eq!((trial.status.waiting, trial.status.order_id), (1, 0));
+        trial.navigator = Navigator::resume(
+            LogicConfig::default(),
+            &trial.status,
+            &BlockedWays::default(),
+            &trial.queue,
+        );
         trial.body.autonomous = true;
         if mode_first {
             trial.tell_mode();
@@ -149,6 +160,23 @@ fn a_granted_arm_stays_granted() {
 }
 
 #[test]
+fn two_frames_of_noise_around_a_kill_are_not_the_cross_bar() {
+    let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Down));
+    let on_its_way_out = |trial: &Trial| {
+        trial.phase() == Phase::Exiting && trial.navigator.status().travelled_mm > 100
+    };
+    assert!(trial.run_until(Duration::from_secs(60), on_its_way_out));
+    trial.tell(Input::Line(LineState::FourWay));
+    trial.run_for(Duration::from_millis(5));
+    trial.status = trial.navigator.status();
+    trial.kill(Duration::from_millis(100));
+    trial.run_for(Duration::from_millis(50));
+    trial.tell(Input::Line(LineState::NotOnLine));
+    assert_eq!(trial.phase(), Phase::Exiting, "{}", trial.story());
+    trial.deliver(1);
+}
+
+#[test]
 fn order_ids_go_on_after_the_old_ones() {
     let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
     trial.run_for(Duration::from_secs(6));
@@ -166,37 +194,29 @@ fn order_ids_go_on_after_the_old_ones() {
 fn without_the_map_nothing_is_ordered() {
     let mut trial = mission((1, 1), (0, 0), (0, 0, Side::Up));
     trial.run_for(Duration::from_secs(6));
-    let navigator = Navigator::resume(LogicConfig::default(), &trial.status);
+    let navigator = resumed(&trial.status);
     assert_eq!(navigator.current_order(), None);
 }
 
 #[test]
-fn a_status_that_makes_no_sense_yields_a_fresh_navigator() {
+fn a_status_that_makes_no_sense_is_as_good_as_none() {
     let nonsense = NavigatorStatus {
         x: -4,
         delivered: 9,
         ..NavigatorStatus::default()
     };
-    let status = Navigator::resume(LogicConfig::default(), &nonsense).status();
+    let status = resumed(&nonsense).status();
     assert_eq!(
         (status.phase.get(), status.delivered),
-        (Some(Phase::WaitingForMap), 0)
+        (Some(Phase::Lost), 0)
     );
 }
 
 proptest! {
-    // The same missions each time. Of random ones about one in three thousand does not come
-    // through: a turn to the goods that is begun twice and misses the short mark ends askew, by
-    // time, or the line is lost and the robot stands (AMB-49).
-    #![proptest_config(ProptestConfig {
-        cases: 200,
-        rng_seed: RngSeed::Fixed(1),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(missions(200))]
 
     #[test]
-    fn a_mission_survives_many_kills_under_trouble(
+    fn a_mission_with_many_kills_under_trouble_is_delivered_or_says_what_would_end_its_failure(
         (width, height) in (1u8..4, 1u8..4),
         corner in 0usize..4,
         square in (0u8..4, 0u8..4),
@@ -216,7 +236,6 @@ proptest! {
             trial.kill(Duration::from_millis(outage));
             trial.thoughts.push("(killed)".to_owned());
         }
-        trial.deliver(1);
-        prop_assert!(trial.count(EventKind::ItemDelivered) >= 1);
+        trial.deliver_or_say_why(1);
     }
 }

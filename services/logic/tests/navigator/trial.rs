@@ -3,11 +3,14 @@
 
 use std::time::Duration;
 
-use lager_logic::map::{Map, Node};
-use lager_logic::{Input, LogicConfig, Navigator, Output};
+use lager_logic::map::Map;
+use lager_logic::node::Node;
+use lager_logic::{Input, LogicConfig, Navigator, Output, Pick};
 use lager_topics::{
-    EventKind, MapProduct, Mode, NavigatorStatus, Order, Phase, Side, WarehouseMap,
+    BlockedWays, EventKind, MapProduct, Mode, NavigatorStatus, Order, OrderQueue, Phase, Remedy,
+    Side, WarehouseMap,
 };
+use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 
 use crate::double::{Body, STEP, Trouble};
 use crate::floor::Exit;
@@ -57,34 +60,81 @@ pub(crate) fn corners(size: (u8, u8)) -> [(u8, u8); 4] {
     [(0, 0), (0, size.1), (size.0, 0), (size.0, size.1)]
 }
 
+/// So many random missions, or as many as `LAGER_MISSIONS` says: the same ones each time, the first
+/// of a longer run among them.
+pub(crate) fn missions(cases: u32) -> ProptestConfig {
+    let wanted = std::env::var("LAGER_MISSIONS").ok();
+    ProptestConfig {
+        cases: wanted.map_or(cases, |count| count.parse().expect("a number")),
+        rng_seed: RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+/// Whether a status has to go out at once: anything but what changes all the time is another.
+fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
+    let steady = |status: &NavigatorStatus| NavigatorStatus {
+        frames: 0,
+        travelled_mm: 0,
+        turned_deg: 0,
+        distance_cm: 0,
+        distance_age_ms: 0,
+        ..*status
+    };
+    steady(before) != steady(after)
+}
+
 /// One robot, its navigator and what has happened.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
+    config: LogicConfig,
     pub(crate) published: WarehouseMap,
+    exit: Exit,
     pub(crate) body: Body,
     pub(crate) navigator: Navigator,
     pub(crate) status: NavigatorStatus,
+    /// The status after the last input.
+    told: NavigatorStatus,
     status_at: Duration,
     sent: (u32, Duration),
     pub(crate) events: Vec<(EventKind, u32, Node)>,
     pub(crate) thoughts: Vec<String>,
+    pub(crate) blocks: BlockedWays,
+    /// The orders, as published.
+    pub(crate) queue: OrderQueue,
     picking_since: Option<Duration>,
     pub(crate) dead: bool,
 }
 
 impl Trial {
     pub(crate) fn new(published: WarehouseMap, exit: Exit, trouble: Trouble, seed: u64) -> Self {
+        Self::with(LogicConfig::default(), published, exit, trouble, seed)
+    }
+
+    pub(crate) fn with(
+        config: LogicConfig,
+        published: WarehouseMap,
+        exit: Exit,
+        trouble: Trouble,
+        seed: u64,
+    ) -> Self {
         let body = Body::new(&published, exit, trouble, seed);
-        let navigator = Navigator::new(LogicConfig::default());
+        let navigator = Navigator::new(config);
         let mut trial = Self {
+            config,
             published,
+            exit,
             body,
             status: navigator.status(),
+            told: navigator.status(),
             navigator,
             status_at: Duration::ZERO,
             sent: (0, Duration::ZERO),
             events: Vec::new(),
             thoughts: Vec::new(),
+            blocks: BlockedWays::default(),
+            queue: OrderQueue::default(),
             picking_since: None,
             dead: false,
         };
@@ -96,6 +146,7 @@ impl Trial {
     fn introduce(&mut self) {
         let published = self.published;
         self.tell(Input::Map(&published));
+        self.tell(Input::DrivenByHand(self.body.driven_by_hand));
         self.tell_mode();
     }
 
@@ -117,7 +168,12 @@ impl Trial {
     pub(crate) fn tell(&mut self, input: Input<'_>) {
         let now = self.body.now;
         let Output {
-            events, thought, ..
+            events,
+            thought,
+            status_changed,
+            blocks_changed,
+            queue_changed,
+            ..
         } = self.navigator.handle(now, input);
         for event in &events {
             let kind = event.kind.get().unwrap();
@@ -126,9 +182,22 @@ impl Trial {
             self.check_event(kind);
         }
         self.thoughts
-            .extend(thought.map(|thought| thought.text.as_str().to_owned()));
+            .extend(thought.map(|thought| thought.to_string()));
+        if blocks_changed {
+            self.blocks = self.navigator.blocks();
+        }
+        if queue_changed {
+            self.queue = self.navigator.queue();
+        }
+        assert_eq!(self.queue, self.navigator.queue(), "a change was not told");
         let status = self.navigator.status();
-        if Navigator::is_news(&self.status, &status) || now >= self.status_at + STATUS_PERIOD {
+        assert!(
+            status_changed || !is_news(&self.told, &status),
+            "a change was not told: {:#?} {status:#?}",
+            self.told
+        );
+        self.told = status;
+        if status_changed || now >= self.status_at + STATUS_PERIOD {
             self.status = status;
             self.status_at = now;
         }
@@ -148,22 +217,33 @@ impl Trial {
         }
         if let Some(state) = frame {
             self.tell(Input::Line(state));
+            if self.config.ranger_cm > 0
+                && let Some(centimetres) = self.body.range_cm()
+            {
+                self.tell(Input::Distance(centimetres));
+            }
         }
-        let report = self.body.report();
-        self.tell(Input::Steering(&report));
+        self.tell(Input::DrivenByHand(self.body.driven_by_hand));
+        if !self.body.silent {
+            let report = self.body.report();
+            self.tell(Input::Steering(&report));
+        }
         self.pick();
     }
 
     /// The operator signals some time after the robot has come to the goods, again and again.
     fn pick(&mut self) {
-        if self.status.phase != Phase::Picking {
+        if self.status.phase != Phase::Picking || self.config.pick == Pick::Auto {
             self.picking_since = None;
             return;
         }
         let since = *self.picking_since.get_or_insert(self.body.now);
         if self.body.now >= since + PICKING {
             let order_id = self.status.order_id;
-            self.tell(Input::PickupDone { order_id });
+            self.tell(Input::PickupDone {
+                order_id,
+                forced: false,
+            });
         }
     }
 
@@ -178,7 +258,8 @@ impl Trial {
         self.dead = true;
         self.run_for(outage);
         self.dead = false;
-        self.navigator = Navigator::resume(LogicConfig::default(), &self.status);
+        self.navigator = Navigator::resume(self.config, &self.status, &self.blocks, &self.queue);
+        self.told = self.navigator.status();
         self.run_for(late);
         self.introduce();
     }
@@ -207,7 +288,31 @@ impl Trial {
     }
 
     pub(crate) fn is_home(&self) -> bool {
-        self.phase() == Phase::WaitingForOrder && self.navigator.status().pending == 0
+        self.phase() == Phase::WaitingForOrder && self.navigator.status().waiting == 0
+    }
+
+    /// As [`Self::deliver`], but a robot that stands and says why, and what would end that, will do
+    /// as well. A reset then ends it.
+    pub(crate) fn deliver_or_say_why(&mut self, count: u32) {
+        let limit = Duration::from_secs(400) * count;
+        self.run_until(limit, |trial| {
+            (trial.status.delivered == count && trial.is_home()) || trial.phase() == Phase::Stuck
+        });
+        if self.phase() != Phase::Stuck {
+            return self.deliver(count);
+        }
+        let failure = self.navigator.status().failure;
+        assert!(!failure.is_none(), "{}", self.story());
+        eprintln!("not delivered: {failure}");
+        assert!(self.count(EventKind::Failed) > 0, "{}", self.story());
+        assert_eq!(failure.remedy.get(), Some(Remedy::Reset), "{failure}");
+        self.run_for(STEP * 200);
+        let start = Body::new(&self.published, self.exit, Trouble::NONE, 3);
+        (self.body.x, self.body.y, self.body.angle) = (start.x, start.y, start.angle);
+        self.tell(Input::Reset);
+        let delivered = self.status.delivered;
+        self.order(99, 1);
+        self.deliver(delivered + 1);
     }
 
     /// Runs until `count` products are delivered and the robot is back; panics with its thoughts
@@ -222,6 +327,17 @@ impl Trial {
         let map = self.map();
         self.assert_at(self.place(map.delivery()));
         self.assert_looks(map.exit(), 180.0);
+    }
+
+    /// Runs until `count` products are delivered and the robot is back, with so many orders that
+    /// wait for a way.
+    pub(crate) fn deliver_but(&mut self, count: u32, waiting: u8) {
+        let done = self.run_until(Duration::from_secs(400) * count, |trial| {
+            let status = trial.navigator.status();
+            (status.delivered, status.waiting) == (count, waiting)
+                && trial.phase() == Phase::WaitingForOrder
+        });
+        assert!(done, "{}", self.story());
     }
 
     pub(crate) fn map(&self) -> Map {

@@ -3,7 +3,7 @@
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use lager_plant::GoodState;
-use lager_simulator::{Robot, Truth};
+use lager_simulator::{Robot, Snapshot};
 use lager_wire::{ArmCommand, Command, SteerFlags, WheelCommand};
 
 use crate::pi::{Pi, ms};
@@ -31,7 +31,7 @@ fn loaded() -> Pi {
     pi
 }
 
-fn state(truth: &Truth) -> GoodState {
+fn state(truth: &Snapshot) -> GoodState {
     truth.world.goods[0].state
 }
 
@@ -70,6 +70,8 @@ fn goods_let_go_elsewhere_lie_there() {
 #[test]
 fn an_empty_squeeze_ends_closed() {
     let mut pi = Pi::in_builtin("small");
+    // Until the first standby the arm is locked.
+    pi.wheels(WheelCommand::Standby);
     pi.run(ms(300));
     pi.arm(ArmCommand::Squeeze, 1);
     assert_eq!(pi.robot.truth().carrying, None);

@@ -98,7 +98,10 @@ fn a_silent_sensor_board_stops_following() {
     pi.robot.hang_board(Wire::Sensor);
     pi.run(ms(120));
     assert_eq!(pi.robot.truth().duties, [0, 0]);
-    // Its watchdog brings the sensor board back, and the line with it.
+    // Its watchdog brings the sensor board back, but what has ended does not begin by itself.
+    pi.run(ms(1_000));
+    assert_eq!(pi.robot.truth().duties, [0, 0]);
+    pi.wheels(WheelCommand::ActiveForward);
     pi.until(ms(1_000), |pi| pi.robot.truth().duties != [0, 0]);
 }
 
@@ -135,6 +138,8 @@ fn noise_on_the_cable_moves_nothing_and_is_counted() {
 #[test]
 fn a_missing_servo_is_flagged_and_the_others_work() {
     let mut pi = Pi::in_builtin("small");
+    // Until the first standby the arm is locked.
+    pi.wheels(WheelCommand::Standby);
     pi.run(ms(2_000));
     assert_eq!(pi.heard.steer.unwrap().servo_errors, 0);
     pi.robot.world_mut().servos().set_present(7, false);

@@ -5,3 +5,4 @@ mod driving;
 mod faults;
 mod pi;
 mod repeat;
+mod varied;

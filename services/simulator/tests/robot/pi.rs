@@ -3,7 +3,7 @@
 
 use core::time::Duration;
 
-use lager_plant::{Pose, Warehouse};
+use lager_plant::{Make, Pose, Warehouse};
 use lager_simulator::{Robot, RobotOptions, Wire};
 use lager_wire::link::{HostEvent, HostLink, HostTransmitter, Up};
 use lager_wire::{
@@ -68,7 +68,7 @@ impl Pi {
         }
     }
 
-    /// A robot of seed 1 in a built-in warehouse, both links up.
+    /// A robot as drawn, of seed 1, in a built-in warehouse, both links up.
     pub(crate) fn in_builtin(name: &str) -> Self {
         Self::started(&Warehouse::builtin(name).unwrap(), 1)
     }
@@ -76,6 +76,7 @@ impl Pi {
     pub(crate) fn started(warehouse: &Warehouse, seed: u64) -> Self {
         let options = RobotOptions {
             seed,
+            make: Make::Nominal,
             ..RobotOptions::default()
         };
         let mut pi = Self::new(warehouse, options);

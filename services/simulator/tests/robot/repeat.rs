@@ -13,7 +13,7 @@ fn life(seed: u64) -> Vec<u8> {
     let mut pi = Pi::started(&Warehouse::builtin("curved").unwrap(), seed);
     pi.wheels(WheelCommand::ActiveForward);
     pi.run(ms(6_000));
-    pi.carry_out(Command::Wheel(WheelCommand::RightPerp), ms(4_000));
+    pi.carry_out(Command::Wheel(WheelCommand::RightPerp), ms(5_000));
     pi.wheels(WheelCommand::Standby);
     pi.run(ms(300));
     pi.arm(ArmCommand::Left, 3);

@@ -3,81 +3,80 @@
 use super::*;
 
 #[test]
-fn a_stop_latches_until_resumed_whoever_sent_it() {
+fn a_stop_latches_until_resumed() {
     for (mode, driver) in [
         (Mode::Manual, Origin::Operator),
         (Mode::Autonomous, Origin::Logic),
     ] {
-        for stopper in [Origin::Operator, Origin::Logic] {
-            let mut bench = Bench::new(mode);
-            let order = drive(driver, 1, FORWARD);
-            bench.run_renewed(100, order);
-            assert_eq!(bench.give(stop(stopper)), Verdict::Stopped);
-            bench.run(1);
-            assert!(!code_moves(bench.board.code));
-            assert_eq!(
-                bench.give(order),
-                Verdict::Ignored(Ignored::StopLatched),
-                "the same order"
-            );
-            assert_eq!(
-                bench.give(drive(driver, 2, FORWARD)),
-                Verdict::Ignored(Ignored::StopLatched),
-                "a new order"
-            );
-            let from = bench.written.len();
-            bench.run(1_000);
-            assert!(bench.written.len() > from + 10, "standby is renewed");
-            let rest = &bench.written[from..];
-            assert!(
-                rest.iter()
-                    .all(|(_, command)| command.command() == Some(STANDBY))
-            );
+        let mut bench = Bench::new(mode);
+        let order = drive(driver, 1, FORWARD);
+        bench.run_renewed(100, order);
+        bench.arbiter.stop();
+        bench.run(1);
+        assert!(!code_moves(bench.board.code));
+        let person = driver == Origin::Operator;
+        let (same, new) = if person {
+            let refused = Verdict::Refused(Refusal::StopLatched);
+            (Verdict::Ended(Finish::Aborted), refused)
+        } else {
+            let ignored = Verdict::Ignored(Refusal::StopLatched);
+            (ignored, ignored)
+        };
+        assert_eq!(bench.give(order), same, "the same order");
+        assert_eq!(bench.give(drive(driver, 2, FORWARD)), new, "a new order");
+        let from = bench.written.len();
+        bench.run(1_000);
+        assert!(bench.written.len() > from + 10, "standby is renewed");
+        let rest = &bench.written[from..];
+        assert!(
+            rest.iter()
+                .all(|(_, command)| command.command() == Some(STANDBY))
+        );
 
-            bench.arbiter.resume_from_stop();
-            bench.run(500);
-            assert!(
-                !code_moves(bench.board.code),
-                "resuming alone moves nothing"
-            );
-            assert_eq!(bench.give(drive(driver, 2, FORWARD)), Verdict::Executes);
-            bench.run(1);
-            assert!(code_moves(bench.board.code));
-        }
-    }
-}
-
-#[test]
-fn a_stop_anywhere_in_a_batch_wins() {
-    let forward = drive(Origin::Operator, 1, FORWARD);
-    let follow = drive(Origin::Operator, 2, FOLLOW);
-    for batch in [
-        [stop(Origin::Operator), forward, follow],
-        [forward, stop(Origin::Operator), follow],
-        [forward, follow, stop(Origin::Operator)],
-    ] {
-        let mut bench = Bench::manual();
-        for order in batch {
-            bench.give(order);
-        }
+        bench.arbiter.resume_from_stop();
         bench.run(500);
         assert!(
-            bench
-                .board
-                .executed
-                .iter()
-                .all(|code| *code == STANDBY.code())
+            !code_moves(bench.board.code),
+            "resuming alone moves nothing"
         );
-        assert!(bench.arbiter.is_stopped());
+        if person {
+            // What was wanted during the stop is not what is wanted after it.
+            for (id, finish) in [(1, Finish::Aborted), (2, Finish::Refused)] {
+                assert_eq!(
+                    bench.give(drive(driver, id, FORWARD)),
+                    Verdict::Ended(finish)
+                );
+            }
+        }
+        let id = if person { 3 } else { 2 };
+        assert_eq!(bench.give(drive(driver, id, FORWARD)), Verdict::Executes);
+        bench.run(1);
+        assert!(code_moves(bench.board.code));
     }
 }
 
 #[test]
-fn a_stop_with_a_code_nobody_knows_still_stops() {
+fn a_stop_is_due_at_once_though_the_driver_took_nothing_a_moment_ago() {
     let mut bench = Bench::manual();
-    let mut order = stop(Origin::Logic);
-    order.code = 0xEE;
-    assert_eq!(bench.give(order), Verdict::Stopped);
+    bench.run_renewed(50, drive(Origin::Operator, 1, FORWARD));
+    bench.arbiter.not_written(bench.now);
+    bench.arbiter.stop();
+    let written = bench.arbiter.poll(bench.now);
+    assert_eq!(written.and_then(|it| it.command()), Some(STANDBY));
+    // So it is for who stops a robot that is stopped.
+    assert_eq!(bench.arbiter.poll(bench.now), None);
+    bench.arbiter.stop();
+    assert!(bench.arbiter.poll(bench.now).is_some());
+}
+
+#[test]
+fn a_stopped_original_board_is_told_standby_again_and_again() {
+    let mut bench = Bench::manual();
+    bench.arbiter.board_up(bench.now, Version::Original, false);
+    bench.arbiter.stop();
+    let from = bench.written.len();
+    bench.run(400);
+    assert!(bench.written.len() >= from + 10);
 }
 
 #[test]
@@ -85,7 +84,7 @@ fn only_the_mode_decides_who_drives() {
     let mut bench = Bench::manual();
     assert_eq!(
         bench.give(drive(Origin::Logic, 1, FORWARD)),
-        Verdict::Ignored(Ignored::NotInCharge)
+        Verdict::Ignored(Refusal::NotInCharge)
     );
     bench.run(50);
     assert!(!code_moves(bench.board.code));
@@ -96,7 +95,7 @@ fn only_the_mode_decides_who_drives() {
     );
     assert_eq!(
         bench.give(drive(Origin::Operator, 1, FORWARD)),
-        Verdict::Ignored(Ignored::NotInCharge)
+        Verdict::Refused(Refusal::NotInCharge)
     );
     bench.run(1);
     assert!(code_moves(bench.board.code));
@@ -131,7 +130,7 @@ fn undefined_codes_are_refused_counted_and_change_nothing() {
             code,
             ..drive(Origin::Operator, id, FORWARD)
         };
-        assert_eq!(bench.give(bad), Verdict::Refused(Refused::Undefined));
+        assert_eq!(bench.give(bad), Verdict::Refused(Refusal::Undefined));
         count += 1;
     }
     assert_eq!(count, 256 - 22);
@@ -142,14 +141,11 @@ fn undefined_codes_are_refused_counted_and_change_nothing() {
 }
 
 #[test]
-fn an_order_from_nobody_or_of_no_kind_is_refused() {
+fn an_order_from_nobody_is_refused() {
     let mut bench = Bench::manual();
     let mut order = drive(Origin::Operator, 1, FORWARD);
     order.origin = lager_topics::Tag::from_raw(9);
-    assert_eq!(bench.give(order), Verdict::Refused(Refused::Undefined));
-    let mut order = drive(Origin::Operator, 1, FORWARD);
-    order.kind = lager_topics::Tag::from_raw(9);
-    assert_eq!(bench.give(order), Verdict::Refused(Refused::Undefined));
+    assert_eq!(bench.give(order), Verdict::Refused(Refusal::Undefined));
     bench.run(50);
     assert!(!code_moves(bench.board.code));
 }
@@ -162,7 +158,7 @@ fn quarter_turns_and_the_drop_are_logics_alone() {
             bench.give(granted_standby(1));
             assert_eq!(
                 bench.give(drive(Origin::Operator, 2, command)),
-                Verdict::Refused(Refused::LogicOnly)
+                Verdict::Refused(Refusal::LogicOnly)
             );
         }
         let mut bench = Bench::autonomous();
@@ -180,7 +176,7 @@ fn an_arm_order_while_driving_is_refused_and_the_drive_goes_on() {
     bench.run_renewed(50, order);
     assert_eq!(
         bench.give(drive(Origin::Operator, 2, ARM_UP)),
-        Verdict::Refused(Refused::ArmLocked)
+        Verdict::Refused(Refusal::ArmLocked)
     );
     assert_eq!(bench.ended(), Some((Origin::Operator, 2, Finish::Refused)));
     assert_eq!(bench.give(order), Verdict::Renewed);
@@ -192,13 +188,13 @@ fn an_arm_order_while_driving_is_refused_and_the_drive_goes_on() {
 fn the_operator_moves_the_arm_while_logic_stands_and_lets_him() {
     let mut bench = Bench::autonomous();
     assert_eq!(
-        bench.give(drive(Origin::Operator, 1, ARM_UP)),
-        Verdict::Ignored(Ignored::NotInCharge)
+        bench.give(drive(Origin::Operator, 11, ARM_UP)),
+        Verdict::Refused(Refusal::NotInCharge)
     );
     bench.give(drive(Origin::Logic, 1, STANDBY));
     assert_eq!(
-        bench.give(drive(Origin::Operator, 1, ARM_UP)),
-        Verdict::Ignored(Ignored::NotInCharge),
+        bench.give(drive(Origin::Operator, 12, ARM_UP)),
+        Verdict::Refused(Refusal::NotInCharge),
         "a standby without the grant lets nobody"
     );
     let grant = granted_standby(2);
@@ -210,7 +206,7 @@ fn the_operator_moves_the_arm_while_logic_stands_and_lets_him() {
     );
     assert_eq!(
         bench.give(drive(Origin::Operator, 2, FORWARD)),
-        Verdict::Ignored(Ignored::NotInCharge)
+        Verdict::Refused(Refusal::NotInCharge)
     );
     for step in 0..400 {
         if step % 40 == 0 {
@@ -259,7 +255,7 @@ fn the_grant_ends_with_logics_lease_with_its_withdrawal_and_with_logics_next_ord
     assert_eq!(bench.board.code, STANDBY.code(), "logic withdrew the grant");
     assert_eq!(
         bench.give(drive(Origin::Operator, 8, SQUEEZE)),
-        Verdict::Ignored(Ignored::NotInCharge)
+        Verdict::Refused(Refusal::NotInCharge)
     );
 
     let mut bench = begin();
@@ -287,8 +283,52 @@ fn a_stop_while_the_operator_moves_the_arm_ends_both() {
     bench.give(granted_standby(1));
     bench.give(drive(Origin::Operator, 7, SQUEEZE));
     bench.run(20);
-    bench.give(stop(Origin::Operator));
+    bench.arbiter.stop();
     assert_eq!(bench.arbiter.current(), None);
     bench.run(1);
     assert_eq!(bench.board.code, STANDBY.code());
+}
+
+#[test]
+fn the_last_refusal_is_told_with_its_reason() {
+    let mut bench = Bench::manual();
+    assert_eq!(bench.health().refusal, Refusal::None);
+    bench.give(drive(Origin::Operator, 5, DROP));
+    let told = |bench: &Bench| {
+        let health = bench.health();
+        (
+            health.refused_origin.get().unwrap(),
+            health.refused_id,
+            health.refusal.get().unwrap(),
+        )
+    };
+    assert_eq!(told(&bench), (Origin::Operator, 5, Refusal::LogicOnly));
+    let revision = bench.arbiter.revision();
+    bench.give(drive(Origin::Logic, 6, FORWARD));
+    assert_eq!(told(&bench), (Origin::Logic, 6, Refusal::NotInCharge));
+    assert_ne!(bench.arbiter.revision(), revision);
+    bench.restart_bridge();
+    assert_eq!(told(&bench), (Origin::Logic, 6, Refusal::NotInCharge));
+}
+
+#[test]
+fn what_a_person_may_not_do_now_he_may_not_do_later_by_the_same_order() {
+    let mut bench = Bench::autonomous();
+    let order = drive(Origin::Operator, 1, FORWARD);
+    assert_eq!(bench.give(order), Verdict::Refused(Refusal::NotInCharge));
+    bench.arbiter.set_mode(Mode::Manual);
+    bench.run_renewed(200, order);
+    assert!(!bench.board.executed.contains(&FORWARD.code()));
+}
+
+#[test]
+fn a_change_of_mode_there_and_back_ends_what_a_person_drove() {
+    let mut bench = Bench::manual();
+    let order = drive(Origin::Operator, 1, FORWARD);
+    bench.run_renewed(50, order);
+    bench.arbiter.set_mode(Mode::Autonomous);
+    bench.arbiter.set_mode(Mode::Manual);
+    bench.run_renewed(200, order);
+    assert!(!code_moves(bench.board.code));
+    assert_eq!(bench.ended(), Some((Origin::Operator, 1, Finish::Aborted)));
 }

@@ -42,13 +42,13 @@ fn an_order_that_lay_in_a_queue_is_as_old_as_it_is() {
     let stale = bench.now.checked_sub(LEASE).unwrap();
     bench
         .arbiter
-        .order(stale, &drive(Origin::Operator, 1, FORWARD));
+        .order(stale, stale, &drive(Origin::Operator, 1, FORWARD));
     bench.run(200);
     assert!(!bench.board.executed.contains(&FORWARD.code()));
 }
 
 #[test]
-fn a_late_renewal_takes_a_lapsed_setpoint_up_again_but_not_a_one_shot() {
+fn a_late_renewal_takes_logics_lapsed_setpoint_up_again_but_not_its_one_shot() {
     let mut bench = Bench::autonomous();
     bench.give(drive(Origin::Logic, 1, FOLLOW));
     bench.run(200);
@@ -138,8 +138,49 @@ fn the_same_id_with_another_code_is_refused_and_does_not_renew() {
     bench.run(100);
     assert_eq!(
         bench.give(drive(Origin::Operator, 1, FOLLOW)),
-        Verdict::Refused(Refused::CodeChanged)
+        Verdict::Refused(Refusal::CodeChanged)
     );
     bench.run(30);
     assert!(!code_moves(bench.board.code));
+}
+
+#[test]
+fn a_late_renewal_of_a_persons_setpoint_moves_nothing() {
+    let mut bench = Bench::manual();
+    let order = drive(Origin::Operator, 1, FORWARD);
+    bench.run_renewed(50, order);
+    bench.run(200);
+    assert_eq!(bench.give(order), Verdict::Ended(Finish::Aborted));
+    bench.run_renewed(200, order);
+    assert!(!code_moves(bench.board.code));
+    bench.run_renewed(50, drive(Origin::Operator, 2, FORWARD));
+    assert!(code_moves(bench.board.code), "a new order does");
+}
+
+#[test]
+fn a_persons_order_that_everybody_has_forgotten_is_too_old_to_begin() {
+    let mut bench = Bench::manual();
+    let given = bench.now;
+    let order = drive(Origin::Operator, 1, FORWARD);
+    bench.run_renewed(50, order);
+    for id in 2..100 {
+        bench.give(drive(Origin::Operator, id, FOLLOW));
+        bench.run(20);
+    }
+    bench.run(200);
+    let late = |bench: &mut Bench, order| bench.arbiter.order(bench.now, given, &order);
+    assert_eq!(late(&mut bench, order), Verdict::Refused(Refusal::Stale));
+    bench.run(50);
+    assert!(!code_moves(bench.board.code));
+    // In force it is renewed however long ago it was given; logic's order is not asked for it.
+    bench
+        .arbiter
+        .order(bench.now, bench.now, &drive(Origin::Operator, 200, FORWARD));
+    let renewed = drive(Origin::Operator, 200, FORWARD);
+    assert_eq!(late(&mut bench, renewed), Verdict::Renewed);
+    bench.arbiter.set_mode(Mode::Autonomous);
+    assert_eq!(
+        late(&mut bench, drive(Origin::Logic, 1, FOLLOW)),
+        Verdict::Executes
+    );
 }

@@ -1,13 +1,16 @@
 //! The arbiter in virtual time, against a model of the steering board.
 
 mod authority;
+mod guards;
 mod leases;
 mod restarts;
+mod silence;
 mod writing;
 
+use lager_topics::{Finish, Health, Mode, Origin, Refusal, SteeringOrder};
+use lager_wire::{ArmCommand, Command, SteerCommand, SteerData, SteerFlags, Version, WheelCommand};
+
 use super::*;
-use lager_topics::{OrderKind, SteeringOrder};
-use lager_wire::{ArmCommand, SteerData, SteerFlags};
 
 /// What the steering board does with commands, as far as the arbiter can tell (T2, T4): a new
 /// sequence byte executes, the same renews, a command older than 150 ms is given up.
@@ -113,16 +116,7 @@ fn drive(origin: Origin, id: u32, command: Command) -> SteeringOrder {
     SteeringOrder {
         id,
         origin: origin.into(),
-        kind: OrderKind::Drive.into(),
         code: command.code(),
-        arm_granted: 0,
-    }
-}
-
-fn stop(origin: Origin) -> SteeringOrder {
-    SteeringOrder {
-        origin: origin.into(),
-        kind: OrderKind::Stop.into(),
         ..SteeringOrder::default()
     }
 }
@@ -132,6 +126,12 @@ fn granted_standby(id: u32) -> SteeringOrder {
         arm_granted: 1,
         ..drive(Origin::Logic, id, STANDBY)
     }
+}
+
+/// One turn of a shell: time passes once, and all that is due is written.
+fn turn(arbiter: &mut Arbiter, now: Duration) -> Vec<SteerCommand> {
+    arbiter.advance(now);
+    std::iter::from_fn(|| arbiter.poll(now)).collect()
 }
 
 const FORWARD: Command = Command::Wheel(WheelCommand::ManualForward);
@@ -177,12 +177,12 @@ impl Bench {
     }
 
     fn give(&mut self, order: SteeringOrder) -> Verdict {
-        self.arbiter.order(self.now, &order)
+        self.arbiter.order(self.now, self.now, &order)
     }
 
     fn run(&mut self, millis: u64) {
         for _ in 0..millis {
-            while let Some(command) = self.arbiter.poll(self.now) {
+            for command in turn(&mut self.arbiter, self.now) {
                 self.written.push((self.now, command));
                 if self.connected {
                     self.board.take(self.now, command);

@@ -22,6 +22,66 @@ fn a_rebooted_board_drives_on_by_a_live_setpoint_but_repeats_no_turn() {
 }
 
 #[test]
+fn a_reset_or_a_renewed_link_ends_what_a_person_drove() {
+    for rebooted in [false, true] {
+        let mut bench = Bench::manual();
+        let order = drive(Origin::Operator, 1, FORWARD);
+        bench.run_renewed(50, order);
+        bench.board = Board::new();
+        bench.arbiter.board_down();
+        bench.arbiter.board_up(bench.now, Version::One, rebooted);
+        bench.run_renewed(200, order);
+        assert!(!bench.board.executed.contains(&FORWARD.code()));
+        assert_eq!(bench.ended(), Some((Origin::Operator, 1, Finish::Aborted)));
+        bench.run_renewed(50, drive(Origin::Operator, 2, FORWARD));
+        assert!(code_moves(bench.board.code));
+    }
+}
+
+#[test]
+fn a_person_who_goes_on_drives_on_across_a_restart_of_the_bridge() {
+    for rebooted in [false, true] {
+        let mut bench = Bench::manual();
+        let order = drive(Origin::Operator, 1, FORWARD);
+        bench.run_renewed(50, order);
+        bench.restart_bridge();
+        bench.run(1);
+        bench.arbiter.board_up(bench.now, Version::One, rebooted);
+        bench.run_renewed(200, order);
+        assert_eq!(code_moves(bench.board.code), !rebooted);
+    }
+}
+
+#[test]
+fn what_a_person_drove_is_summed_across_a_restart_of_the_bridge() {
+    let mut bench = Bench::autonomous();
+    bench.run_renewed(500, drive(Origin::Logic, 1, FOLLOW));
+    bench.arbiter.set_mode(Mode::Manual);
+    bench.run(300);
+    let rolled_out = bench.health().driven_by_hand;
+    assert!(
+        rolled_out <= 2 * 200 * 1_000,
+        "{rolled_out}: logic's are not counted"
+    );
+    bench.run_renewed(1_000, drive(Origin::Operator, 1, FORWARD));
+    bench.run(300);
+    let driven = bench.health().driven_by_hand - rolled_out;
+    // Both motors at 100, a second and what was left of the lease.
+    assert!((200_000_000..230_000_000).contains(&driven), "{driven}");
+    let before = bench.health().driven_by_hand;
+    bench.restart_bridge();
+    assert_eq!(bench.health().driven_by_hand, before);
+    bench.arbiter.board_up(bench.now, Version::One, false);
+    bench.run_renewed(100, drive(Origin::Operator, 2, FORWARD));
+    let before = bench.health().driven_by_hand;
+    bench.restart_bridge();
+    assert!(
+        bench.health().driven_by_hand >= before + 200 * 150_000,
+        "nobody has counted what the board did alone"
+    );
+}
+
+#[test]
 fn a_turn_goes_on_when_only_the_link_was_renewed() {
     let mut bench = Bench::autonomous();
     let turn = drive(Origin::Logic, 1, LEFT_PERP);
@@ -59,14 +119,14 @@ fn a_turn_that_vanished_with_an_unplugged_board_is_not_repeated() {
 fn a_restarted_bridge_keeps_mode_latch_and_counters() {
     let mut bench = Bench::autonomous();
     bench.give(drive(Origin::Operator, 5, DROP));
-    bench.give(stop(Origin::Operator));
+    bench.arbiter.stop();
     bench.restart_bridge();
     assert_eq!(bench.arbiter.mode(), Mode::Autonomous);
     assert!(bench.arbiter.is_stopped());
     assert_eq!(bench.health().orders_refused, 1);
     assert_eq!(
         bench.give(drive(Origin::Logic, 1, FORWARD)),
-        Verdict::Ignored(Ignored::StopLatched)
+        Verdict::Ignored(Refusal::StopLatched)
     );
 }
 
@@ -246,9 +306,7 @@ fn no_mixture_of_events_moves_the_robot_without_a_live_order() {
         let mut restarted = Duration::ZERO;
         for _ in 0..300 {
             match next(24) {
-                0 => {
-                    bench.give(stop(Origin::Logic));
-                }
+                0 => bench.arbiter.stop(),
                 1 | 2 => bench.arbiter.resume_from_stop(),
                 3 => bench.arbiter.set_mode(Mode::Manual),
                 4 => bench.arbiter.set_mode(Mode::Autonomous),

@@ -114,13 +114,20 @@ fn a_board_that_gave_up_a_live_setpoint_is_told_anew() {
     assert!(!bench.board.failsafe);
 }
 
-#[test]
-fn an_original_board_is_told_each_command_once() {
-    let mut bench = Bench::autonomous();
+/// An arbiter with an original board, which may be driven or not.
+fn with_original_board(mode: Mode, accepted: bool) -> Bench {
+    let mut bench = Bench::new(mode);
     bench.arbiter = Arbiter::new();
-    bench.arbiter.set_mode(Mode::Autonomous);
+    bench.arbiter.set_mode(mode);
+    bench.arbiter.drive_original_boards(accepted);
     bench.arbiter.board_up(bench.now, Version::Original, false);
     bench.written.clear();
+    bench
+}
+
+#[test]
+fn an_original_board_is_told_each_moving_command_once_and_standby_again_and_again() {
+    let mut bench = with_original_board(Mode::Autonomous, true);
     bench.run(100);
     bench.run_renewed(500, drive(Origin::Logic, 1, FOLLOW));
     bench.run_renewed(3_400, drive(Origin::Logic, 2, LEFT_PERP));
@@ -128,25 +135,69 @@ fn an_original_board_is_told_each_command_once() {
     bench.run_renewed(3_400, drive(Origin::Logic, 3, LEFT_PERP));
     bench.run_renewed(100, drive(Origin::Logic, 4, FOLLOW));
     bench.run(500);
-    let codes: Vec<_> = bench
+    let mut codes: Vec<_> = bench
         .written
         .iter()
         .map(|(_, command)| command.command().unwrap())
         .collect();
+    let moving = codes.iter().filter(|command| moves(**command)).count();
+    assert_eq!(moving, 4);
+    codes.dedup();
     assert_eq!(
         codes,
         [
             STANDBY, FOLLOW, LEFT_PERP, STANDBY, LEFT_PERP, STANDBY, FOLLOW, STANDBY
         ]
     );
+    let pause = |pair: &[(Duration, SteerCommand)]| pair[1].0.checked_sub(pair[0].0).unwrap();
+    let standing = bench.written.windows(2).filter(|pair| {
+        pair.iter()
+            .all(|(_, command)| command.command() == Some(STANDBY))
+    });
+    assert!(standing.clone().count() > 10);
+    assert!(standing.map(pause).all(|pause| pause == RESEND));
+}
+
+#[test]
+fn an_original_board_is_told_standby_only_unless_that_was_accepted() {
+    let mut bench = with_original_board(Mode::Manual, false);
+    assert_eq!(
+        bench.give(drive(Origin::Operator, 1, FORWARD)),
+        Verdict::Refused(Refusal::OriginalBoard)
+    );
+    bench.run(500);
+    bench.arbiter.set_mode(Mode::Autonomous);
+    assert_eq!(
+        bench.give(drive(Origin::Logic, 1, FOLLOW)),
+        Verdict::Ignored(Refusal::OriginalBoard)
+    );
+    bench.run(500);
+    assert_eq!(bench.health().blocked, Refusal::OriginalBoard);
+    assert!(bench.written.len() > 20, "it is told to stand");
+    assert!(
+        bench
+            .written
+            .iter()
+            .all(|(_, command)| command.command() == Some(STANDBY))
+    );
+}
+
+#[test]
+fn what_an_original_board_is_told_by_hand_is_summed() {
+    let mut bench = with_original_board(Mode::Manual, true);
+    bench.run_renewed(1_000, drive(Origin::Operator, 1, FORWARD));
+    bench.run(1_000);
+    let driven = bench.health().driven_by_hand;
+    assert!((200_000_000..230_000_000).contains(&driven), "{driven}");
 }
 
 #[test]
 fn what_an_original_board_reports_ends_no_order() {
     let mut arbiter = Arbiter::new();
+    arbiter.drive_original_boards(true);
     arbiter.board_up(ms(0), Version::Original, false);
-    arbiter.order(ms(0), &drive(Origin::Operator, 1, ARM_UP));
-    while arbiter.poll(ms(0)).is_some() {}
+    arbiter.order(ms(0), ms(0), &drive(Origin::Operator, 1, ARM_UP));
+    turn(&mut arbiter, ms(0));
     for seq in 0..=u8::MAX {
         let mut data = Board::new().step(ms(1));
         data.finished_seq = seq;
@@ -159,16 +210,21 @@ fn what_an_original_board_reports_ends_no_order() {
 #[test]
 fn nothing_is_written_while_no_board_is_up() {
     let mut arbiter = Arbiter::new();
-    arbiter.order(ms(0), &drive(Origin::Operator, 1, FORWARD));
-    assert_eq!(arbiter.poll(ms(10)), None);
+    arbiter.set_mode(Mode::Autonomous);
+    let forward = drive(Origin::Logic, 1, FORWARD);
+    assert_eq!(
+        arbiter.order(ms(0), ms(0), &forward),
+        Verdict::Ignored(Refusal::NoBoard)
+    );
+    assert_eq!(turn(&mut arbiter, ms(10)), []);
     arbiter.board_up(ms(20), Version::One, false);
-    let mut written = Vec::new();
-    while let Some(command) = arbiter.poll(ms(20)) {
-        written.push(command.command().unwrap());
-    }
-    assert_eq!(written, [STANDBY, FORWARD]);
+    arbiter.order(ms(20), ms(20), &forward);
+    let written = turn(&mut arbiter, ms(20));
+    let commands = [written[0].command(), written[1].command()];
+    assert_eq!(commands, [Some(STANDBY), Some(FORWARD)]);
+    assert_eq!(written.len(), 2);
     arbiter.board_down();
-    assert_eq!(arbiter.poll(ms(90)), None);
+    assert_eq!(turn(&mut arbiter, ms(90)), []);
 }
 
 #[test]
@@ -189,14 +245,16 @@ fn a_parked_arbiter_writes_standby_again_and_again_and_takes_no_orders() {
     for version in [Version::One, Version::Original] {
         let mut arbiter = Arbiter::new();
         arbiter.board_up(ms(0), version, false);
-        arbiter.order(ms(0), &drive(Origin::Operator, 1, FORWARD));
-        while arbiter.poll(ms(0)).is_some() {}
+        arbiter.order(ms(0), ms(0), &drive(Origin::Operator, 1, FORWARD));
+        turn(&mut arbiter, ms(0));
         arbiter.park();
         assert_eq!(
-            arbiter.order(ms(1), &drive(Origin::Operator, 2, FORWARD)),
-            Verdict::Ignored(Ignored::ShuttingDown)
+            arbiter.order(ms(1), ms(1), &drive(Origin::Operator, 2, FORWARD)),
+            Verdict::Ignored(Refusal::ShuttingDown)
         );
-        let written: Vec<_> = (1..100).filter_map(|now| arbiter.poll(ms(now))).collect();
+        let written: Vec<_> = (1..100)
+            .flat_map(|now| turn(&mut arbiter, ms(now)))
+            .collect();
         assert!(written.len() >= 4, "{version:?}");
         assert!(
             written
@@ -219,12 +277,11 @@ fn the_next_due_time_misses_nothing() {
     eager.give(order);
     eager.run(400);
     let mut written = Vec::new();
-    lazy.order(start, &order);
+    lazy.order(start, start, &order);
     let mut now = start;
     while now < start + ms(400) {
-        while let Some(command) = lazy.poll(now) {
-            written.push((now, command));
-        }
+        let due = turn(&mut lazy, now).into_iter();
+        written.extend(due.map(|command| (now, command)));
         now = lazy.next_due().unwrap().max(now);
     }
     written.retain(|(at, _)| *at < start + ms(400));

@@ -222,6 +222,16 @@ impl SensorBoard {
         self.restarts += 1;
     }
 
+    /// Ends the calibration that runs, with so many sensors that have seen floor and tape.
+    pub(crate) fn end_calibration(&mut self, sensors: i16, status: SettingStatus) {
+        self.answers.push(Payload::SettingReply(SettingReply {
+            key: SettingKey::Calibrate,
+            seq: self.calibration.expect("a calibration was asked for"),
+            value: sensors,
+            status,
+        }));
+    }
+
     fn set(&mut self, packet: &Packet) {
         let Payload::Setting(setting) = packet.payload else {
             return;
@@ -240,7 +250,7 @@ impl SensorBoard {
                 }
                 SettingStatus::Accepted
             }
-            SettingKey::GainP | SettingKey::GainD => SettingStatus::NotHere,
+            _ => SettingStatus::NotHere,
         };
         self.answers.push(Payload::SettingReply(SettingReply {
             key: setting.key,

@@ -1,7 +1,7 @@
 //! A robot for tests: an isolated bus, two pseudo terminals with scripted boards behind them, and
 //! the bridge in a thread of this process.
 //!
-//! Every robot has its own bus prefix and folder, and removes both when it is dropped. Nothing
+//! Every robot has its own bus and folder, and removes both when it is dropped. Nothing
 //! here waits without an end: [`wait_until`] panics after [`PATIENCE`].
 #![allow(
     dead_code,
@@ -21,13 +21,16 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lager_bridge::BridgeConfig;
-use lager_ports::{Bus, BusConfig, Cause, Client, PortError, Publisher, Shutdown, Subscriber};
-use lager_topics::{
-    Answer, Ask, AskKind, BridgeRequest, DistanceFrame, Health, LineFrame, LinkHealth, Mode,
-    OrderKind, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder,
-    SteeringReport, SteeringState, Topic,
+use lager_ports::{
+    Bus, BusConfig, Cause, Client, Clock, PortError, Publisher, Shutdown, Stop, StopPage, StopTold,
+    StopWord, Subscriber,
 };
-use lager_wire::{Command, WheelCommand};
+use lager_topics::{
+    Answer, Ask, AskKind, BridgeRequest, DistanceFrame, Finish, Health, LineFrame, LinkHealth,
+    Mode, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringReport,
+    SteeringState, StopCause, Topic,
+};
+use lager_wire::{ArmCommand, Command, WheelCommand};
 
 pub(crate) use board::{Board, Peer, SensorBoard};
 pub(crate) use original::{OriginalSensor, OriginalSteering};
@@ -67,11 +70,15 @@ pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
 /// The bus of an isolation.
 pub(crate) fn bus_config(name: &str) -> BusConfig {
     BusConfig {
-        prefix: Some(name.to_owned()),
-        root: Some(PathBuf::from("/tmp").join(name)),
+        folder: Some(PathBuf::from("/dev/shm").join(name)),
         speed: SPEED,
         ..BusConfig::default()
     }
+}
+
+/// Where an isolation's ports are.
+pub(crate) fn folder(name: &str) -> PathBuf {
+    PathBuf::from("/tmp").join(name)
 }
 
 /// An isolated bus.
@@ -88,7 +95,7 @@ impl Isolation {
             std::process::id(),
             NEXT.fetch_add(1, Ordering::Relaxed)
         );
-        let folder = PathBuf::from("/tmp").join(&name);
+        let folder = folder(&name);
         std::fs::create_dir_all(&folder).unwrap();
         Self {
             config: bus_config(&name),
@@ -98,7 +105,8 @@ impl Isolation {
 
     /// The name by which another process joins with [`bus_config`].
     pub(crate) fn name(&self) -> &str {
-        self.config.prefix.as_deref().expect("it is named")
+        let folder = self.config.folder.as_deref().and_then(Path::file_name);
+        folder.and_then(|name| name.to_str()).expect("it is named")
     }
 
     pub(crate) fn folder(&self) -> &Path {
@@ -114,15 +122,8 @@ impl Drop for Isolation {
     /// Removes what the transport leaves for the next process of a domain, which never comes.
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder);
-        let prefix = self.name();
-        for file in std::fs::read_dir("/dev/shm")
-            .into_iter()
-            .flatten()
-            .flatten()
-        {
-            if file.file_name().to_string_lossy().starts_with(prefix) {
-                let _ = std::fs::remove_file(file.path());
-            }
+        if let Ok(place) = self.config.place() {
+            place.remove();
         }
     }
 }
@@ -180,6 +181,7 @@ impl Drop for Bridge {
 pub(crate) struct Hands {
     orders: Publisher<SteeringCommand>,
     requests: Client<BridgeRequest>,
+    pub(crate) stop_word: PathBuf,
     pub(crate) line: Seen<SensorLine>,
     pub(crate) distance: Seen<SensorDistance>,
     pub(crate) state: Seen<SteeringState>,
@@ -234,6 +236,7 @@ impl Hands {
         Self {
             orders: bus.publisher().unwrap(),
             requests: bus.client().unwrap(),
+            stop_word: bus.place().robot(bus.robot()).join(StopPage::FILE),
             line: Seen::new(bus),
             distance: Seen::new(bus),
             state: Seen::new(bus),
@@ -264,6 +267,27 @@ impl Hands {
         }
     }
 
+    /// Renews `order` until its one-shot command is carried out, and returns its number then. Where
+    /// this machine was held up for longer than an order lasts, the command was cut short; it is
+    /// ordered anew under the next number.
+    pub(crate) fn carry_out(&mut self, mut order: SteeringOrder) -> u32 {
+        loop {
+            let mut finish = None;
+            self.give_until(order, "the command has ended", |hands| {
+                let reports = hands.state.drain();
+                let own = reports.iter().find(|state| {
+                    (state.finished_id, state.finished_origin) == (order.id, order.origin)
+                });
+                finish = own.map(|state| state.finish.get());
+                finish.is_some()
+            });
+            if finish == Some(Some(Finish::Done)) {
+                return order.id;
+            }
+            order.id += 1;
+        }
+    }
+
     pub(crate) fn ask(&self, ask: Ask) -> Answer {
         self.requests.call(ask, PATIENCE).unwrap()
     }
@@ -283,12 +307,13 @@ impl Hands {
         })
     }
 
-    pub(crate) fn stop(&self) {
-        self.give(SteeringOrder {
-            origin: Origin::Operator.into(),
-            kind: OrderKind::Stop.into(),
-            ..SteeringOrder::default()
-        });
+    pub(crate) fn stop(&self) -> Stop {
+        StopWord::set(&self.stop_word, Role::Operator, StopCause::Ordered).unwrap()
+    }
+
+    /// What the file of the stop word tells.
+    pub(crate) fn stop_told(&self) -> StopTold {
+        StopWord::read(&self.stop_word).unwrap().expect("a file")
     }
 
     pub(crate) fn wait_for_health(
@@ -349,11 +374,15 @@ pub(crate) struct Robot<A: Peer = SensorBoard, B: Peer = SteeringBoard> {
 }
 
 impl Robot {
-    /// Two version-1 boards and a bridge, all up.
+    /// Two version-1 boards and a bridge, all up: the bridge says so, and the boards have read it.
     pub(crate) fn up() -> Self {
         let mut robot = Self::with(SensorBoard::new(), SteeringBoard::new());
         robot.start();
         robot.wait_until_up();
+        wait_until("the boards have read so", || {
+            robot.sensor.with(|board| board.link.is_up())
+                && robot.steering.with(|board| board.link.is_up())
+        });
         robot
     }
 
@@ -400,11 +429,11 @@ impl<A: Peer, B: Peer> Robot<A, B> {
 /// An order of the operator.
 pub(crate) fn operator(id: u32, command: Command) -> SteeringOrder {
     SteeringOrder {
+        given_ns: Clock::monotonic_ns(),
         id,
         origin: Origin::Operator.into(),
-        kind: OrderKind::Drive.into(),
         code: command.code(),
-        arm_granted: 0,
+        ..SteeringOrder::default()
     }
 }
 
@@ -419,4 +448,5 @@ pub(crate) fn logic(id: u32, command: Command) -> SteeringOrder {
 pub(crate) const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
 pub(crate) const FORWARD: Command = Command::Wheel(WheelCommand::ManualForward);
 pub(crate) const FOLLOW: Command = Command::Wheel(WheelCommand::ActiveForward);
+pub(crate) const ARM_UP: Command = Command::Arm(ArmCommand::Up);
 pub(crate) const LEFT_PERP: Command = Command::Wheel(WheelCommand::LeftPerp);

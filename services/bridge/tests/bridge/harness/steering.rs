@@ -3,8 +3,8 @@
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    ArmData, BoardStatus, Callsign, Command, Packet, Payload, ResetCause, Setting, SettingKey,
-    SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags, WheelCommand,
+    ArmData, ArmProfile, BoardStatus, Callsign, Command, Packet, Payload, ResetCause, Setting,
+    SettingKey, SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags, WheelCommand,
 };
 
 use super::board::{GAP_US, Peer};
@@ -18,11 +18,18 @@ pub(crate) struct SteeringBoard {
     /// Every command executed, in order, over restarts.
     pub(crate) executed: Vec<u8>,
     pub(crate) gains: [i16; 2],
+    /// The arm's profile as it was told, and whether it is in force.
+    pub(crate) profile: [u16; ArmProfile::VALUES],
+    pub(crate) profile_in_force: bool,
+    /// Takes no profile.
+    pub(crate) stubborn: bool,
     pub(crate) restarts: usize,
     /// How often the link came up.
     pub(crate) ups: usize,
     /// The age limit has struck.
     pub(crate) failsafe: bool,
+    /// It reports nothing; all else works.
+    pub(crate) mute: bool,
     /// How often a packet with a command came.
     pub(crate) commands: usize,
     reset: ResetCause,
@@ -42,9 +49,13 @@ impl SteeringBoard {
             code: 0,
             executed: Vec::with_capacity(1 << 12),
             gains: [2, 2],
+            profile: [0; ArmProfile::VALUES],
+            profile_in_force: false,
+            stubborn: false,
             restarts: 0,
             ups: 0,
             failsafe: false,
+            mute: false,
             commands: 0,
             reset: ResetCause::PowerOn,
             last_seq: None,
@@ -63,6 +74,7 @@ impl SteeringBoard {
             executed: std::mem::take(&mut self.executed),
             restarts: self.restarts + 1,
             ups: self.ups,
+            stubborn: self.stubborn,
             reset: cause,
             ..Self::new()
         };
@@ -121,11 +133,32 @@ impl SteeringBoard {
         }
     }
 
+    fn set_profile(&mut self, setting: &Setting) {
+        if setting.key == SettingKey::ArmProfile {
+            self.profile_in_force =
+                !self.stubborn && setting.value == ArmProfile::check(&self.profile);
+        } else if let Some(index) = ArmProfile::index(setting.key) {
+            self.profile[index] = setting.value.cast_unsigned();
+        }
+        let last = setting.key == SettingKey::ArmProfile;
+        self.out.push(Payload::SettingReply(SettingReply {
+            key: setting.key,
+            seq: setting.seq,
+            value: setting.value,
+            status: if last && !self.profile_in_force {
+                SettingStatus::OutOfRange
+            } else {
+                SettingStatus::Accepted
+            },
+        }));
+    }
+
     fn set(&mut self, setting: &Setting) {
         let place = match setting.key {
             SettingKey::GainP => 0,
             SettingKey::GainD => 1,
             SettingKey::RawLine | SettingKey::Calibrate => return,
+            _ => return self.set_profile(setting),
         };
         let status = if setting.value <= 100 {
             self.gains[place] = setting.value;
@@ -139,6 +172,19 @@ impl SteeringBoard {
             value: self.gains[place],
             status,
         }));
+    }
+
+    fn status(&self) -> BoardStatus {
+        BoardStatus {
+            reset: self.reset,
+            bad_packets: self.link.bad_packets(),
+            lost_packets: self.link.lost_packets(),
+            refused: 1,
+            exde_errors: 2,
+            servo_timeouts: 3,
+            load_percent: 4,
+            longest_loop_100us: 5,
+        }
     }
 
     fn report(&self) -> SteerData {
@@ -168,16 +214,7 @@ impl Peer for SteeringBoard {
         match self.link.push(byte, now_us) {
             Some(BoardEvent::Up) => {
                 self.ups += 1;
-                self.out.push(Payload::BoardStatus(BoardStatus {
-                    reset: self.reset,
-                    bad_packets: self.link.bad_packets(),
-                    lost_packets: self.link.lost_packets(),
-                    refused: 1,
-                    exde_errors: 2,
-                    servo_timeouts: 3,
-                    load_percent: 4,
-                    longest_loop_100us: 5,
-                }));
+                self.out.push(Payload::BoardStatus(self.status()));
             }
             Some(BoardEvent::Packet(Packet { payload, .. })) => match payload {
                 Payload::SteerCommand(command) => self.command(command, now_us),
@@ -206,7 +243,11 @@ impl Peer for SteeringBoard {
         }
         if now_us.wrapping_sub(self.report_us) >= 5_000 {
             self.report_us = now_us;
-            let report = Payload::SteerData(self.report());
+            // Muted it says something all the same, so that its link stays up.
+            let report = match self.mute {
+                false => Payload::SteerData(self.report()),
+                true => Payload::BoardStatus(self.status()),
+            };
             out.extend(self.link.encode(report).into_iter().flatten());
         }
     }

@@ -1,0 +1,116 @@
+//! What a robot and a station of this project say to each other besides the document's
+//! [`conversation`](crate::conversation).
+//!
+//! # Who speaks it
+//!
+//! The robot's first line is `lager 1 <name>`, with the highest version that it speaks and its
+//! name. It does not wait for an answer but goes on with `sidelength`. A station that speaks the
+//! extension answers `lager 1 <name>`; from then on both use the lower of the two versions. To any
+//! other peer the robot never says another line of it, and what such a peer says to the first line
+//! is passed over.
+//!
+//! A robot may repeat its first line at any time, and such a station answers it each time: so each
+//! side knows that the other is there. A robot that is driven by hand does so every 50 ms, and
+//! stands if nothing at all has come from the station for 150 ms.
+//!
+//! The document's questions and answers go on between the lines below, which are asynchronous in
+//! both directions: nobody waits for a line before he sends his own. The first word tells what a
+//! line is.
+//!
+//! # Station to robot
+//!
+//! ```text
+//! stop [<number>]                      stand at once; has a lane of its own, see below
+//! do <number> <action>                 answered by `done` or `refused` with that number, once
+//!
+//! <number> ::= <int>                   0 to 4294967295, one not used before on this connection
+//! <action> ::= order <order> <prodid>  fetch a product after those that wait
+//!            | cancel <order>          fetch it no more
+//!            | first <order>           fetch it before those that wait
+//!            | clear                   fetch none of those that wait
+//!            | mode <mode>             who drives
+//!            | resume                  end a stop
+//!            | reset                   the robot stands on the delivery corner, looking inwards
+//!            | picked [force]          the goods are in the gripper; force: felt or not
+//!            | drive <styrcomm> <ms>   the wheels, for 1 to 1000 ms from receipt
+//!            | arm <armcomm>           one step of the arm
+//!            | gains <int> <int>       of the error and of its change, each 0 to 255
+//!            | calibrate               the line sensors, on the tape under the robot
+//!            | obstacle put <edge>     in a simulated world
+//!            | obstacle take <edge>
+//! <order>  ::= <int>                   0 to 4294967295, chosen by the station
+//! <mode>   ::= manual | autonomous
+//! <edge>   ::= <coord> <direction>     from a node to the next one that way
+//! ```
+//!
+//! `drive` is renewed by a further `do` before its time is over, with or without another command;
+//! code 8 and 9 are turns that run once and need no renewal. A robot counts the time by its own
+//! clock from when it has read the line.
+//!
+//! **A stop has a lane of its own.** Whoever sends puts it before all lines that wait to be sent;
+//! whoever receives reads on to the end of what has arrived and carries out every stop in it before
+//! anything else. It is never queued, and commands to wheels and arm that wait are dropped (C5); the
+//! products to fetch still wait. A line whose first word is `stop` is a stop even if what follows
+//! cannot be read; then it has no number and is not confirmed. Only `resume` ends it.
+//!
+//! # Robot to station
+//!
+//! ```text
+//! stopped <number> <int>               both boards show the stop, that many ms after its receipt
+//! done <number>
+//! refused <number> <text>              why it was not done
+//! state {<key>=<value>}                20 times a second; see `State`
+//! route <int> {<coord>}                nodes of the way; how many there are, and the first of them
+//! blocked <int> {<edge>}               ways that are not taken, likewise
+//! queue <int> {<order> <prodid>}       what is fetched next, likewise
+//! event <event> <coord> <order> <prodid> [<text>]
+//!                                      at that node; `-` where there is no order or product
+//! latency <int> <int> <int> <int> <int> <int>
+//!                                      commands measured; half, 90 %, 99 %, 99.9 %, all of them
+//!                                      took at most so many microseconds
+//! truth <int> <int> <int> <prodid>     of a simulated robot: x and y in mm, heading in degrees,
+//!                                      what it holds or `-`
+//! thought <text>                       as in the document
+//!
+//! <event> ::= in_position | getting_item | item_delivered | next_node | refused
+//!           | pickup_refused | failed
+//! ```
+//!
+//! Here a list may be empty, and `route`, `blocked` and `queue` are sent when they have changed. A
+//! line that cannot be read changes nothing; if it has a number the robot answers `refused`.
+//!
+//! ```
+//! use lager_lines::conversation::{RobotLine, StationLine};
+//! use lager_lines::extension::{Action, Order, Report};
+//! use lager_lines::to_line;
+//!
+//! let asked = StationLine::read("do 17 order 4 7").unwrap();
+//! let StationLine::Order(Order::Do { number, action }) = asked else { panic!() };
+//! assert!(matches!(action, Action::Add { order: 4, .. }));
+//! assert_eq!(to_line(&RobotLine::Report(Report::Done { number })).unwrap(), "done 17\n");
+//!
+//! let error = Order::read("do 18 drive F3 200").unwrap().unwrap_err();
+//! assert_eq!(error.number(), Some(18));
+//! assert_eq!(
+//!     error.to_string(),
+//!     "column 13: 243 is no code of the wheels; they have 1 to 9",
+//! );
+//!
+//! assert_eq!(Order::read("stop 0x13"), Some(Ok(Order::Stop { number: None })));
+//! assert_eq!(
+//!     RobotLine::read("blocked 1 2 0 up").unwrap().to_string(),
+//!     "blocked 1 2 0 up",
+//! );
+//! ```
+
+mod hello;
+mod listed;
+mod order;
+mod report;
+mod state;
+
+pub use hello::Hello;
+pub use listed::{Edge, Listed, Queued};
+pub use order::{Action, ActionError, LeaseMs, Mode, Order, Put};
+pub use report::{Event, EventKind, Latency, Report, Truth};
+pub use state::{Degrees, Servos, State};

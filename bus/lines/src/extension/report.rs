@@ -1,0 +1,315 @@
+//! Robot to station: what became of orders, and what goes on.
+
+use core::fmt;
+
+use super::listed::{Edge, Listed, Queued};
+use super::order::number;
+use super::state::{Degrees, State};
+use crate::misread::Misread;
+use crate::reader::Reader;
+use crate::text::Text;
+use crate::warehouse::{Coord, ProductId};
+
+/// What a robot tells.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Report {
+    /// Both boards show the stop.
+    Stopped {
+        /// The stop's number.
+        number: u32,
+        /// How long that took from its receipt, in ms.
+        after_ms: u32,
+    },
+    /// The action is done.
+    Done {
+        /// Its number.
+        number: u32,
+    },
+    /// The action is not done.
+    Refused {
+        /// Its number.
+        number: u32,
+        /// Why.
+        reason: Text,
+    },
+    /// What it is doing. Boxed: it is much larger than all others.
+    State(Box<State>),
+    /// The nodes of its way, the next one first.
+    Route(Listed<Coord>),
+    /// Ways that it does not take.
+    Blocked(Listed<Edge>),
+    /// What it fetches next, in this order.
+    Queue(Listed<Queued>),
+    /// Something has happened.
+    Event(Event),
+    /// How long it takes to react.
+    Latency(Latency),
+    /// Where a simulated robot really is.
+    Truth(Truth),
+}
+
+/// What has happened on a mission (C8).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// What.
+    pub kind: EventKind,
+    /// The node last passed; with `next_node` the one to which the robot goes.
+    pub node: Coord,
+    /// The order it belongs to.
+    pub order: Option<u32>,
+    /// The product of that order.
+    pub product: Option<ProductId>,
+    /// The reason, where there is one.
+    pub text: Text,
+}
+
+/// A kind of event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EventKind {
+    /// The robot stands at the goods.
+    InPosition,
+    /// The robot is on its way to the goods.
+    GettingItem,
+    /// The goods lie at the place of delivery.
+    ItemDelivered,
+    /// The robot goes to a node.
+    NextNode,
+    /// The order is not carried out.
+    Refused,
+    /// The goods are not felt in the gripper, so the robot does not leave.
+    PickupRefused,
+    /// The robot cannot go on.
+    Failed,
+}
+
+impl EventKind {
+    /// Every kind.
+    pub const ALL: [Self; 7] = [
+        Self::InPosition,
+        Self::GettingItem,
+        Self::ItemDelivered,
+        Self::NextNode,
+        Self::Refused,
+        Self::PickupRefused,
+        Self::Failed,
+    ];
+
+    /// The word.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::InPosition => "in_position",
+            Self::GettingItem => "getting_item",
+            Self::ItemDelivered => "item_delivered",
+            Self::NextNode => "next_node",
+            Self::Refused => "refused",
+            Self::PickupRefused => "pickup_refused",
+            Self::Failed => "failed",
+        }
+    }
+
+    fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.as_str() == word)
+    }
+}
+
+/// How long it takes from a sensor's frame to the command that it causes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Latency {
+    /// Commands measured since the last such line.
+    pub count: u32,
+    /// Half of them took at most this long, in us.
+    pub p50_us: u32,
+    /// Nine in ten took at most this long, in us.
+    pub p90_us: u32,
+    /// All but one in a hundred took at most this long, in us.
+    pub p99_us: u32,
+    /// All but one in a thousand took at most this long, in us.
+    pub p999_us: u32,
+    /// The longest, in us.
+    pub max_us: u32,
+}
+
+/// Where a simulated robot really is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Truth {
+    /// Middle of the axle, in mm to the right of node (0, 0).
+    pub x_mm: i32,
+    /// Middle of the axle, in mm up from node (0, 0).
+    pub y_mm: i32,
+    /// Where it looks.
+    pub heading: Degrees,
+    /// The product in its gripper.
+    pub carrying: Option<ProductId>,
+}
+
+impl Report {
+    /// Reads a line; `None` if its first word is another one.
+    ///
+    /// # Errors
+    ///
+    /// When something else stands behind the first word than belongs there.
+    pub fn read(line: &str) -> Option<Result<Self, Misread>> {
+        let mut reader = Reader::new(line);
+        let read = match reader.word().text {
+            "stopped" => read_stopped,
+            "done" => |reader: &mut Reader<'_>| {
+                let number = number(reader)?;
+                Ok(Self::Done { number })
+            },
+            "refused" => |reader: &mut Reader<'_>| {
+                Ok(Self::Refused {
+                    number: number(reader)?,
+                    reason: reader.rest_as_text()?,
+                })
+            },
+            "state" => |reader: &mut Reader<'_>| Ok(Self::State(Box::new(State::read(reader)?))),
+            "route" => |reader: &mut Reader<'_>| Ok(Self::Route(Listed::<Coord>::read(reader)?)),
+            "blocked" => |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Edge>::read(reader)?)),
+            "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
+            "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
+            "latency" => |reader: &mut Reader<'_>| Latency::read(reader).map(Self::Latency),
+            "truth" => |reader: &mut Reader<'_>| Truth::read(reader).map(Self::Truth),
+            _ => return None,
+        };
+        Some(read(&mut reader).and_then(|report| reader.end().map(|()| report)))
+    }
+}
+
+fn read_stopped(reader: &mut Reader<'_>) -> Result<Report, Misread> {
+    let number = number(reader)?;
+    let wanted = "a time from 0 to 4294967295 ms";
+    let after_ms = reader.word().number(wanted, 0, i64::from(u32::MAX))?;
+    Ok(Report::Stopped { number, after_ms })
+}
+
+/// What stands behind the next word, `None` for a `-`.
+fn read_or_dash<T>(
+    reader: &mut Reader<'_>,
+    read: impl FnOnce(&mut Reader<'_>) -> Result<T, Misread>,
+) -> Result<Option<T>, Misread> {
+    if reader.ahead().text == "-" {
+        reader.word();
+        return Ok(None);
+    }
+    read(reader).map(Some)
+}
+
+impl Event {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
+        let wanted = "one of in_position, getting_item, item_delivered, next_node, refused, \
+                      pickup_refused and failed";
+        Ok(Self {
+            kind: reader.word().read(wanted, EventKind::from_word)?,
+            node: Coord::read(reader)?,
+            order: read_or_dash(reader, number)?,
+            product: read_or_dash(reader, |reader| ProductId::from_word(reader.word()))?,
+            text: reader.rest_as_text()?,
+        })
+    }
+}
+
+impl Latency {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
+        let mut next = |wanted| reader.word().number(wanted, 0, i64::from(u32::MAX));
+        let time = "a time from 0 to 4294967295 us";
+        Ok(Self {
+            count: next("the number of commands measured, 0 to 4294967295")?,
+            p50_us: next(time)?,
+            p90_us: next(time)?,
+            p99_us: next(time)?,
+            p999_us: next(time)?,
+            max_us: next(time)?,
+        })
+    }
+}
+
+impl Truth {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
+        let mut way = || {
+            let (least, most) = (i64::from(i32::MIN), i64::from(i32::MAX));
+            reader.word().number("a way in mm", least, most)
+        };
+        Ok(Self {
+            x_mm: way()?,
+            y_mm: way()?,
+            heading: reader.word().read(Degrees::WANTED, Degrees::of)?,
+            carrying: read_or_dash(reader, |reader| ProductId::from_word(reader.word()))?,
+        })
+    }
+}
+
+/// What there is, or a `-`.
+struct OrDash<T>(Option<T>);
+
+impl<T: fmt::Display> fmt::Display for OrDash<T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            Some(value) => value.fmt(formatter),
+            None => formatter.write_str("-"),
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stopped { number, after_ms } => write!(formatter, "stopped {number} {after_ms}"),
+            Self::Done { number } => write!(formatter, "done {number}"),
+            Self::Refused { number, reason } => write!(formatter, "refused {number} {reason}"),
+            Self::State(state) => write!(formatter, "state{state}"),
+            Self::Route(nodes) => write!(formatter, "route {nodes}"),
+            Self::Blocked(ways) => write!(formatter, "blocked {ways}"),
+            Self::Queue(orders) => write!(formatter, "queue {orders}"),
+            Self::Event(event) => write!(formatter, "event {event}"),
+            Self::Latency(latency) => write!(formatter, "latency {latency}"),
+            Self::Truth(truth) => write!(formatter, "truth {truth}"),
+        }
+    }
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            kind,
+            node,
+            order,
+            product,
+            text,
+        } = self;
+        let (order, product) = (OrDash(*order), OrDash(*product));
+        write!(formatter, "{} {node} {order} {product}", kind.as_str())?;
+        if !text.as_str().is_empty() {
+            write!(formatter, " {text}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Latency {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            count,
+            p50_us,
+            p90_us,
+            p99_us,
+            p999_us,
+            max_us,
+        } = self;
+        write!(
+            formatter,
+            "{count} {p50_us} {p90_us} {p99_us} {p999_us} {max_us}"
+        )
+    }
+}
+
+impl fmt::Display for Truth {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            x_mm,
+            y_mm,
+            heading,
+            carrying,
+        } = self;
+        write!(formatter, "{x_mm} {y_mm} {heading} {}", OrDash(*carrying))
+    }
+}

@@ -1,0 +1,210 @@
+//! The extension: every line of it, and that lists and states always fit.
+
+use lager_lines::conversation::{RobotLine, StationLine};
+use lager_lines::extension::{
+    Action, Degrees, Edge, Hello, LeaseMs, Listed, Mode, Order, Queued, Report, Servos, State,
+};
+use lager_lines::{Coord, Direction, Name, ProductId, to_line};
+use lager_wire::{Binary, LineBits};
+
+#[test]
+fn every_line_of_the_station_is_read_and_written() {
+    for line in [
+        "lager 1 station",
+        "stop",
+        "stop 1",
+        "do 0 order 4294967295 7",
+        "do 1 cancel 4",
+        "do 2 first 4",
+        "do 3 clear",
+        "do 4 mode manual",
+        "do 5 mode autonomous",
+        "do 6 resume",
+        "do 7 reset",
+        "do 8 picked",
+        "do 9 picked force",
+        "do 10 drive 00000010 1",
+        "do 11 drive 00001001 1000",
+        "do 12 arm 11111010",
+        "do 13 gains 0 255",
+        "do 14 calibrate",
+        "do 15 obstacle put 1 2 up",
+        "do 16 obstacle take 0 0 right",
+    ] {
+        let read = StationLine::read(line).expect(line);
+        assert!(!matches!(read, StationLine::Answer(_)), "{line}");
+        assert_eq!(read.to_string(), line);
+    }
+}
+
+#[test]
+fn every_line_of_the_robot_is_read_and_written() {
+    for line in [
+        "lager 1 r1",
+        "stopped 4294967295 23",
+        "done 17",
+        "refused 17 the arm is locked while the wheels move",
+        "refused 17 ",
+        "state",
+        "state time_ms=81250 x_mm=-400 y_mm=0 heading_deg=90 node=1,0 looks=right next=2,0",
+        "state phase=waiting_for_order hold=none mode=manual stopped=1 order=4 product=7",
+        "state line_bits=00000110000 line_error=-3 distance_cm=25 left_duty=0 right_duty=255",
+        "state code=00000011 servos=512,-,0,1023,-,-,-,1 battery_dv=114 sensor_up=1 steering_up=0",
+        "state delivered=3 sensor_lost=0 steering_lost=1 bus_lost=18446744073709551615",
+        "route 0",
+        "route 2 1 0 2 0",
+        "route 300 1 0 2 0",
+        "blocked 1 2 0 up",
+        "queue 2 4 7 5 12",
+        "event next_node 2 1 - -",
+        "event in_position 1 0 4 7",
+        "event getting_item 1 0 4 7",
+        "event item_delivered 0 0 4 7",
+        "event refused 1 0 4 7 product 7 is not on my map",
+        "event pickup_refused 1 0 4 7 the claw is closed on nothing, at 300 of 310",
+        "event failed 1 0 - - I have lost the line",
+        "latency 500 110 180 240 900 4294967295",
+        "truth -35 2147483647 359 -",
+        "truth 0 0 0 7",
+    ] {
+        let read = RobotLine::read(line).expect(line);
+        assert!(!matches!(read, RobotLine::Request(_)), "{line}");
+        assert_eq!(read.to_string(), line);
+    }
+}
+
+#[test]
+fn two_versions_meet_at_the_lower_one() {
+    let hello = |version| Hello {
+        version,
+        name: Name::new("r1").expect("a name"),
+    };
+    let ours = hello(Hello::VERSION);
+    assert_eq!(ours.version_with(&hello(9)), 1);
+    assert_eq!(hello(9).version_with(&ours), 1);
+}
+
+#[test]
+fn a_state_may_have_fields_that_are_not_known_here() {
+    let line = "state mood=fine x_mm=1 y_mm=2 mood=bad";
+    let Some(Ok(Report::State(state))) = Report::read(line) else {
+        panic!("a state");
+    };
+    let known = State {
+        x_mm: Some(1),
+        y_mm: Some(2),
+        ..State::default()
+    };
+    assert_eq!(*state, known);
+}
+
+#[test]
+fn the_fullest_state_fits_in_a_line() {
+    let name = || Name::new("x".repeat(Name::MAX_LENGTH)).ok();
+    let node = Some(Coord { x: 255, y: 255 });
+    let full = State {
+        time_ms: Some(u64::MAX),
+        x_mm: Some(i32::MIN),
+        y_mm: Some(i32::MIN),
+        heading_deg: Some(Degrees::new(-1)),
+        node,
+        looks: Some(Direction::Right),
+        next: node,
+        phase: name(),
+        hold: name(),
+        mode: Some(Mode::Autonomous),
+        stopped: Some(true),
+        order: Some(u32::MAX),
+        product: ProductId::new(i32::MAX),
+        delivered: Some(u32::MAX),
+        line_bits: Some(LineBits::new(LineBits::MASK)),
+        line_error: Some(i8::MIN),
+        distance_cm: Some(255),
+        left_duty: Some(255),
+        right_duty: Some(255),
+        code: Some(Binary(255)),
+        servos: Some(Servos::new([Some(1023); 8])),
+        battery_dv: Some(255),
+        sensor_up: Some(true),
+        steering_up: Some(true),
+        sensor_lost: Some(u32::MAX),
+        steering_lost: Some(u32::MAX),
+        bus_lost: Some(u64::MAX),
+    };
+    let line = to_line(&Report::State(Box::new(full.clone()))).expect("it fits");
+    let read = Report::read(line.trim_end());
+    assert_eq!(read, Some(Ok(Report::State(Box::new(full)))));
+}
+
+#[test]
+fn the_longest_lists_fit_in_a_line_and_tell_how_many_there_are() {
+    let node = Coord { x: 255, y: 255 };
+    let way = Direction::Right;
+    let product = ProductId::new(i32::MAX).expect("a number");
+    let queued = Queued {
+        order: u32::MAX,
+        product,
+    };
+    let route = Listed::<Coord>::new(&vec![node; 512]);
+    assert_eq!(
+        (route.total(), route.first().len()),
+        (512, Listed::<Coord>::FIT)
+    );
+    let blocked = Listed::<Edge>::new(&vec![Edge { node, way }; 512]);
+    assert_eq!(
+        (blocked.total(), blocked.first().len()),
+        (512, Listed::<Edge>::FIT)
+    );
+    let queue = Listed::<Queued>::new(&vec![queued; 46]);
+    assert_eq!(
+        (queue.total(), queue.first().len()),
+        (46, Listed::<Queued>::FIT)
+    );
+    for report in [
+        Report::Route(route),
+        Report::Blocked(blocked),
+        Report::Queue(queue),
+    ] {
+        let line = to_line(&report).expect("it fits");
+        assert_eq!(Report::read(line.trim_end()), Some(Ok(report)));
+    }
+}
+
+#[test]
+fn angles_and_servos_are_brought_into_their_ranges() {
+    for (degrees, expected) in [(-1, 359), (0, 0), (359, 359), (360, 0), (i32::MIN, 232)] {
+        assert_eq!(Degrees::new(degrees).get(), expected, "{degrees}");
+    }
+    let mut positions = [Some(1023); 8];
+    positions[2] = Some(1024);
+    positions[3] = None;
+    let heard = Servos::new(positions)
+        .get()
+        .map(|position| position.is_some());
+    assert_eq!(heard, [true, true, false, false, true, true, true, true]);
+}
+
+#[test]
+fn a_lease_is_from_1_to_1000_ms() {
+    let leases = [0, 1, 1000, 1001].map(|ms| LeaseMs::new(ms).map(LeaseMs::get));
+    assert_eq!(leases, [None, Some(1), Some(1000), None]);
+}
+
+#[test]
+fn an_action_that_cannot_be_read_still_has_the_number_to_refuse_it_with() {
+    for (line, number) in [
+        ("do", None),
+        ("do x clear", None),
+        ("do 4294967296 clear", None),
+        ("do 7", Some(7)),
+        ("do 7 dance", Some(7)),
+        ("do 7 clear all", Some(7)),
+        ("do 7 arm 9", Some(7)),
+    ] {
+        let error = Order::read(line).expect("an action").expect_err(line);
+        assert_eq!(error.number(), number, "{line}");
+    }
+    let good = Order::read("do 7 clear");
+    let action = Action::Clear;
+    assert_eq!(good, Some(Ok(Order::Do { number: 7, action })));
+}

@@ -1,0 +1,311 @@
+//! What is written is read as the same, for any values at all.
+
+use lager_lines::command::Wheels;
+use lager_lines::conversation::{RobotLine, StationLine};
+use lager_lines::extension::{
+    Action, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Mode, Order, Put,
+    Queued, Report, Servos, State, Truth,
+};
+use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
+use lager_lines::strings::{Good, Goods, map_string, read_map};
+use lager_lines::{
+    Coord, Direction, Map, Name, Product, ProductId, Products, SideLength, Text, to_line,
+};
+use lager_wire::{Binary, LineBits, OperatorArm, OperatorCommand};
+use proptest::option::of;
+use proptest::prelude::*;
+use proptest::sample::select;
+
+fn coord() -> impl Strategy<Value = Coord> {
+    (any::<u8>(), any::<u8>()).prop_map(|(x, y)| Coord { x, y })
+}
+
+fn direction() -> impl Strategy<Value = Direction> {
+    select(&Direction::ALL)
+}
+
+fn product_id() -> impl Strategy<Value = ProductId> {
+    prop_oneof![0..1000, 0..=i32::MAX].prop_map(|id| ProductId::new(id).expect("not negative"))
+}
+
+fn text() -> impl Strategy<Value = Text> {
+    "[^\r\n]{0,100}".prop_map(|text| Text::new(text).expect("no line break"))
+}
+
+fn name() -> impl Strategy<Value = Name> {
+    "[a-z0-9_-]{1,32}".prop_map(|name| Name::new(name).expect("a name"))
+}
+
+fn map() -> impl Strategy<Value = Map> {
+    (1..=255_u8, 1..=255_u8, any::<bool>(), any::<bool>()).prop_map(|(x, y, right, top)| {
+        let delivery = Coord {
+            x: if right { x } else { 0 },
+            y: if top { y } else { 0 },
+        };
+        Map::new(Coord { x, y }, delivery).expect("a corner")
+    })
+}
+
+/// As many as always fit in a line.
+fn products() -> impl Strategy<Value = Products> {
+    let place = (coord(), direction());
+    prop::collection::btree_map(product_id(), place, 0..35).prop_map(|all| {
+        let product = |(id, (square, side))| Product { id, square, side };
+        Products::new(all.into_iter().map(product).collect()).expect("each once")
+    })
+}
+
+fn command() -> impl Strategy<Value = OperatorCommand> {
+    select(&OperatorCommand::ALL)
+}
+
+fn wheels() -> impl Strategy<Value = Wheels> {
+    command().prop_filter_map("wheels", Wheels::new)
+}
+
+fn arm() -> impl Strategy<Value = OperatorArm> {
+    command().prop_filter_map("arm", |command| match command {
+        OperatorCommand::Arm(step) => Some(step),
+        _ => None,
+    })
+}
+
+fn request() -> impl Strategy<Value = Request> {
+    prop_oneof![
+        select(&Query::ALL).prop_map(Request::Query),
+        text().prop_map(|text| Request::Telemetry(Telemetry::Thought(text))),
+        coord().prop_map(|node| Request::Telemetry(Telemetry::Robot(node))),
+        direction().prop_map(|way| Request::Telemetry(Telemetry::Heading(way))),
+    ]
+}
+
+fn answer() -> impl Strategy<Value = Answer> {
+    let word = select(&[ListWord::Prodlis, ListWord::Prodlist]);
+    prop_oneof![
+        (1..=u16::MAX).prop_map(|cm| Answer::SideLength(SideLength::new(cm).expect("not 0"))),
+        map().prop_map(Answer::Map),
+        (word, products()).prop_map(|(word, products)| Answer::Products(word, products)),
+        product_id().prop_map(Answer::Fetch),
+        command().prop_map(Answer::Command),
+        Just(Answer::PickupDone),
+    ]
+}
+
+fn edge() -> impl Strategy<Value = Edge> {
+    (coord(), direction()).prop_map(|(node, way)| Edge { node, way })
+}
+
+fn mode() -> impl Strategy<Value = Mode> {
+    select(&[Mode::Manual, Mode::Autonomous])
+}
+
+fn action() -> impl Strategy<Value = Action> {
+    let lease = (1..=LeaseMs::MAX).prop_map(|ms| LeaseMs::new(ms).expect("in range"));
+    prop_oneof![
+        (any::<u32>(), product_id()).prop_map(|(order, product)| Action::Add { order, product }),
+        any::<u32>().prop_map(|order| Action::Cancel { order }),
+        any::<u32>().prop_map(|order| Action::First { order }),
+        Just(Action::Clear),
+        mode().prop_map(Action::Mode),
+        Just(Action::Resume),
+        Just(Action::Reset),
+        any::<bool>().prop_map(|force| Action::Picked { force }),
+        (wheels(), lease).prop_map(|(wheels, lease)| Action::Drive { wheels, lease }),
+        arm().prop_map(Action::Arm),
+        any::<(u8, u8)>().prop_map(|(p, d)| Action::Gains { p, d }),
+        Just(Action::Calibrate),
+        (select(&[Put::Put, Put::Take]), edge())
+            .prop_map(|(put, edge)| Action::Obstacle { put, edge }),
+    ]
+}
+
+fn order() -> impl Strategy<Value = Order> {
+    prop_oneof![
+        any::<Option<u32>>().prop_map(|number| Order::Stop { number }),
+        (any::<u32>(), action()).prop_map(|(number, action)| Order::Do { number, action }),
+    ]
+}
+
+fn degrees() -> impl Strategy<Value = Degrees> {
+    any::<i32>().prop_map(Degrees::new)
+}
+
+prop_compose! {
+    fn place()(
+        time_ms in of(any::<u64>()), x_mm in of(any::<i32>()), y_mm in of(any::<i32>()),
+        heading_deg in of(degrees()), node in of(coord()), looks in of(direction()),
+        next in of(coord()), phase in of(name()), hold in of(name()), mode in of(mode()),
+    ) -> State {
+        State {
+            time_ms, x_mm, y_mm, heading_deg, node, looks, next, phase, hold, mode,
+            ..State::default()
+        }
+    }
+}
+
+prop_compose! {
+    fn work()(
+        place in place(), stopped in of(any::<bool>()), order in of(any::<u32>()),
+        product in of(product_id()), delivered in of(any::<u32>()),
+        sensor_up in of(any::<bool>()), steering_up in of(any::<bool>()),
+        sensor_lost in of(any::<u32>()), steering_lost in of(any::<u32>()),
+        bus_lost in of(any::<u64>()),
+    ) -> State {
+        State {
+            stopped, order, product, delivered, sensor_up, steering_up, sensor_lost, steering_lost,
+            bus_lost,
+            ..place
+        }
+    }
+}
+
+prop_compose! {
+    fn state()(
+        work in work(), bits in of(any::<u16>()), line_error in of(any::<i8>()),
+        distance_cm in of(any::<u8>()), left_duty in of(any::<u8>()),
+        right_duty in of(any::<u8>()), code in of(any::<u8>()),
+        servos in of(any::<[Option<u16>; 8]>()), battery_dv in of(any::<u8>()),
+    ) -> State {
+        State {
+            line_bits: bits.map(LineBits::new), line_error, distance_cm, left_duty, right_duty,
+            code: code.map(Binary), servos: servos.map(Servos::new), battery_dv,
+            ..work
+        }
+    }
+}
+
+fn report() -> impl Strategy<Value = Report> {
+    let queued =
+        (any::<u32>(), product_id()).prop_map(|(order, product)| Queued { order, product });
+    let many = 0..200_usize;
+    prop_oneof![
+        any::<(u32, u32)>().prop_map(|(number, after_ms)| Report::Stopped { number, after_ms }),
+        any::<u32>().prop_map(|number| Report::Done { number }),
+        (any::<u32>(), text()).prop_map(|(number, reason)| Report::Refused { number, reason }),
+        state().prop_map(|state| Report::State(Box::new(state))),
+        prop::collection::vec(coord(), many.clone())
+            .prop_map(|all| Report::Route(Listed::<Coord>::new(&all))),
+        prop::collection::vec(edge(), many.clone())
+            .prop_map(|all| Report::Blocked(Listed::<Edge>::new(&all))),
+        prop::collection::vec(queued, many)
+            .prop_map(|all| Report::Queue(Listed::<Queued>::new(&all))),
+        (
+            select(&EventKind::ALL),
+            coord(),
+            any::<Option<u32>>(),
+            of(product_id()),
+            text()
+        )
+            .prop_map(|(kind, node, order, product, text)| {
+                Report::Event(Event {
+                    kind,
+                    node,
+                    order,
+                    product,
+                    text,
+                })
+            }),
+        any::<[u32; 6]>().prop_map(|[count, p50_us, p90_us, p99_us, p999_us, max_us]| {
+            Report::Latency(Latency {
+                count,
+                p50_us,
+                p90_us,
+                p99_us,
+                p999_us,
+                max_us,
+            })
+        }),
+        (any::<i32>(), any::<i32>(), degrees(), of(product_id())).prop_map(
+            |(x_mm, y_mm, heading, carrying)| {
+                Report::Truth(Truth {
+                    x_mm,
+                    y_mm,
+                    heading,
+                    carrying,
+                })
+            }
+        ),
+    ]
+}
+
+fn hello() -> impl Strategy<Value = Hello> {
+    (1..=255_u8, name()).prop_map(|(version, name)| Hello { version, name })
+}
+
+fn good() -> impl Strategy<Value = Good> {
+    // Labels that are numbers as often as names.
+    let label = prop_oneof![
+        product_id().prop_map(|id| id.to_string()),
+        "[a-zåäö0-9]([^,;\r\n]{0,8}[a-zåäö.])?",
+    ];
+    (label, coord(), direction())
+        .prop_map(|(label, square, side)| Good::new(label, square, side).expect("a label"))
+}
+
+/// The line of a value without its end.
+fn body(value: &impl std::fmt::Display) -> String {
+    let line = to_line(value).expect("it fits in a line");
+    line.strip_suffix('\n').expect("a line's end").to_owned()
+}
+
+proptest! {
+    #[test]
+    fn requests(request in request()) {
+        let line = body(&request);
+        prop_assert_eq!(Request::read(&line), Ok(request.clone()));
+        prop_assert_eq!(RobotLine::read(&line), Ok(RobotLine::Request(request)));
+    }
+
+    #[test]
+    fn answers(answer in answer()) {
+        let line = body(&answer);
+        prop_assert_eq!(Answer::read(&line), Ok(answer.clone()));
+        prop_assert_eq!(StationLine::read(&line), Ok(StationLine::Answer(answer)));
+    }
+
+    #[test]
+    fn orders(order in order()) {
+        let line = body(&order);
+        prop_assert_eq!(StationLine::read(&line), Ok(StationLine::Order(order)));
+    }
+
+    #[test]
+    fn reports(report in report()) {
+        let line = body(&report);
+        prop_assert_eq!(RobotLine::read(&line), Ok(RobotLine::Report(report)));
+    }
+
+    #[test]
+    fn hellos(hello in hello()) {
+        let line = body(&hello);
+        prop_assert_eq!(RobotLine::read(&line), Ok(RobotLine::Hello(hello.clone())));
+        prop_assert_eq!(StationLine::read(&line), Ok(StationLine::Hello(hello)));
+    }
+
+    #[test]
+    fn map_strings(map in map()) {
+        prop_assert_eq!(read_map(&map_string(map)), Ok(map));
+    }
+
+    #[test]
+    fn goods_strings(goods in prop::collection::vec(good(), 0..30)) {
+        let goods = Goods(goods);
+        prop_assert_eq!(Goods::read(&goods.to_string()), Ok(goods));
+    }
+
+    #[test]
+    fn products_through_the_goods_string(products in products()) {
+        let goods = Goods::read(&Goods::from(&products).to_string()).expect("goods");
+        prop_assert_eq!(goods.products(), Ok(products));
+    }
+
+    #[test]
+    fn any_text_is_read_or_refused_where_it_stands(line in "\\PC{0,80}") {
+        for refused in [
+            Request::read(&line).map(drop).err(),
+            RobotLine::read(&line).map(drop).err(),
+        ].into_iter().flatten() {
+            prop_assert!((1..=line.chars().count() + 1).contains(&refused.column));
+        }
+    }
+}

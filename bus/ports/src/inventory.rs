@@ -1,0 +1,131 @@
+//! Whether what living processes have of a bus can still be found by those who come.
+//!
+//! A file that is removed stays with whoever has it mapped: the robot drives on, nothing fails, and
+//! nobody new can see it, stop it with a tool, or take over from a service that ends. So whoever
+//! attends a robot looks at what its processes have mapped (`/proc/PID/maps`), and at the files
+//! that describe it. Nothing is opened and nothing waited for.
+//!
+//! | file | is missed when |
+//! |---|---|
+//! | a service's list of ends (`.dynamic`), a board of bells, a clock | it is mapped and removed |
+//! | the samples of a port (`.data`) | likewise, while the port has its tag |
+//! | what a service is (`.service`) | its list of ends is mapped, and no description has its number |
+//!
+//! A newcomer that finds no description makes another one, with a number of its own. Ports come and
+//! go at any moment, so only what two looks in a row miss is missed.
+
+use std::collections::BTreeSet;
+use std::fs::{self, DirEntry};
+use std::path::{Path, PathBuf};
+
+use crate::place::{Place, SHARED_MEMORY};
+
+/// How the kernel marks a mapping whose file was removed.
+const REMOVED: &str = " (deleted)";
+
+/// What was missed when somebody looked last.
+#[derive(Debug, Default)]
+pub struct Inventory {
+    missed: BTreeSet<PathBuf>,
+}
+
+impl Inventory {
+    /// Looks at what `processes` have of the bus at `place`; returns a file that was missed, or whose
+    /// description was, at the look before, too. A process that has ended has nothing.
+    pub fn look(&mut self, place: &Place, processes: &[u32]) -> Option<PathBuf> {
+        let (ports, services) = (ports(place), services(place));
+        let mapped = processes.iter().flat_map(|pid| mapped(*pid));
+        let missed = mapped
+            .filter(|file| is_missed(file, place, &ports, &services))
+            .map(|file| file.path)
+            .collect();
+        let before = core::mem::replace(&mut self.missed, missed);
+        self.missed.intersection(&before).next().cloned()
+    }
+}
+
+/// A file that a process has mapped.
+struct Mapped {
+    path: PathBuf,
+    removed: bool,
+}
+
+fn mapped(process: u32) -> Vec<Mapped> {
+    let maps = fs::read_to_string(format!("/proc/{process}/maps")).unwrap_or_default();
+    maps.lines()
+        .filter_map(|line| {
+            let path = &line[line.find('/')?..];
+            let (path, removed) = match path.strip_suffix(REMOVED) {
+                Some(path) => (path, true),
+                None => (path, false),
+            };
+            Some(Mapped {
+                path: PathBuf::from(path),
+                removed,
+            })
+        })
+        .collect()
+}
+
+fn is_missed(
+    file: &Mapped,
+    place: &Place,
+    ports: &BTreeSet<String>,
+    services: &BTreeSet<u128>,
+) -> bool {
+    let Mapped { path, removed } = file;
+    if path.starts_with(place.folder()) {
+        // The stop word is watched by who obeys it.
+        return *removed && (path.ends_with("bells") || path.ends_with("clock"));
+    }
+    let name = path.strip_prefix(SHARED_MEMORY).ok().and_then(Path::to_str);
+    let Some((stem, end)) = name
+        .and_then(|name| name.strip_prefix(place.prefix()))
+        .and_then(|name| name.rsplit_once('.'))
+    else {
+        return false;
+    };
+    let number = stem.rsplit('_').next().unwrap_or_default();
+    match end {
+        "dynamic" => {
+            let is_described = |number: u128| services.contains(&number);
+            *removed || !number.parse().is_ok_and(is_described)
+        }
+        "data" => *removed && ports.contains(number),
+        _ => false,
+    }
+}
+
+/// The numbers of the ports that processes have.
+fn ports(place: &Place) -> BTreeSet<String> {
+    let nodes = entries(&place.transport_folder().join("nodes"));
+    nodes
+        .flat_map(|node| entries(&node.path()))
+        .filter_map(|file| {
+            let name = file.file_name();
+            let name = name.to_str()?.strip_prefix(place.prefix())?;
+            Some(name.strip_suffix(".port_tag")?.to_owned())
+        })
+        .collect()
+}
+
+/// The numbers of the services that are described.
+fn services(place: &Place) -> BTreeSet<u128> {
+    entries(&place.transport_folder().join("services"))
+        .filter_map(|file| number_in(&fs::read_to_string(file.path()).ok()?))
+        .collect()
+}
+
+/// The number of the service that a description is of, as the name of its list of ends has it.
+fn number_in(description: &str) -> Option<u128> {
+    let value = |key: &str| {
+        let mut lines = description.lines();
+        let value = lines.find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "))?;
+        value.parse::<u64>().ok().map(u128::from)
+    };
+    Some(value("unique_value")? << 64 | value("payload_value")?)
+}
+
+fn entries(folder: &Path) -> impl Iterator<Item = DirEntry> + use<> {
+    fs::read_dir(folder).into_iter().flatten().flatten()
+}

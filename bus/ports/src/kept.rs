@@ -1,0 +1,100 @@
+//! What a successor finds of its predecessor, and the difference between "nobody kept anything" and
+//! "it cannot be read".
+//!
+//! Apart from the [`Keeper`](crate::Keeper), which lives in another process: this is the other end.
+
+use core::time::Duration;
+use std::time::Instant;
+
+use lager_topics::Topic;
+
+use crate::bus::Bus;
+use crate::error::PortError;
+use crate::subscriber::Subscriber;
+
+/// Why it is not known whether a value was kept.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum KeptError {
+    /// The topic could not be opened.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// It could not be read.
+    #[error(
+        "what an earlier process left on `{topic}` cannot be read ({detail}), so where it was is not known; check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
+    )]
+    Unreadable {
+        /// The topic.
+        topic: &'static str,
+        /// What was met last.
+        detail: String,
+    },
+}
+
+impl From<KeptError> for PortError {
+    /// For whoever cannot begin without that value.
+    fn from(error: KeptError) -> Self {
+        match error {
+            KeptError::Port(error) => error,
+            KeptError::Unreadable { topic, detail } => Self::Transport {
+                topic: topic.to_owned(),
+                detail,
+            },
+        }
+    }
+}
+
+/// How often a topic that cannot be read is opened anew before that is called lasting. A killed
+/// writer is out of the way after the first sweep.
+const ATTEMPTS: u32 = 5;
+
+/// Pause between attempts, in real time.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Waits for a value of a topic this process is about to write.
+pub(crate) fn kept<T: Topic>(
+    bus: &Bus,
+    timeout: Duration,
+) -> Result<Option<T::Payload>, KeptError> {
+    let start = Instant::now();
+    let mut attempt = 1;
+    loop {
+        let fault = match look_for::<T>(bus, start, timeout) {
+            Ok(kept) => return Ok(kept),
+            Err(fault) => fault,
+        };
+        if attempt == ATTEMPTS || matches!(fault, KeptError::Port(_)) {
+            return Err(fault);
+        }
+        attempt += 1;
+        bus.sweep();
+        std::thread::sleep(PAUSE);
+    }
+}
+
+/// Waits with one subscriber, which connects to each writer once.
+fn look_for<T: Topic>(
+    bus: &Bus,
+    start: Instant,
+    timeout: Duration,
+) -> Result<Option<T::Payload>, KeptError> {
+    let mut subscriber = Subscriber::<T>::new(bus)?;
+    loop {
+        let unreadable = |detail| KeptError::Unreadable {
+            topic: T::NAME,
+            detail,
+        };
+        match subscriber.latest() {
+            Ok(Some(sample)) => return Ok(Some(*sample)),
+            Ok(None) => (),
+            Err(error) => return Err(unreadable(error.to_string())),
+        }
+        let writers = subscriber.unreached();
+        if writers > 0 {
+            return Err(unreadable(format!("{writers} writers cannot be reached")));
+        }
+        if start.elapsed() >= timeout {
+            return Ok(None);
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}

@@ -1,0 +1,129 @@
+//! Whether anybody at all has a file open: the kernel's word for it.
+//!
+//! A write lease is granted on a file that nobody else has open or mapped, in whatever process,
+//! container or namespace; as long as it lasts whoever opens the file waits. So what is done under
+//! a lease is done to a file without users, and needs no guess from ages or process ids. Every file
+//! of the transport is open in the process that uses it for as long as it does, also while it is
+//! being made: what can be leased has been left behind.
+
+#![allow(
+    unsafe_code,
+    reason = "leases are asked for by fcntl, which rustix has no calls for"
+)]
+
+use std::fs::{File, OpenOptions};
+use std::io::{Error, ErrorKind};
+use std::os::fd::AsRawFd;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+/// Linux's number for the request; `libc` has none.
+const F_SETSIG: i32 = 10;
+
+/// Removes a file that nobody has open; says whether it did.
+pub(crate) fn remove_unused(path: &Path) -> bool {
+    let Ok(file) = open(path) else {
+        return false;
+    };
+    // It ends with the file.
+    lease(&file).is_ok() && std::fs::remove_file(path).is_ok()
+}
+
+/// Whether somebody has a file open; one that cannot be asked about counts as used.
+pub(crate) fn is_used(path: &Path) -> bool {
+    match open(path) {
+        Ok(file) => lease(&file).is_err(),
+        Err(error) => error.kind() != ErrorKind::NotFound,
+    }
+}
+
+/// A segment that is being made may only be written, a finished description only be read.
+fn open(path: &Path) -> Result<File, Error> {
+    let how = |options: &mut OpenOptions| {
+        // Never waits: for a lease of somebody else, or for a pipe's other end.
+        options
+            .custom_flags(libc::O_NONBLOCK | libc::O_NOFOLLOW)
+            .open(path)
+    };
+    match how(OpenOptions::new().read(true)) {
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => {
+            how(OpenOptions::new().write(true))
+        }
+        opened => opened,
+    }
+}
+
+fn lease(file: &File) -> Result<(), Error> {
+    let ask = |request, argument: i32| {
+        // SAFETY: the descriptor is open, and both requests take a number.
+        match unsafe { libc::fcntl(file.as_raw_fd(), request, argument) } {
+            -1 => Err(Error::last_os_error()),
+            _ => Ok(()),
+        }
+    };
+    // Who opens the file meanwhile makes the kernel send this instead of SIGIO, which would end the
+    // process; nobody minds this one.
+    ask(F_SETSIG, libc::SIGURG)?;
+    ask(libc::F_SETLEASE, libc::F_WRLCK)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+
+    use super::*;
+
+    fn scene(name: &str) -> PathBuf {
+        let path = Path::new("/dev/shm").join(format!("lplease{}{name}", std::process::id()));
+        std::fs::write(&path, [7; 100]).unwrap();
+        path
+    }
+
+    #[test]
+    fn a_file_is_used_while_anybody_reads_writes_or_maps_it() {
+        let path = scene("a");
+        assert!(!is_used(&path));
+        for write in [false, true] {
+            let file = OpenOptions::new().read(true).write(write).open(&path);
+            let file = file.unwrap();
+            assert!(is_used(&path) && !remove_unused(&path));
+            // SAFETY: a fresh mapping at an address of the kernel's choice.
+            let place = unsafe {
+                mmap(
+                    core::ptr::null_mut(),
+                    100,
+                    ProtFlags::READ,
+                    MapFlags::SHARED,
+                    &file,
+                    0,
+                )
+                .unwrap()
+            };
+            drop(file);
+            assert!(is_used(&path) && !remove_unused(&path));
+            // SAFETY: mapped above and referred to by nobody.
+            unsafe { munmap(place, 100).unwrap() };
+            assert!(!is_used(&path));
+        }
+        assert!(remove_unused(&path));
+        assert!(!path.exists() && !is_used(&path));
+    }
+
+    #[test]
+    fn who_opens_a_file_that_is_looked_at_is_not_disturbed() {
+        let path = scene("b");
+        std::thread::scope(|scope| {
+            let looker = scope.spawn(|| {
+                for _ in 0..2000 {
+                    is_used(&path);
+                }
+            });
+            while !looker.is_finished() {
+                drop(File::open(&path).unwrap());
+            }
+        });
+        assert!(remove_unused(&path));
+    }
+}

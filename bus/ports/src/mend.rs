@@ -1,0 +1,307 @@
+//! Mending a bus by its files alone: nothing is mapped, opened as a service or waited for, so it
+//! works when nothing answers and whatever the files hold.
+//!
+//! | what | when it goes |
+//! |---|---|
+//! | a segment that was never finished: empty, or not readable yet | at every look, if nobody has it open |
+//! | a service's description that was never finished | likewise |
+//! | a node's folder without the node | likewise, if it is older than a creation takes |
+//! | any segment, description or socket; a node's files; bells, locks, what `up` kept | in [`mend`], if nobody has it open |
+//!
+//! That nobody has a file open is the kernel's word ([`lease`]), so the files of living
+//! processes are left alone, also of those that are stopped, or are just making them. What a dead
+//! process has registered with living ones is for the ordinary sweep ([`sweep`](crate::sweep)).
+
+use std::fs;
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use crate::error::OpenError;
+use crate::lease;
+use crate::lock;
+use crate::name::RobotName;
+use crate::place::{Place, user_name};
+
+/// A creator makes a node's folder and opens a file in it at once.
+const CREATION: Duration = Duration::from_secs(2);
+
+/// What the segment ends with that every process of the bus opens to get its number. The transport
+/// lets every user write to it.
+const COUNTER: &str = ".global_mgmt";
+
+/// All that is in it: the transport's version, and the number.
+const COUNTER_SIZE: u64 = 16;
+
+/// iceoryx2 0.10.0, as it stands there.
+const VERSION: u64 = 0x000a_0000;
+
+/// What a supervisor and a station of its own keep in the robot's folder.
+const RUNTIME: [&str; 10] = [
+    "lager.toml",
+    "lager.toml.new",
+    "sensor.tty",
+    "steering.tty",
+    "clock",
+    "gag",
+    "warehouse.toml",
+    "warehouse.toml.new",
+    "warehouse.toml.queue",
+    "warehouse.toml.queue.new",
+];
+
+/// What [`mend`] has found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Mended {
+    /// How many files it has removed.
+    pub removed: usize,
+    /// What is damaged and still in use: empty, or another user's. Whoever uses it must end first.
+    pub damaged: Vec<PathBuf>,
+}
+
+/// Removes all files of a bus that nobody uses.
+///
+/// # Errors
+/// The folder cannot be used, or belongs to another user.
+pub fn mend(config: &crate::BusConfig) -> Result<Mended, OpenError> {
+    let place = config.place()?;
+    let mut removed = unfinished(&place);
+    removed += segments(&place)
+        .filter(|path| !is_counter(path))
+        .filter(|path| lease::remove_unused(path))
+        .count();
+    let mut living = false;
+    for node in nodes(&place) {
+        if node.is_used() {
+            living = true;
+        } else if node.is_left() {
+            removed += node.remove();
+        }
+    }
+    for folder in [place.transport_folder(), services(&place)] {
+        removed += files(&folder).filter(|path| remove_left(path)).count();
+    }
+    removed += earlier(&place);
+    for robot in place.robots() {
+        removed += tidy(&place, &robot);
+    }
+    if !living {
+        let counters = segments(&place).filter(|path| is_counter(path));
+        removed += counters.filter(|path| lease::remove_unused(path)).count();
+    }
+    Ok(Mended {
+        removed,
+        damaged: damaged(config)?,
+    })
+}
+
+/// The segments of a bus that are empty or belong to another user.
+///
+/// # Errors
+/// The folder cannot be used, or belongs to another user.
+pub fn damaged(config: &crate::BusConfig) -> Result<Vec<PathBuf>, OpenError> {
+    let place = config.place()?;
+    Ok(segments(&place).filter(|path| is_damaged(path)).collect())
+}
+
+/// Removes what was never finished and has nobody left to finish it; returns how much it was.
+pub(crate) fn unfinished(place: &Place) -> usize {
+    let bad_counter = |path: &Path| is_counter(path) && !is_sound_counter(path);
+    let segments = segments(place)
+        .filter(|path| is_unfinished(path) || bad_counter(path))
+        .filter(|path| lease::remove_unused(path))
+        .count();
+    let descriptions = files(&services(place))
+        .filter(|path| mode(path).is_some_and(|mode| mode & 0o200 != 0))
+        .filter(|path| lease::remove_unused(path))
+        .count();
+    let nodes = nodes(place)
+        .into_iter()
+        .filter(|node| node.monitors.is_empty() && !node.is_used() && node.is_left())
+        .map(|node| node.remove())
+        .sum::<usize>();
+    segments + descriptions + nodes
+}
+
+/// Refuses a bus on which another user has put a segment: whoever opens it is in his hands.
+pub(crate) fn refuse_foreign(place: &Place) -> Result<(), OpenError> {
+    match foreign(place) {
+        Some((path, uid)) => Err(OpenError::ForeignSegment {
+            path,
+            uid,
+            name: user_name(uid),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Keeps other users from the segment that the transport would let them empty. Nobody but this one
+/// needs it, as all of a bus belongs to one user.
+pub(crate) fn protect(place: &Place) {
+    for path in segments(place).filter(|path| is_counter(path)) {
+        if mode(&path).is_some_and(|mode| mode & 0o077 != 0) {
+            let _ = fs::set_permissions(&path, fs::Permissions::from_mode(0o600));
+        }
+    }
+}
+
+/// Removes what is left of the bus before it was cleared.
+fn earlier(place: &Place) -> usize {
+    let mut folders = place.transport_folders();
+    folders.retain(|folder| *folder != place.transport_folder());
+    let mut removed = 0;
+    // A folder's own folders come behind it.
+    let mut at = 0;
+    while let Some(folder) = folders.get(at).cloned() {
+        removed += files(&folder).filter(|path| remove_left(path)).count();
+        let below = fs::read_dir(&folder).into_iter().flatten().flatten();
+        folders.extend(below.map(|entry| entry.path()).filter(|path| path.is_dir()));
+        at += 1;
+    }
+    for folder in folders.iter().rev() {
+        let _ = fs::remove_dir(folder);
+    }
+    removed
+}
+
+fn foreign(place: &Place) -> Option<(PathBuf, u32)> {
+    let uid = rustix::process::geteuid().as_raw();
+    segments(place).find_map(|path| {
+        let owner = fs::symlink_metadata(&path).ok()?.uid();
+        (owner != uid).then_some((path, owner))
+    })
+}
+
+fn segments(place: &Place) -> impl Iterator<Item = PathBuf> {
+    place.segments().into_iter()
+}
+
+fn services(place: &Place) -> PathBuf {
+    place.transport_folder().join("services")
+}
+
+fn files(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .map(|entry| entry.path())
+        .filter(|path| !path.is_dir())
+}
+
+fn mode(path: &Path) -> Option<u32> {
+    let found = fs::symlink_metadata(path).ok()?;
+    Some(found.permissions().mode() & 0o777)
+}
+
+/// A segment is readable when it is whole; before that it has no size, or no contents.
+fn is_unfinished(path: &Path) -> bool {
+    fs::symlink_metadata(path)
+        .is_ok_and(|found| found.len() == 0 || found.permissions().mode() & 0o400 == 0)
+}
+
+fn is_damaged(path: &Path) -> bool {
+    let uid = rustix::process::geteuid().as_raw();
+    fs::symlink_metadata(path).is_ok_and(|found| found.len() == 0 || found.uid() != uid)
+}
+
+fn is_counter(path: &Path) -> bool {
+    path.to_string_lossy().ends_with(COUNTER)
+}
+
+fn is_sound_counter(path: &Path) -> bool {
+    let sized = fs::metadata(path).is_ok_and(|found| found.len() == COUNTER_SIZE);
+    sized && fs::read(path).is_ok_and(|bytes| bytes.first_chunk() == Some(&VERSION.to_ne_bytes()))
+}
+
+/// Removes a description or a socket that nobody uses.
+fn remove_left(path: &Path) -> bool {
+    let kind = fs::symlink_metadata(path).map(|found| found.file_type());
+    if kind.is_ok_and(|kind| kind.is_socket()) {
+        // Nobody's socket refuses.
+        let asked = UnixDatagram::unbound().and_then(|socket| socket.connect(path));
+        let refused = std::io::ErrorKind::ConnectionRefused;
+        return asked.is_err_and(|error| error.kind() == refused) && fs::remove_file(path).is_ok();
+    }
+    lease::remove_unused(path)
+}
+
+/// Removes what killed processes have left in a robot's folder, and the folder if nothing is in it
+/// any more. The stop word is nobody's to remove.
+fn tidy(place: &Place, robot: &RobotName) -> usize {
+    let folder = place.folder_of(robot);
+    let before = files(&folder).count();
+    let locks = files(&folder).filter(|path| path.extension().is_some_and(|end| end == "lock"));
+    locks.for_each(|path| lock::sweep(&path));
+    lease::remove_unused(&folder.join("bells"));
+    // While this has the name nobody can start.
+    if let Ok(_name) = place.lock_name(robot) {
+        for name in RUNTIME {
+            let _ = fs::remove_file(folder.join(name));
+        }
+        let _ = fs::remove_dir_all(folder.join("eeprom"));
+    }
+    let removed = before - files(&folder).count().min(before);
+    let _ = fs::remove_dir(&folder);
+    removed
+}
+
+/// What the transport keeps of a process: a folder of tags and details, and the files beside it
+/// that tell whether the process lives.
+struct Node {
+    folder: PathBuf,
+    monitors: Vec<PathBuf>,
+}
+
+fn nodes(place: &Place) -> Vec<Node> {
+    let beside = place.transport_folder().join("nodes");
+    let mut nodes: Vec<Node> = Vec::new();
+    let entries = fs::read_dir(&beside).into_iter().flatten().flatten();
+    for entry in entries {
+        let name = entry.file_name();
+        let Some(name) = name.to_str() else { continue };
+        let id = match name.strip_prefix(place.prefix()) {
+            Some(monitor) => monitor.split('.').next().unwrap_or_default(),
+            None => name,
+        };
+        let folder = beside.join(id);
+        let at = nodes.iter().position(|node| node.folder == folder);
+        let at = at.unwrap_or_else(|| {
+            nodes.push(Node {
+                folder,
+                monitors: Vec::new(),
+            });
+            nodes.len() - 1
+        });
+        if name != id {
+            nodes[at].monitors.push(entry.path());
+        }
+    }
+    nodes
+}
+
+impl Node {
+    /// Whether its process is gone, when nobody has any file of it open: who makes it has one open
+    /// at once, and an empty folder may be a moment old.
+    fn is_left(&self) -> bool {
+        if !self.monitors.is_empty() || files(&self.folder).next().is_some() {
+            return true;
+        }
+        let age = fs::metadata(&self.folder)
+            .and_then(|found| found.modified())
+            .map(|when| SystemTime::now().duration_since(when).unwrap_or_default());
+        age.is_ok_and(|age| age >= CREATION)
+    }
+
+    fn is_used(&self) -> bool {
+        let mut all = files(&self.folder).chain(self.monitors.iter().cloned());
+        all.any(|path| lease::is_used(&path))
+    }
+
+    fn remove(&self) -> usize {
+        let own: Vec<PathBuf> = files(&self.folder).collect();
+        let all = own.iter().chain(&self.monitors);
+        let removed = all.filter(|path| fs::remove_file(path).is_ok()).count();
+        let _ = fs::remove_dir(&self.folder);
+        removed
+    }
+}

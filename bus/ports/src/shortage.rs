@@ -1,0 +1,82 @@
+//! What this process or this machine has run out of: asked when something failed and the
+//! transport does not say why.
+
+use core::fmt;
+use std::fs;
+
+use rustix::process::{Resource, getrlimit};
+
+use crate::place::SHARED_MEMORY;
+
+/// A process that has at most so many files left cannot open a port: one takes up to as many.
+const FILES_LEFT: u64 = 8;
+/// A segment of a topic needs up to so much, in bytes.
+const SEGMENT: u64 = 1024 * 1024;
+
+/// What there is too little of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shortage {
+    /// This process may open no more files than it has.
+    Files {
+        /// How many it may open.
+        limit: u64,
+    },
+    /// `/dev/shm` is full.
+    Memory {
+        /// What is free, in KiB.
+        free_kib: u64,
+    },
+    /// `/dev/shm` can hold no more files.
+    Names,
+    /// This user may not write to `/dev/shm`.
+    Rights,
+}
+
+impl Shortage {
+    /// What is short now, if anything is.
+    pub fn now() -> Option<Self> {
+        let files = getrlimit(Resource::Nofile).current;
+        let open = fs::read_dir("/proc/self/fd").map(|open| open.count() as u64);
+        if let Some(limit) = files
+            // Where even the folder of the open files cannot be opened, none is left.
+            && open.map_or(true, |open| open + FILES_LEFT > limit)
+        {
+            return Some(Self::Files { limit });
+        }
+        let write = rustix::fs::Access::WRITE_OK | rustix::fs::Access::EXEC_OK;
+        if rustix::fs::access(SHARED_MEMORY, write).is_err() {
+            return Some(Self::Rights);
+        }
+        let stat = rustix::fs::statvfs(SHARED_MEMORY).ok()?;
+        let free = stat.f_bavail.saturating_mul(stat.f_frsize);
+        if free < SEGMENT {
+            let free_kib = free / 1024;
+            return Some(Self::Memory { free_kib });
+        }
+        // A file system without a limit says 0 of 0.
+        (stat.f_files > 0 && stat.f_favail == 0).then_some(Self::Names)
+    }
+}
+
+impl fmt::Display for Shortage {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Files { limit } => write!(
+                formatter,
+                "this process may open {limit} files and has as good as all of them open (EMFILE); `ulimit -n 4096` or LimitNOFILE= in the unit allows more"
+            ),
+            Self::Memory { free_kib } => write!(
+                formatter,
+                "{SHARED_MEMORY} is full, {free_kib} KiB are left (ENOSPC); `lager doctor --fix` removes what dead processes left there, `mount -o remount,size=256M {SHARED_MEMORY}` enlarges it"
+            ),
+            Self::Names => write!(
+                formatter,
+                "{SHARED_MEMORY} can hold no more files (ENOSPC); remove some, or mount it with more (nr_inodes=)"
+            ),
+            Self::Rights => write!(
+                formatter,
+                "this user may not write to {SHARED_MEMORY} (EACCES); it needs mode 1777"
+            ),
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! The stop word's page in memory, shared by the bridge's main loop and the watching thread.
+//!
+//! The mapping stays at one address for the page's life. When the file is replaced, the watching
+//! thread maps the new one over the old one, which the kernel does in one step: whoever reads
+//! meanwhile reads the one or the other.
+//!
+//! A file that is cut short while it is mapped ends the process that touches it next (SIGBUS).
+//! That is safe: the steering board halts by itself, and the successor finds a damaged file.
+
+#![allow(unsafe_code, reason = "a mapping is shared memory")]
+
+use core::ffi::c_void;
+use core::ptr::NonNull;
+use core::sync::atomic::{AtomicU64, Ordering};
+use std::fs::File;
+use std::io::Error;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use lager_topics::{Role, StopCause};
+use rustix::fs::{FallocateFlags, fallocate};
+use rustix::io::Errno;
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+
+use super::{LAYOUT, SIZE, Stop, at, is_whole, open};
+use crate::clock::Clock;
+
+/// The mapped page.
+#[derive(Debug)]
+pub(super) struct Page {
+    path: PathBuf,
+    /// The file that was mapped at first.
+    pub(super) opened: Identity,
+    words: NonNull<[AtomicU64; at::END]>,
+}
+
+// SAFETY: the page consists of atomics and stays mapped at its place until the drop.
+unsafe impl Send for Page {}
+// SAFETY: as above.
+unsafe impl Sync for Page {}
+
+impl Page {
+    /// Opens the file, or makes it; `new` is why a file that had to be made stops the robot.
+    pub(super) fn open(path: &Path, new: Option<StopCause>) -> Result<Self, Error> {
+        let file = prepared(path, new)?;
+        Ok(Self {
+            path: path.to_owned(),
+            opened: Identity::of(&file)?,
+            words: NonNull::new(map(&file, None)?.cast()).ok_or(Errno::NOMEM)?,
+        })
+    }
+
+    /// Sees to it that the path leads to the mapped file, whole: otherwise it is mended or made
+    /// anew, mapped, and stops the robot. `known` is the file that is mapped.
+    ///
+    /// Returns the file that is mapped now.
+    pub(super) fn verify(&self, known: Identity) -> Result<Identity, Error> {
+        let file = prepared(&self.path, Some(StopCause::WordRemoved))?;
+        let identity = Identity::of(&file)?;
+        if identity != known {
+            stop_in(&file, StopCause::WordRemoved)?;
+            let _ = map(&file, Some(self.words))?;
+            self.put(at::PROCESS, u64::from(std::process::id()));
+        }
+        Ok(identity)
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Sets a stop of the bridge's own, unless there is one.
+    pub(super) fn stop(&self, cause: StopCause) {
+        set_unless_set(self.word(), cause);
+    }
+
+    pub(super) fn word(&self) -> &AtomicU64 {
+        &self.words()[at::WORD]
+    }
+
+    #[inline]
+    pub(super) fn put(&self, place: usize, value: u64) {
+        self.words()[place].store(value, Ordering::Release);
+    }
+
+    #[inline]
+    fn words(&self) -> &[AtomicU64; at::END] {
+        // SAFETY: mapped with at least this length, aligned as a page is, until the drop; every
+        // bit pattern is valid, and all writers write whole words.
+        unsafe { self.words.as_ref() }
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        // SAFETY: mapped with this length, and nobody can refer to it any more.
+        let _ = unsafe { munmap(self.words.as_ptr().cast(), SIZE as usize) };
+    }
+}
+
+/// Which file it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Identity {
+    device: u64,
+    inode: u64,
+}
+
+impl Identity {
+    pub(super) fn of(file: &File) -> Result<Self, Error> {
+        let found = file.metadata()?;
+        Ok(Self {
+            device: found.dev(),
+            inode: found.ino(),
+        })
+    }
+}
+
+/// Opens the file, or makes it, and makes it whole. A file that was not whole is damaged and
+/// stops the robot; one that was not there does if `new` says why.
+fn prepared(path: &Path, new: Option<StopCause>) -> Result<File, Error> {
+    let (file, made) = open(path)?;
+    if made || !is_whole(&file)? {
+        // Backed by memory now, so that a full file system is an error here and no fault later.
+        match fallocate(&file, FallocateFlags::empty(), 0, SIZE) {
+            Err(Errno::OPNOTSUPP) => file.set_len(SIZE)?,
+            done => done?,
+        }
+        if let Some(cause) = if made {
+            new
+        } else {
+            Some(StopCause::WordDamaged)
+        } {
+            stop_in(&file, cause)?;
+        }
+        super::put(&file, at::LAYOUT, LAYOUT)?;
+    }
+    Ok(file)
+}
+
+/// Sets a stop in a file, unless there is one: no word that anybody has set is lost.
+fn stop_in(file: &File, cause: StopCause) -> Result<(), Error> {
+    let place = map(file, None)?;
+    // SAFETY: mapped with the length of a page, so aligned and long enough for one word, until
+    // it is unmapped below.
+    let word: &AtomicU64 = unsafe { &*place.cast::<AtomicU64>().add(at::WORD) };
+    set_unless_set(word, cause);
+    // SAFETY: mapped above with this length, and `word` is not used any more.
+    Ok(unsafe { munmap(place, SIZE as usize) }?)
+}
+
+fn set_unless_set(word: &AtomicU64, cause: StopCause) {
+    let stop = Stop::new(Role::Bridge, cause, Clock::monotonic_ns());
+    let _ = word.compare_exchange(0, stop.word(), Ordering::AcqRel, Ordering::Acquire);
+}
+
+/// Maps the file, at a place of the kernel's choice or over the mapping at `over`.
+fn map(file: &File, over: Option<NonNull<[AtomicU64; at::END]>>) -> Result<*mut c_void, Error> {
+    let (place, fixed) = match over {
+        Some(words) => (words.as_ptr().cast(), MapFlags::FIXED),
+        None => (core::ptr::null_mut(), MapFlags::empty()),
+    };
+    // SAFETY: either the kernel chooses a free place, or the new mapping replaces one of the same
+    // length that this module made and that is only ever read and written as atomics.
+    let place = unsafe {
+        mmap(
+            place,
+            SIZE as usize,
+            ProtFlags::READ | ProtFlags::WRITE,
+            MapFlags::SHARED | MapFlags::POPULATE | fixed,
+            file,
+            0,
+        )
+    };
+    Ok(place?)
+}

@@ -1,0 +1,175 @@
+//! The reading end of a topic.
+
+use core::ptr::NonNull;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
+use iceoryx2::port::{DegradationAction, ReceiveError as IpcReceiveError};
+use iceoryx2::prelude::{CallbackProgression, PortFactory};
+use iceoryx2::sample::Sample;
+use lager_topics::{OBSERVERS, Stamp};
+
+use super::{Bytes, Header, Here, Kind, behind, ends_here};
+use crate::bus::Bus;
+use crate::clock::Clock;
+use crate::error::{PortError, ReceiveError};
+use crate::name;
+use crate::service::{self, Fault, MAX_HELD, TopicService, patiently};
+use crate::streams::{Newest, Streams};
+use crate::transport::Ipc;
+
+/// What [`crate::Subscriber`] is but for the payload's type.
+pub(crate) struct Reader {
+    port: Here<Port>,
+    payload_align: usize,
+    streams: Streams,
+    newest: Newest,
+    /// Writers that could not be connected to.
+    unreached: Arc<AtomicU32>,
+}
+
+type Port = Subscriber<Ipc, Bytes, Header>;
+type Received = Sample<Ipc, Bytes, Header>;
+
+ends_here!(Port, Received);
+
+/// A received sample, which the reader holds until this is dropped.
+pub(crate) struct Taken {
+    _sample: Here<Received>,
+    payload: NonNull<u8>,
+    stamp: NonNull<Stamp>,
+}
+
+impl Reader {
+    #[inline(never)]
+    pub(crate) fn new(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
+        let service = service::topic(bus, kind)?;
+        let unreached = Arc::new(AtomicU32::new(0));
+        let port = patiently(bus, kind.name, || {
+            unreached.store(0, Ordering::Relaxed);
+            let missed = Arc::clone(&unreached);
+            let subscriber = service
+                .subscriber_builder()
+                .name(bus.port_name())
+                // The others are received all the same.
+                .set_degradation_handler(move |_, _| {
+                    missed.fetch_add(1, Ordering::Relaxed);
+                    DegradationAction::Ignore
+                })
+                .buffer_size(kind.qos.buffer)
+                .create()
+                .map_err(|error| match error {
+                    SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+                        Fault::Full(no_place(bus, kind))
+                    }
+                    other => service::no_resources(kind.name, other),
+                })?;
+            // Counted with the new one in place, so that two that come at once cannot both slip
+            // through.
+            if bus.role().is_observer() && observers(&service) > OBSERVERS {
+                return Err(Fault::Full(no_place(bus, kind)));
+            }
+            Ok(subscriber)
+        })?;
+        let details = service.static_config().message_type_details();
+        Ok(Self {
+            port: Here::new(port),
+            payload_align: details.payload.alignment(),
+            // After the port exists: a publisher that is younger has seen it from the start.
+            streams: Streams::new(Clock::monotonic_ns()),
+            newest: Newest::default(),
+            unreached,
+        })
+    }
+
+    /// The next sample, oldest first.
+    #[inline(never)]
+    pub(crate) fn receive(&mut self) -> Result<Option<Taken>, ReceiveError> {
+        match self.port.receive() {
+            Ok(Some(sample)) => {
+                let header = NonNull::from(sample.user_header());
+                let taken = Taken {
+                    payload: behind(header, size_of::<Stamp>(), self.payload_align),
+                    stamp: header.cast(),
+                    _sample: Here::new(sample),
+                };
+                self.streams.note(taken.stamp(), Clock::monotonic_ns);
+                Ok(Some(taken))
+            }
+            Ok(None) => Ok(None),
+            Err(IpcReceiveError::ExceedsMaxBorrows) => {
+                Err(ReceiveError::TooManyHeld { limit: MAX_HELD })
+            }
+            Err(other) => Err(ReceiveError::Transport(format!("{other:?}"))),
+        }
+    }
+
+    /// The newest sample of all that there are, if it is newer than what this has returned before.
+    #[inline(never)]
+    pub(crate) fn latest(&mut self) -> Result<Option<Taken>, ReceiveError> {
+        let mut latest = None;
+        loop {
+            match self.receive() {
+                Ok(Some(sample)) => {
+                    let publish_ns = sample.stamp().publish_time_ns;
+                    if self.newest.takes(publish_ns, Clock::monotonic_ns()) {
+                        latest = Some(sample);
+                    }
+                }
+                Ok(None) => return Ok(latest),
+                Err(error) if latest.is_none() => return Err(error),
+                Err(_) => return Ok(latest),
+            }
+        }
+    }
+
+    pub(crate) fn unreached(&self) -> u32 {
+        self.unreached.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn streams(&self) -> &Streams {
+        &self.streams
+    }
+}
+
+impl Taken {
+    /// Where the payload is; valid as long as this is, and nobody writes to it meanwhile.
+    pub(crate) fn payload(&self) -> NonNull<u8> {
+        self.payload
+    }
+
+    pub(crate) fn stamp(&self) -> &Stamp {
+        // SAFETY: the service's header is a `Stamp` (`Kind::header`); the sample is held, and its
+        // writer does not touch it before it is given back.
+        unsafe { self.stamp.as_ref() }
+    }
+}
+
+fn observers(service: &TopicService) -> usize {
+    let mut observers = 0;
+    service.dynamic_config().list_subscribers(|details| {
+        if name::parse_port(details.subscriber_name.as_str())
+            .is_some_and(|(role, _)| role.is_observer())
+        {
+            observers += 1;
+        }
+        CallbackProgression::Continue
+    });
+    observers
+}
+
+fn no_place(bus: &Bus, kind: &Kind) -> PortError {
+    let topic = kind.name.to_owned();
+    if bus.role().is_observer() {
+        PortError::TooManyObservers {
+            topic,
+            limit: OBSERVERS,
+        }
+    } else {
+        PortError::TooManyReaders {
+            topic,
+            limit: kind.qos.max_subscribers(),
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The writing end of a topic.
+
+use core::cell::Cell;
+use core::ptr::NonNull;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use iceoryx2::port::LoanError;
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
+use iceoryx2::sample_mut::SampleMut;
+use lager_topics::Stamp;
+
+use super::{Bytes, Header, Here, Kind, behind, ends_here};
+use crate::bus::Bus;
+use crate::cause::Cause;
+use crate::clock::Clock;
+use crate::doorbell::{Rope, StandardListeners};
+use crate::error::{PortError, SendError};
+use crate::service::{self, Fault, MAX_LOANS, patiently};
+use crate::transport::Ipc;
+
+/// What [`crate::Publisher`] is but for the payload's type.
+pub(crate) struct Writer {
+    port: Here<Port>,
+    payload_align: usize,
+    standard: Here<StandardListeners>,
+    ropes: Box<[Rope]>,
+    next_sequence: Cell<u64>,
+    epoch: u64,
+    writer: u32,
+}
+
+type Port = Publisher<Ipc, Bytes, Header>;
+type Loaned = SampleMut<Ipc, Bytes, Header>;
+
+ends_here!(Port, Loaned, StandardListeners);
+
+/// A sample on loan; dropped unsent it leaves no trace.
+pub(crate) struct Lent {
+    sample: Here<Loaned>,
+    payload: NonNull<u8>,
+}
+
+/// Who is told of a sample.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ring {
+    Actors,
+    Nobody,
+}
+
+impl Writer {
+    #[inline(never)]
+    pub(crate) fn new(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
+        let ropes = kind
+            .qos
+            .actors
+            .iter()
+            .map(|actor| Rope::to(bus, *actor, kind.id))
+            .collect::<Result<_, _>>()?;
+        let standard = StandardListeners::of(bus, kind)?;
+        let service = service::topic(bus, kind)?;
+        let port = patiently(bus, kind.name, || {
+            service
+                .publisher_builder()
+                .name(bus.port_name())
+                .max_loaned_samples(MAX_LOANS)
+                // With overflow there is always room; whatever else happens, never wait.
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+                .map_err(|error| match error {
+                    PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                        Fault::Full(PortError::TooManyWriters {
+                            topic: kind.name.to_owned(),
+                            limit: kind.qos.max_publishers(),
+                        })
+                    }
+                    other => service::no_resources(kind.name, other),
+                })
+        })?;
+        let details = service.static_config().message_type_details();
+        Ok(Self {
+            port: Here::new(port),
+            payload_align: details.payload.alignment(),
+            standard: Here::new(standard),
+            ropes,
+            next_sequence: Cell::new(0),
+            // After the port exists: a subscriber that is older than the epoch has been there
+            // for every sample, and may count what it missed from 0 on.
+            epoch: new_epoch(),
+            writer: std::process::id(),
+        })
+    }
+
+    /// Takes a sample. Its payload is whatever was there before.
+    #[inline(never)]
+    pub(crate) fn lend(&self) -> Result<Lent, SendError> {
+        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
+        let sample = unsafe { self.port.loan_custom_payload(1) }.map_err(refused)?;
+        // SAFETY: memory that others have written is initialised, and bytes are all that it is
+        // taken for here.
+        let mut sample = unsafe { sample.assume_init() };
+        let header = NonNull::from(sample.user_header_mut());
+        Ok(Lent {
+            payload: behind(header, size_of::<Stamp>(), self.payload_align),
+            sample: Here::new(sample),
+        })
+    }
+
+    /// Sends a sample that follows from `cause`, as published at that time.
+    #[inline(never)]
+    pub(crate) fn deliver(
+        &self,
+        mut lent: Lent,
+        cause: Cause,
+        publish_time_ns: u64,
+        ring: Ring,
+    ) -> Result<(), SendError> {
+        let sequence = self.next_sequence.get();
+        self.next_sequence.set(sequence + 1);
+        let stamp = cause.stamp(Stamp {
+            sequence,
+            publish_time_ns,
+            epoch: self.epoch,
+            writer: self.writer,
+            ..Stamp::default()
+        });
+        let header = NonNull::from(lent.sample.user_header_mut()).cast::<Stamp>();
+        // SAFETY: the service's header is a `Stamp` (`Kind::header`), and the loan is ours.
+        unsafe { header.write(stamp) };
+        let sent = lent.sample.take().send();
+        if ring == Ring::Actors {
+            for rope in &self.ropes {
+                rope.ring();
+            }
+        }
+        self.standard.notify();
+        match sent {
+            Ok(_) => Ok(()),
+            Err(error) => Err(SendError::Transport(format!("{error:?}"))),
+        }
+    }
+
+    /// Connects to readers that have come, and gives them their history.
+    #[inline(never)]
+    pub(crate) fn tick(&self) {
+        // A reader that cannot be connected now is tried again with the next change.
+        let _ = self.port.update_connections();
+    }
+
+    /// Start of this writer's life.
+    pub(crate) fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Samples sent so far.
+    pub(crate) fn sent(&self) -> u64 {
+        self.next_sequence.get()
+    }
+}
+
+impl Lent {
+    /// Where the payload is, aligned and large enough for one; valid as long as this is.
+    pub(crate) fn payload(&self) -> NonNull<u8> {
+        self.payload
+    }
+}
+
+fn refused(error: LoanError) -> SendError {
+    match error {
+        LoanError::ExceedsMaxLoans => SendError::TooManyLoans { limit: MAX_LOANS },
+        other => SendError::Transport(format!("{other:?}")),
+    }
+}
+
+/// The current time, made unique within the process.
+fn new_epoch() -> u64 {
+    static LAST: AtomicU64 = AtomicU64::new(0);
+    let now = Clock::monotonic_ns();
+    let last = LAST
+        .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |last| {
+            Some(now.max(last + 1))
+        })
+        .unwrap_or_default();
+    now.max(last + 1)
+}

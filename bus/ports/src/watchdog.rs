@@ -1,0 +1,239 @@
+//! A watch over calls into the bus, which may never return.
+//!
+//! The transport waits without a time-out for a shared-memory segment to get its size; a process
+//! that is killed or frozen in between leaves one that never does, and whoever opens it hangs.
+//! Services have a supervisor for that. A tool has this: a thread of its own, which touches
+//! nothing of the bus, counts how long a call takes and says when it has taken too long. It also
+//! sees to it that one wish to stop is enough, whatever the tool's other threads are in.
+//!
+//! ```text
+//!            enter                        limit is over
+//!  resting ---------> in a call ------------------------------> given up (hung)
+//!     ^                 |   |
+//!     +----- leave -----+   +-- shutdown wished, grace over --> given up (interrupted)
+//!     +----------------------- shutdown wished, grace over ---> given up (interrupted)
+//! ```
+
+use core::fmt;
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::shutdown::Shutdown;
+
+/// How often the watch looks.
+const TICK: Duration = Duration::from_millis(10);
+/// A longer pause between two looks counts as this one: the whole process did not run meanwhile,
+/// because it was frozen or kept from its core, and so was the call that is watched.
+const LONGEST_TICK: Duration = Duration::from_millis(100);
+/// How long an orderly end may take after it was wished for.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// Why the watch gives the process up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GivenUp {
+    /// A call into the bus has not returned within the limit.
+    Hung {
+        /// What the process was doing, as it was told to [`Watchdog::enter`].
+        what: &'static str,
+    },
+    /// The end that was wished for does not come by itself.
+    Interrupted,
+}
+
+/// A watch over calls into the bus; clones share it.
+#[derive(Clone, Default)]
+pub struct Watchdog {
+    now: Arc<Mutex<Now>>,
+}
+
+/// What the watched threads are at.
+#[derive(Clone, Copy, Debug, Default)]
+struct Now {
+    /// How many calls there have been.
+    calls: u64,
+    /// What the last of them is for; `None` once it has returned.
+    what: Option<&'static str>,
+}
+
+impl Watchdog {
+    /// Watches from now on. `give_up` runs once, in the watch's thread, and is to end the
+    /// process: what hangs cannot be called back.
+    ///
+    /// # Errors
+    /// The system has no thread for it.
+    pub fn start(
+        limit: Duration,
+        shutdown: &Shutdown,
+        give_up: impl FnOnce(GivenUp) + Send + 'static,
+    ) -> io::Result<Self> {
+        let watchdog = Self::default();
+        let (watching, shutdown) = (watchdog.clone(), shutdown.clone());
+        std::thread::Builder::new()
+            .name("watchdog".to_owned())
+            .spawn(move || give_up(watching.watch(limit, &shutdown)))?;
+        Ok(watchdog)
+    }
+
+    /// A call into the bus begins, and the one before is over; `what` says what it is for.
+    pub fn enter(&self, what: &'static str) {
+        let mut now = self.now();
+        now.calls += 1;
+        now.what = Some(what);
+    }
+
+    /// No call into the bus is under way: what follows may take as long as it likes.
+    pub fn leave(&self) {
+        self.now().what = None;
+    }
+
+    /// Makes one call under the watch.
+    pub fn over<T>(&self, what: &'static str, call: impl FnOnce() -> T) -> T {
+        self.enter(what);
+        let result = call();
+        self.leave();
+        result
+    }
+
+    fn now(&self) -> MutexGuard<'_, Now> {
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Looks until there is a reason to give up.
+    fn watch(&self, limit: Duration, shutdown: &Shutdown) -> GivenUp {
+        let mut watch = Watch::new(limit);
+        let mut looked = Instant::now();
+        loop {
+            std::thread::sleep(TICK);
+            let tick = looked.elapsed();
+            looked = Instant::now();
+            let now = *self.now();
+            if let Some(why) = watch.look(tick, now, shutdown.is_requested()) {
+                return why;
+            }
+        }
+    }
+}
+
+impl fmt::Debug for Watchdog {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_tuple("Watchdog")
+            .field(&*self.now())
+            .finish()
+    }
+}
+
+/// What the watch has counted so far.
+struct Watch {
+    limit: Duration,
+    call: u64,
+    lasted: Duration,
+    wished_for: Duration,
+}
+
+impl Watch {
+    fn new(limit: Duration) -> Self {
+        Self {
+            limit,
+            call: 0,
+            lasted: Duration::ZERO,
+            wished_for: Duration::ZERO,
+        }
+    }
+
+    /// One look, `tick` after the one before; whether to give up.
+    fn look(&mut self, tick: Duration, now: Now, shutdown: bool) -> Option<GivenUp> {
+        let tick = tick.min(LONGEST_TICK);
+        if shutdown {
+            self.wished_for += tick;
+            if self.wished_for >= GRACE {
+                return Some(GivenUp::Interrupted);
+            }
+        }
+        if now.calls != self.call {
+            self.call = now.calls;
+            self.lasted = Duration::ZERO;
+            return None;
+        }
+        self.lasted += tick;
+        let what = now.what.filter(|_| self.lasted >= self.limit)?;
+        Some(GivenUp::Hung { what })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    const LIMIT: Duration = Duration::from_secs(3);
+
+    fn call(calls: u64) -> Now {
+        let what = Some("opening a topic");
+        Now { calls, what }
+    }
+
+    #[test]
+    fn a_call_that_does_not_return_is_named_when_the_limit_is_over() {
+        let mut watch = Watch::new(LIMIT);
+        for _ in 0..=299 {
+            assert_eq!(watch.look(TICK, call(1), false), None);
+        }
+        let what = "opening a topic";
+        assert_eq!(
+            watch.look(TICK, call(1), false),
+            Some(GivenUp::Hung { what })
+        );
+    }
+
+    #[test]
+    fn calls_that_return_may_follow_each_other_for_ever() {
+        let mut watch = Watch::new(LIMIT);
+        for number in 0..1_000 {
+            assert_eq!(watch.look(LONGEST_TICK, call(number / 2), false), None);
+        }
+        let resting = Now {
+            calls: 1_000,
+            what: None,
+        };
+        for _ in 0..1_000 {
+            assert_eq!(watch.look(LONGEST_TICK, resting, false), None);
+        }
+    }
+
+    #[test]
+    fn time_in_which_the_process_did_not_run_is_no_hanging() {
+        let mut watch = Watch::new(LIMIT);
+        watch.look(TICK, call(1), false);
+        let frozen = Duration::from_secs(3600);
+        assert_eq!(watch.look(frozen, call(1), false), None);
+    }
+
+    #[test]
+    fn one_wish_to_stop_is_enough_within_a_call_and_between_two() {
+        for now in [call(1), Now::default()] {
+            let mut watch = Watch::new(LIMIT);
+            let mut looks = 0;
+            while watch.look(TICK, now, true).is_none() {
+                looks += 1;
+            }
+            assert!(TICK * looks < GRACE, "{looks} looks");
+        }
+    }
+
+    #[test]
+    fn the_thread_gives_up_a_call_that_hangs() {
+        let (send, given_up) = mpsc::channel();
+        let limit = Duration::from_millis(50);
+        let watchdog = Watchdog::start(limit, &Shutdown::new(), move |why| {
+            let _ = send.send(why);
+        })
+        .expect("a thread");
+        watchdog.over("opening a topic", || {
+            let what = "opening a topic";
+            assert_eq!(given_up.recv(), Ok(GivenUp::Hung { what }));
+        });
+    }
+}

@@ -1,0 +1,282 @@
+//! The arm's profile: what a robot's arm may do and where its poses are (AMB-32), and how it
+//! travels.
+//!
+//! ```text
+//!  Pi                                              steering board
+//!   | -- setting ArmTorqueLimit, value -----------> |  put aside, answered
+//!   |    ... one setting for each value ...         |
+//!   | -- setting ArmProfile, check value ---------> |  all of it in force, or none
+//!   | <------- reply, check value in force -------- |
+//! ```
+//!
+//! A profile is obeyed as a whole: half of a new one beside half of the old one may allow what
+//! neither does. The carry pose stays on the Pi, where whoever turns the wheels needs it.
+//!
+//! The type stands here because configuration, bridge, board and simulator must mean the same by
+//! it, the rules it has to keep included.
+
+mod rules;
+
+use crate::crc::checksum;
+use crate::setting::SettingKey;
+
+pub use rules::ArmProfileError;
+use rules::broken;
+
+/// The greatest position, load and torque of a servo.
+pub const SERVO_MAX: u16 = 1023;
+
+/// Where a joint may be sent, in positions 0 to 1023 of its (first) servo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "[u16; 2]", into = "[u16; 2]"))]
+pub struct ArmLimits {
+    /// Least position.
+    pub lowest: u16,
+    /// Greatest position.
+    pub highest: u16,
+}
+
+impl ArmLimits {
+    /// All positions a servo has.
+    pub const ALL: Self = Self {
+        lowest: 0,
+        highest: SERVO_MAX,
+    };
+}
+
+impl From<[u16; 2]> for ArmLimits {
+    fn from([lowest, highest]: [u16; 2]) -> Self {
+        Self { lowest, highest }
+    }
+}
+
+impl From<ArmLimits> for [u16; 2] {
+    fn from(limits: ArmLimits) -> Self {
+        [limits.lowest, limits.highest]
+    }
+}
+
+/// The limits of all joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+pub struct JointLimits {
+    /// Servo 1.
+    pub base: ArmLimits,
+    /// Servo 2; servo 3 is mirrored.
+    pub shoulder: ArmLimits,
+    /// Servo 4; servo 5 is mirrored.
+    pub elbow: ArmLimits,
+    /// Servo 6.
+    pub wrist: ArmLimits,
+    /// Servo 7.
+    pub rotation: ArmLimits,
+    /// Servo 8.
+    pub gripper: ArmLimits,
+}
+
+impl Default for JointLimits {
+    fn default() -> Self {
+        Self {
+            base: ArmLimits::ALL,
+            shoulder: ArmLimits::ALL,
+            elbow: ArmLimits::ALL,
+            wrist: ArmLimits::ALL,
+            rotation: ArmLimits::ALL,
+            gripper: ArmLimits::ALL,
+        }
+    }
+}
+
+/// A pose of the joints that carry the gripper; positions 0 to 1023 of servos 1, 2, 4 and 6.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ArmPose {
+    /// Servo 1.
+    pub base: u16,
+    /// Servo 2; servo 3 is mirrored.
+    pub shoulder: u16,
+    /// Servo 4; servo 5 is mirrored.
+    pub elbow: u16,
+    /// Servo 6.
+    pub wrist: u16,
+}
+
+/// What a robot's arm may do. [`Default`] is the robot of the simulator's world, and what a board
+/// obeys that has been told nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+pub struct ArmProfile {
+    /// Torque limit of every servo, 1 to 1023 of full.
+    pub torque_limit: u16,
+    /// Load that ends a squeeze, 1 to 1023 of full.
+    pub squeeze_load: u16,
+    /// Gripper position when open.
+    pub gripper_open: u16,
+    /// Gripper position when closed on nothing.
+    pub gripper_closed: u16,
+    /// Where each joint may be sent.
+    pub limits: JointLimits,
+    /// Where the arm goes when it has let go.
+    pub neutral: ArmPose,
+    /// Where goods are let go.
+    pub drop: ArmPose,
+    /// Where the arm is while the robot drives with goods.
+    pub carry: ArmPose,
+}
+
+impl Default for ArmProfile {
+    fn default() -> Self {
+        let raised = ArmPose {
+            base: 512,
+            shoulder: 600,
+            elbow: 400,
+            wrist: 512,
+        };
+        Self {
+            torque_limit: SERVO_MAX,
+            squeeze_load: 300,
+            gripper_open: 512,
+            gripper_closed: 210,
+            limits: JointLimits::default(),
+            neutral: raised,
+            drop: ArmPose {
+                base: 512,
+                shoulder: 300,
+                elbow: 512,
+                wrist: 512,
+            },
+            carry: raised,
+        }
+    }
+}
+
+impl ArmProfile {
+    /// How many values a board is told: all but the carry pose.
+    pub const VALUES: usize = 24;
+
+    /// Whether an arm can obey it.
+    ///
+    /// # Errors
+    /// The first rule it breaks.
+    pub fn validate(&self) -> Result<(), ArmProfileError> {
+        // The carry pose keeps the rules of a pose that a board is told.
+        let carried = Self {
+            drop: self.carry,
+            ..*self
+        };
+        for (profile, last_pose) in [(self, "drop"), (&carried, "carry")] {
+            let values = profile.values();
+            if let Some(rule) = broken(&values) {
+                return Err(rule.told(&values, last_pose));
+            }
+        }
+        Ok(())
+    }
+
+    /// The same for values that have been told. It costs a board less than the reason would.
+    pub fn is_sound(values: &[u16; Self::VALUES]) -> bool {
+        broken(values).is_none()
+    }
+
+    /// What a board is told, in the order of [`ArmProfile::key`].
+    pub const fn values(&self) -> [u16; Self::VALUES] {
+        let limits = &self.limits;
+        [
+            self.torque_limit,
+            self.squeeze_load,
+            self.gripper_open,
+            self.gripper_closed,
+            limits.base.lowest,
+            limits.base.highest,
+            limits.shoulder.lowest,
+            limits.shoulder.highest,
+            limits.elbow.lowest,
+            limits.elbow.highest,
+            limits.wrist.lowest,
+            limits.wrist.highest,
+            limits.rotation.lowest,
+            limits.rotation.highest,
+            limits.gripper.lowest,
+            limits.gripper.highest,
+            self.neutral.base,
+            self.neutral.shoulder,
+            self.neutral.elbow,
+            self.neutral.wrist,
+            self.drop.base,
+            self.drop.shoulder,
+            self.drop.elbow,
+            self.drop.wrist,
+        ]
+    }
+
+    /// The profile that has these values. A board knows no carry pose; it takes the neutral one.
+    pub const fn from_values(values: &[u16; Self::VALUES]) -> Self {
+        let neutral = pose(values, 16);
+        Self {
+            torque_limit: values[0],
+            squeeze_load: values[1],
+            gripper_open: values[2],
+            gripper_closed: values[3],
+            limits: JointLimits {
+                base: limits(values, 4),
+                shoulder: limits(values, 6),
+                elbow: limits(values, 8),
+                wrist: limits(values, 10),
+                rotation: limits(values, 12),
+                gripper: limits(values, 14),
+            },
+            neutral,
+            drop: pose(values, 20),
+            carry: neutral,
+        }
+    }
+
+    /// The setting that tells value `index` of [`ArmProfile::values`].
+    pub fn key(index: usize) -> Option<SettingKey> {
+        let code = u8::try_from(index).ok()?.checked_add(FIRST)?;
+        SettingKey::from_code(code).filter(|key| Self::index(*key).is_some())
+    }
+
+    /// The place in [`ArmProfile::values`] of what a setting tells, if it is one of them.
+    pub const fn index(key: SettingKey) -> Option<usize> {
+        let code = key.code();
+        if code >= FIRST && code <= LAST {
+            Some((code - FIRST) as usize)
+        } else {
+            None
+        }
+    }
+
+    /// The check value of a profile's values, as [`SettingKey::ArmProfile`] carries it: 0 to 255.
+    pub fn check(values: &[u16; Self::VALUES]) -> i16 {
+        let mut bytes = [0; 2 * Self::VALUES];
+        for (pair, value) in bytes.chunks_exact_mut(2).zip(values) {
+            pair.copy_from_slice(&value.to_le_bytes());
+        }
+        checksum(&bytes).into()
+    }
+}
+
+const FIRST: u8 = SettingKey::ArmTorqueLimit.code();
+const LAST: u8 = SettingKey::ArmDropWrist.code();
+const _: () = assert!((LAST - FIRST + 1) as usize == ArmProfile::VALUES);
+
+const fn limits(values: &[u16; ArmProfile::VALUES], at: usize) -> ArmLimits {
+    ArmLimits {
+        lowest: values[at],
+        highest: values[at + 1],
+    }
+}
+
+const fn pose(values: &[u16; ArmProfile::VALUES], at: usize) -> ArmPose {
+    ArmPose {
+        base: values[at],
+        shoulder: values[at + 1],
+        elbow: values[at + 2],
+        wrist: values[at + 3],
+    }
+}

@@ -1,0 +1,89 @@
+//! The arm's profile: its rules, and how its values travel.
+
+use lager_wire::{ArmLimits, ArmProfile, SettingKey};
+
+use crate::sample::Noise;
+
+type Change = fn(&mut ArmProfile);
+
+#[test]
+fn the_default_is_valid_and_comes_back_from_its_values() {
+    let profile = ArmProfile::default();
+    assert_eq!(profile.validate(), Ok(()));
+    assert_eq!(ArmProfile::from_values(&profile.values()), profile);
+}
+
+#[test]
+fn every_value_has_a_place_and_a_setting_of_its_own() {
+    let mut values = [0; ArmProfile::VALUES];
+    for (index, value) in values.iter_mut().enumerate() {
+        *value = 40 + index as u16;
+        let key = ArmProfile::key(index).expect("a setting");
+        assert_eq!(ArmProfile::index(key), Some(index));
+    }
+    assert_eq!(ArmProfile::from_values(&values).values(), values);
+    assert_eq!(ArmProfile::key(ArmProfile::VALUES), None);
+    for key in [SettingKey::GainP, SettingKey::ArmProfile] {
+        assert_eq!(ArmProfile::index(key), None);
+    }
+}
+
+#[test]
+fn the_check_value_tells_profiles_apart_that_differ_in_one_bit() {
+    let values = ArmProfile::default().values();
+    let check = ArmProfile::check(&values);
+    for index in 0..values.len() {
+        for bit in 0..16 {
+            let mut other = values;
+            other[index] ^= 1 << bit;
+            assert_ne!(ArmProfile::check(&other), check, "value {index} bit {bit}");
+        }
+    }
+}
+
+#[test]
+fn what_no_arm_can_obey_is_refused_with_the_key() {
+    let limits = |lowest, highest| ArmLimits { lowest, highest };
+    let cases: [(Change, &str); 9] = [
+        (|arm| arm.torque_limit = 0, "torque_limit"),
+        (|arm| arm.torque_limit = 1024, "torque_limit"),
+        (|arm| arm.squeeze_load = 0, "squeeze_load"),
+        (|arm| arm.torque_limit = 200, "squeeze_load"),
+        (|arm| arm.limits.base.highest = 2_000, "base"),
+        (|arm| arm.limits.wrist.lowest = 1_000, "wrist"),
+        (|arm| arm.gripper_closed = 512, "gripper_closed"),
+        (|arm| arm.drop.shoulder = 1_024, "drop"),
+        (|arm| arm.carry.elbow = 1_024, "carry"),
+    ];
+    for (change, word) in cases {
+        let mut profile = ArmProfile::default();
+        change(&mut profile);
+        let error = profile.validate().expect_err(word).to_string();
+        assert!(error.contains(word), "{error}");
+    }
+    let mut profile = ArmProfile::default();
+    profile.limits.gripper = limits(300, 600);
+    let error = profile.validate().expect_err("closed is outside");
+    assert!(error.to_string().contains("gripper_closed"), "{error}");
+    profile.gripper_closed = 300;
+    assert_eq!(profile.validate(), Ok(()));
+    profile.limits.shoulder = limits(600, 299);
+    assert!(profile.validate().is_err(), "the lower one first");
+}
+
+#[test]
+fn board_and_configuration_judge_alike() {
+    let mut noise = Noise::new(5);
+    let mut sound = 0;
+    for _ in 0..20_000 {
+        let mut values = ArmProfile::default().values();
+        for _ in 0..1 + noise.byte() % 3 {
+            let place = usize::from(noise.byte()) % values.len();
+            values[place] = u16::from_le_bytes([noise.byte(), noise.byte() % 8]);
+        }
+        let judged = ArmProfile::from_values(&values).validate().is_ok();
+        assert_eq!(ArmProfile::is_sound(&values), judged, "{values:?}");
+        sound += u32::from(judged);
+    }
+    assert!((2_000..18_000).contains(&sound), "{sound}");
+}

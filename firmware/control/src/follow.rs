@@ -1,0 +1,154 @@
+//! What following needs: words from the sensor board and, within a gap of the tape, tape (W3, S7).
+//!
+//! ```text
+//!               no word for 100 ms
+//!   watching --------------------------> lost: words
+//!      |        words, and no tape in them for 2 s
+//!      '-------------------------------> lost: tape
+//! ```
+//!
+//! Both states last until the next command: a robot that has lost its line and stands does not start again
+//! by itself because something dark is pushed under its sensors, or a loose plug touches.
+//!
+//! The longest legal way without tape is the Pi's to judge, which knows where the robot is: it stands 80 mm
+//! after the line was last seen, and drives 40 mm past the bar of the delivery. A board knows no millimetres
+//! but time: 80 mm are 1.1 s at the cruise speed of 73 mm/s, and 2 s leave room for a battery that is low, a
+//! way that begins without tape, and the time the Pi takes to notice. So the Pi always judges first, and a
+//! Pi that does not is stopped 150 mm behind the line.
+
+use lager_wire::LineBits;
+
+use crate::time::{first, reached};
+
+/// How old the last word may be, in microseconds: eight passes of the sensor board at 9600 Bd.
+const WORD_LIMIT_US: u32 = 100_000;
+/// How long words may show no tape, in microseconds.
+const TAPE_LIMIT_US: u32 = 2_000_000;
+
+/// For want of what following was given up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lost {
+    /// Words from the sensor board.
+    Words,
+    /// Tape in them.
+    Tape,
+}
+
+/// Watches one following.
+#[derive(Debug, Clone)]
+pub(crate) struct Follow {
+    /// When the last word came, or following began.
+    heard_us: u32,
+    /// Since when the words show no tape.
+    bare_since_us: Option<u32>,
+    lost: Option<Lost>,
+}
+
+impl Follow {
+    /// A following that begins now.
+    pub(crate) const fn new(now_us: u32) -> Self {
+        Self {
+            heard_us: now_us,
+            bare_since_us: None,
+            lost: None,
+        }
+    }
+
+    /// A word from the sensor board that came at `at_us`.
+    pub(crate) fn on_word(&mut self, bits: LineBits, at_us: u32) {
+        self.heard_us = at_us;
+        if bits.0 != 0 {
+            self.bare_since_us = None;
+        } else if self.bare_since_us.is_none() {
+            self.bare_since_us = Some(at_us);
+        }
+    }
+
+    /// Whether it has to be given up just now; once.
+    pub(crate) fn gives_up(&mut self, now_us: u32) -> bool {
+        if self.lost.is_some() {
+            return false;
+        }
+        if reached(now_us, self.heard_us.wrapping_add(WORD_LIMIT_US)) {
+            self.lost = Some(Lost::Words);
+        } else if self
+            .bare_due_us()
+            .is_some_and(|due_us| reached(now_us, due_us))
+        {
+            self.lost = Some(Lost::Tape);
+        }
+        self.lost.is_some()
+    }
+
+    /// For want of what it was given up.
+    pub(crate) const fn lost(&self) -> Option<Lost> {
+        self.lost
+    }
+
+    /// When it is given up if nothing comes.
+    pub(crate) fn next_due_us(&self) -> Option<u32> {
+        if self.lost.is_some() {
+            return None;
+        }
+        let word_us = self.heard_us.wrapping_add(WORD_LIMIT_US);
+        Some(match self.bare_due_us() {
+            Some(bare_us) => first(self.heard_us, word_us, bare_us),
+            None => word_us,
+        })
+    }
+
+    fn bare_due_us(&self) -> Option<u32> {
+        self.bare_since_us
+            .map(|since_us| since_us.wrapping_add(TAPE_LIMIT_US))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TAPE: LineBits = LineBits(0b000_0111_0000);
+    const BARE: LineBits = LineBits(0);
+
+    fn fed(word: LineBits, from_us: u32, until_us: u32, watch: &mut Follow) -> Option<u32> {
+        (from_us..until_us).step_by(5_000).find(|at_us| {
+            watch.on_word(word, *at_us);
+            watch.gives_up(*at_us)
+        })
+    }
+
+    #[test]
+    fn tape_keeps_it_going_and_want_of_it_ends_it_once() {
+        let mut watch = Follow::new(0);
+        assert_eq!(fed(TAPE, 0, 10_000_000, &mut watch), None);
+        let over = fed(BARE, 10_000_000, 13_000_000, &mut watch);
+        assert_eq!(over, Some(12_000_000));
+        assert_eq!(watch.lost(), Some(Lost::Tape));
+        assert_eq!(fed(TAPE, 12_005_000, 13_000_000, &mut watch), None);
+        assert_eq!(watch.lost(), Some(Lost::Tape), "and stays");
+    }
+
+    #[test]
+    fn a_gap_that_closes_in_time_is_a_gap() {
+        let mut watch = Follow::new(0);
+        for round in 0..5 {
+            let from_us = round * 2_000_000;
+            assert_eq!(fed(BARE, from_us, from_us + 1_990_000, &mut watch), None);
+            assert_eq!(
+                fed(TAPE, from_us + 1_990_000, from_us + 2_000_000, &mut watch),
+                None
+            );
+        }
+    }
+
+    #[test]
+    fn silence_ends_it_also_when_no_word_ever_came_and_the_clock_wraps() {
+        let start = u32::MAX - 50_000;
+        let mut watch = Follow::new(start);
+        assert_eq!(watch.next_due_us(), Some(start.wrapping_add(100_000)));
+        assert!(!watch.gives_up(start.wrapping_add(99_999)));
+        assert!(watch.gives_up(start.wrapping_add(100_000)));
+        assert_eq!(watch.lost(), Some(Lost::Words));
+        assert_eq!(watch.next_due_us(), None);
+    }
+}

@@ -1,0 +1,224 @@
+//! How unlike the two motors are: what the regulator always had to add, learnt on straight lines
+//! (W3, W6).
+//!
+//! ```text
+//!   settled corrections --> mean of the last second --- at a mark --> bias: left + b, right - b
+//! ```
+//!
+//! The line before a mark of the grid is straight, the way out to the delivery need not be: so the
+//! mean counts only when a mark comes, and neither at the delivery's bar, where the line ends, nor
+//! at the next mark behind it, where the way back does. What brings the robot to its line after
+//! a turn tells nothing of the sides, and a station's mark may come soon after one. The bias is
+//! added wherever both sides are to be alike: to every correction, to turns on the spot, which
+//! would wander off their place, and to the commands by hand.
+
+use lager_wire::LineState;
+
+use crate::time::reached;
+use crate::wheels::Motors;
+use crate::{Motor, PWM_STANDARD};
+
+/// From one correction that is looked at to the next, in microseconds.
+const PERIOD_US: u32 = 20_000;
+/// The mean is over 2^6 of them.
+const MEAN_BITS: u8 = 6;
+/// So many at the beginning of a following do not count: the robot comes to its line in these 2 s.
+const SETTLED: u8 = 100;
+/// A mean counts after this many.
+const LEAST: u8 = 175;
+/// The most bias, in duty steps.
+const MOST: i16 = 12;
+/// For so many words the line may look like one after tape to both sides, as the bar does that is left
+/// at an angle: 150 ms.
+const ASKEW: u8 = 30;
+
+/// The mean and the bias.
+#[derive(Debug, Clone, Default)]
+pub struct Sides {
+    /// In 256ths of a duty step.
+    mean: i16,
+    seen: u8,
+    due_us: u32,
+    bias: i16,
+    /// The bias before the last mark.
+    before: i16,
+    /// So many words may still come before the line ends behind tape to both sides.
+    wide: u8,
+    /// The line has ended, and no mark has come since.
+    ended: bool,
+}
+
+impl Sides {
+    /// Two sides that are alike as far as is known.
+    pub const fn new() -> Self {
+        Self {
+            mean: 0,
+            seen: 0,
+            due_us: 0,
+            bias: 0,
+            before: 0,
+            wide: 0,
+            ended: false,
+        }
+    }
+
+    /// A correction in duty steps, the bias in it, that was given while the line was in this state.
+    // In the step itself it would take registers from what cannot wait.
+    #[inline(never)]
+    pub fn observe(&mut self, correction: i16, state: LineState, now_us: u32) {
+        self.wide = self.wide.saturating_sub(1);
+        match state {
+            LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
+                if state == LineState::FourWay {
+                    self.wide = ASKEW;
+                }
+                if core::mem::take(&mut self.ended) {
+                    self.pause();
+                } else if self.seen >= LEAST {
+                    self.before = self.bias;
+                    self.bias = ((self.mean + 128) >> 8).clamp(-MOST, MOST);
+                    self.seen = SETTLED;
+                }
+            }
+            LineState::NotOnLine | LineState::DropStation
+                if self.wide > 0 || state == LineState::DropStation =>
+            {
+                if !self.ended {
+                    self.bias = self.before;
+                }
+                self.ended = true;
+            }
+            _ if self.seen > 0 && !reached(now_us, self.due_us) => {}
+            _ => {
+                self.due_us = now_us.wrapping_add(PERIOD_US);
+                self.seen = self.seen.saturating_add(1);
+                if self.seen <= SETTLED {
+                    return;
+                }
+                let missing = (correction.clamp(-60, 60) << 8) - self.mean;
+                self.mean += (missing + (1 << (MEAN_BITS - 1))) >> MEAN_BITS;
+            }
+        }
+    }
+
+    /// The robot does not follow a line.
+    pub fn pause(&mut self) {
+        self.mean = self.bias << 8;
+        self.seen = 0;
+    }
+
+    /// What is added to the left side and taken from the right, in duty steps.
+    pub fn bias(&self) -> i16 {
+        self.bias
+    }
+
+    /// Duties that are to move both sides alike.
+    pub fn alike(&self, motors: Motors) -> Motors {
+        let with = |motor: Motor, bias: i16| Motor {
+            duty: if motor.duty == PWM_STANDARD {
+                (i16::from(PWM_STANDARD) + bias) as u8
+            } else {
+                motor.duty
+            },
+            ..motor
+        };
+        (with(motors.0, self.bias), with(motors.1, -self.bias))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINE: LineState = LineState::OnLine;
+    const MARK: LineState = LineState::FourWay;
+
+    fn follow(sides: &mut Sides, correction: i16, ms: u32, state: LineState) {
+        let start_us = sides.due_us;
+        for at_ms in 0..ms {
+            let now_us = start_us.wrapping_add(at_ms * 1_000);
+            sides.observe(correction, state, now_us);
+        }
+    }
+
+    #[test]
+    fn what_is_always_added_before_a_mark_is_learnt() {
+        let mut sides = Sides::new();
+        follow(&mut sides, 4, 6_000, LINE);
+        assert_eq!(sides.bias(), 0, "it may be a curve");
+        follow(&mut sides, 4, 100, MARK);
+        assert_eq!(sides.bias(), 4);
+        let turning = (Motor::backward(100), Motor::forward(100));
+        let both = sides.alike(turning);
+        assert_eq!(both, (Motor::backward(104), Motor::forward(96)));
+        assert_eq!(
+            sides.alike((Motor::OFF, Motor::OFF)),
+            (Motor::OFF, Motor::OFF)
+        );
+    }
+
+    #[test]
+    fn a_mark_soon_after_a_turn_teaches_nothing_and_a_curve_is_forgotten() {
+        let mut sides = Sides::new();
+        follow(&mut sides, 20, 3_000, LINE);
+        follow(&mut sides, 20, 100, MARK);
+        assert_eq!(sides.bias(), 0);
+        sides.pause();
+        follow(&mut sides, 20, 1_900, LINE);
+        follow(&mut sides, 0, 2_000, LINE);
+        follow(&mut sides, 0, 100, MARK);
+        assert_eq!(sides.bias(), 0);
+        sides.pause();
+        follow(&mut sides, 20, 5_000, LINE);
+        follow(&mut sides, 0, 6_000, LINE);
+        follow(&mut sides, 0, 100, MARK);
+        assert_eq!(sides.bias(), 0);
+    }
+
+    #[test]
+    fn the_way_to_the_delivery_and_back_teaches_nothing() {
+        let mut sides = Sides::new();
+        follow(&mut sides, 4, 6_000, LINE);
+        follow(&mut sides, 4, 100, MARK);
+        for _ in 0..2 {
+            // A bend, the bar and its end; a bend and the corner.
+            follow(&mut sides, 20, 6_000, LINE);
+            follow(&mut sides, 20, 100, MARK);
+            follow(&mut sides, 20, 100, LineState::DropStation);
+            assert_eq!(sides.bias(), 4);
+            sides.pause();
+            follow(&mut sides, -20, 6_000, LINE);
+            follow(&mut sides, -20, 100, MARK);
+            assert_eq!(sides.bias(), 4);
+        }
+        follow(&mut sides, 7, 6_000, LINE);
+        follow(&mut sides, 7, 100, MARK);
+        assert_eq!(sides.bias(), 7);
+    }
+
+    #[test]
+    fn the_bar_may_be_left_at_an_angle() {
+        let mut sides = Sides::new();
+        follow(&mut sides, 20, 6_000, LINE);
+        follow(&mut sides, 20, 15, LineState::StationToRight);
+        follow(&mut sides, 20, 20, MARK);
+        assert_eq!(sides.bias(), MOST);
+        follow(&mut sides, 20, 20, LineState::RightOfLine);
+        follow(&mut sides, 20, 20, LineState::NotOnLine);
+        assert_eq!(sides.bias(), 0);
+        // The corner, on the way back.
+        follow(&mut sides, -20, 6_000, LINE);
+        follow(&mut sides, -20, 100, MARK);
+        assert_eq!(sides.bias(), 0);
+    }
+
+    #[test]
+    fn there_is_a_most() {
+        for way in [1, -1] {
+            let mut sides = Sides::new();
+            follow(&mut sides, way * 2_000, 20_000, LINE);
+            follow(&mut sides, 0, 10, MARK);
+            assert_eq!(sides.bias(), way * MOST);
+        }
+    }
+}

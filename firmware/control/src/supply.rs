@@ -1,0 +1,138 @@
+//! The battery's part in the wheels' speed, taken out: a full battery drives the same duty faster
+//! than one that is nearly empty, and near the duty at which the wheels break loose much faster.
+//!
+//! `duty at the pins = duty * 11.1 V / battery`: every duty that is decided, ordered or reported is
+//! one at 11.1 V, three lithium cells at rest, and only the motor drivers are given another. The
+//! battery is the mean of the last readings, since it sags with every start. Within a reading's
+//! step of 11.1 V nothing changes, and neither does a battery that cannot be one: what is not measured
+//! is not corrected.
+
+use crate::Motor;
+use crate::divide::divide;
+use crate::wheels::Motors;
+
+/// The battery all duties are meant for, in tenths of a volt.
+const NOMINAL_DECIVOLTS: u8 = 111;
+/// What three lithium cells can have, in tenths of a volt.
+const BELIEVED: core::ops::RangeInclusive<u8> = 80..=135;
+/// A mean is over this many readings, as a power of two.
+const MEAN_BITS: u8 = 4;
+/// The mean must move by this much to be taken, in sixteenths of a reading's step.
+const TAKEN: u16 = 4;
+/// So near to the nominal battery nothing is corrected, in the same unit: the steps below and
+/// above it.
+const NEAR: u16 = 12;
+/// The factor 1. The largest, 1.39 at the lowest battery, fits 8 bits: what is on the way from the
+/// line to the wheels is two products of bytes.
+const ONE: u8 = 128;
+
+/// The mean of the battery, and the factor that follows from it.
+#[derive(Debug, Clone)]
+pub(crate) struct Supply {
+    /// In sixteenths of a tenth of a volt; 0 before the first reading.
+    mean: u16,
+    taken: u16,
+    factor: u8,
+}
+
+impl Supply {
+    /// A battery that was never read.
+    pub(crate) const fn new() -> Self {
+        Self {
+            mean: 0,
+            taken: 0,
+            factor: ONE,
+        }
+    }
+
+    /// A reading of the battery in tenths of a volt.
+    pub(crate) fn observe(&mut self, decivolts: u8) {
+        if !BELIEVED.contains(&decivolts) {
+            *self = Self::new();
+            return;
+        }
+        // A reading is cut off to whole steps; the middle of the step is the best guess.
+        let reading = (u16::from(decivolts) << MEAN_BITS) + (1 << (MEAN_BITS - 1));
+        self.mean = if self.mean == 0 {
+            reading
+        } else {
+            self.mean - (self.mean >> MEAN_BITS) + (reading >> MEAN_BITS)
+        };
+        if self.mean.abs_diff(self.taken) >= TAKEN {
+            self.taken = self.mean;
+            self.factor = factor(self.mean);
+        }
+    }
+
+    /// What the drivers are given for these duties.
+    pub(crate) fn at_pins(&self, motors: Motors) -> Motors {
+        (self.scaled(motors.0), self.scaled(motors.1))
+    }
+
+    fn scaled(&self, motor: Motor) -> Motor {
+        let scaled = u16::from(motor.duty) * u16::from(self.factor) + u16::from(ONE / 2);
+        Motor {
+            duty: (scaled / u16::from(ONE)).min(255) as u8,
+            ..motor
+        }
+    }
+}
+
+fn factor(mean: u16) -> u8 {
+    let nominal = u16::from(NOMINAL_DECIVOLTS) << MEAN_BITS;
+    if mean.abs_diff(nominal) <= NEAR {
+        return ONE;
+    }
+    divide(
+        u32::from(nominal) * u32::from(ONE) + u32::from(mean) / 2,
+        u32::from(mean),
+    ) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(decivolts: u8, duty: u8) -> u8 {
+        let mut supply = Supply::new();
+        for _ in 0..100 {
+            supply.observe(decivolts);
+        }
+        let motors = (Motor::forward(duty), Motor::backward(duty));
+        let (left, right) = supply.at_pins(motors);
+        assert_eq!((left.duty, left.reverse), (right.duty, false));
+        assert!(right.reverse);
+        left.duty
+    }
+
+    #[test]
+    fn a_duty_means_the_same_voltage_on_every_battery() {
+        for (decivolts, duty) in [(100, 110), (105, 105), (118, 94), (126, 88)] {
+            assert!(
+                at(decivolts, 100).abs_diff(duty) <= 1,
+                "{decivolts}: {}",
+                at(decivolts, 100)
+            );
+        }
+        assert_eq!(at(90, 255), 255, "there is no more than all");
+        assert_eq!(at(126, 0), 0);
+    }
+
+    #[test]
+    fn about_the_nominal_battery_and_without_one_nothing_is_corrected() {
+        for decivolts in [0, 50, 110, 111, 150, 255] {
+            assert_eq!(at(decivolts, 100), 100, "{decivolts}");
+        }
+    }
+
+    #[test]
+    fn one_wrong_reading_changes_little() {
+        let mut supply = Supply::new();
+        for _ in 0..100 {
+            supply.observe(111);
+        }
+        supply.observe(130);
+        let (left, _) = supply.at_pins((Motor::forward(100), Motor::OFF));
+        assert!((98..=100).contains(&left.duty), "{}", left.duty);
+    }
+}

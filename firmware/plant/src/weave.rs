@@ -1,0 +1,47 @@
+//! How well the robot keeps to its line: the largest lateral error after the first metre (E15).
+//!
+//! Measured is the middle of the line sensors against the middle of the tape they follow, while
+//! neither wheel is driven backwards. The first metre of all and the first 300 mm after each turn
+//! do not count: there the robot comes to its line from where it was put, or from a turn that has
+//! ended within a few degrees. Bends count: on the tightest one a robot that follows well has the
+//! tape under its outer sensors.
+
+use crate::body::{LINE_SENSOR_AHEAD, Pose};
+use crate::tape::Tape;
+
+/// Way of which nothing counts, in mm.
+const RUN_IN: f64 = 1_000.0;
+/// Way after each turn that does not count, in mm.
+const SETTLING: f64 = 300.0;
+
+/// The way driven and the largest error on it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Weave {
+    driven: f64,
+    straight: f64,
+    worst: f64,
+}
+
+impl Weave {
+    /// Takes note of where the robot has come to with these duties, on a `way` in mm.
+    pub(crate) fn step(&mut self, pose: &Pose, duties: [i16; 2], way: f64, tape: &Tape) {
+        if duties.iter().any(|duty| *duty < 0) {
+            self.straight = 0.0;
+            return;
+        }
+        self.driven += way;
+        self.straight += way;
+        if self.driven < RUN_IN || self.straight < SETTLING {
+            return;
+        }
+        let (x, y) = pose.point(LINE_SENSOR_AHEAD, 0.0);
+        if let Some(error) = tape.beside(x, y, pose.heading) {
+            self.worst = self.worst.max(error);
+        }
+    }
+
+    /// The largest error in mm.
+    pub(crate) fn worst(&self) -> f64 {
+        self.worst
+    }
+}

@@ -1,0 +1,82 @@
+//! How orders end: by their lease, by the board's word, by a stop or a change of the mode.
+//!
+//! Apart from the judgement of orders because an end needs nobody's word. What is written to a
+//! board afterwards is the wire's side.
+
+use core::time::Duration;
+
+use lager_topics::{Finish, Origin};
+
+use super::ledger::Ended;
+use super::{Arbiter, Grant, STANDBY};
+
+impl Arbiter {
+    /// Ends what runs, with nothing in its place.
+    pub(super) fn quiet(&mut self) {
+        self.grant = None;
+        if self.running.is_some() {
+            self.finish_running(Finish::Aborted);
+        }
+        self.stand_anew();
+        self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// Ends the order in force; logic's standby below it comes back if there is one.
+    pub(super) fn finish_running(&mut self, finish: Finish) {
+        let Some(over) = self.running.take() else {
+            return;
+        };
+        let by_person = over.key.origin == Origin::Operator;
+        let given_up = matches!(finish, Finish::NoWord | Finish::NoTape);
+        if over.command.is_one_shot() || finish == Finish::Refused || by_person || given_up {
+            let key = over.key;
+            self.ledger.enter(Ended { key, finish });
+        }
+        if over.command == STANDBY && finish != Finish::Refused {
+            self.stand_on(&over);
+        } else {
+            self.last = Some(Ended {
+                key: over.key,
+                finish,
+            });
+            self.stand_anew();
+        }
+        if let Some(Grant {
+            key: Some(key),
+            lease,
+        }) = self.grant.take()
+        {
+            self.stand_for(key, lease);
+        }
+        self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// Ends what nobody had renewed by `at`.
+    pub(super) fn expire(&mut self, at: Duration) {
+        if self.grant.is_some_and(|grant| grant.lease.is_over(at)) {
+            // What the operator moved, he moved by logic's leave.
+            self.grant = None;
+            self.lapse();
+        }
+        // The standby below a guest may have lapsed as well.
+        for _ in 0..2 {
+            if self
+                .running
+                .is_some_and(|running| running.lease.is_over(at))
+            {
+                self.lapse();
+            }
+        }
+    }
+
+    /// Nobody has renewed the order in force.
+    fn lapse(&mut self) {
+        if self
+            .running
+            .is_some_and(|running| running.command != STANDBY)
+        {
+            self.leases_expired = self.leases_expired.wrapping_add(1);
+        }
+        self.finish_running(Finish::Aborted);
+    }
+}

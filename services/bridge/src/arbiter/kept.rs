@@ -1,0 +1,127 @@
+//! What outlives the arbiter: all that a successor needs, as `link/health` carries it, and what
+//! `steering/state` tells of orders.
+//!
+//! Apart from the arbiter because it decides nothing: what is written here is read here.
+
+use core::time::Duration;
+
+use lager_topics::{Finish, Health, Mode, Origin, Refusal, SteeringReport};
+use lager_wire::Command;
+
+use super::driven::Driven;
+use super::lease::Lease;
+use super::ledger::{Ended, OrderKey};
+use super::{Arbiter, Grant, Running, moves};
+
+impl Arbiter {
+    /// Goes on where an earlier life of the bridge ended: mode, latch, counters, and which order
+    /// belongs to which sequence byte.
+    ///
+    /// Nothing is written for the order in force until its origin renews it; if nobody does
+    /// within [`LEASE`], it lapses. Until then the board's own limit of 150 ms protects.
+    pub fn resume(kept: &Health) -> Self {
+        let mut arbiter = Self {
+            mode: kept.mode.get().unwrap_or(Mode::Manual),
+            stopped: kept.stopped != 0,
+            orders_refused: kept.orders_refused,
+            leases_expired: kept.leases_expired,
+            acquainted: kept.wire_seq != 0,
+            wire_seq: kept.wire_seq,
+            ..Self::new()
+        };
+        if let (Some(origin), Some(refusal)) = (kept.refused_origin.get(), kept.refusal.get())
+            && refusal != Refusal::None
+        {
+            let id = kept.refused_id;
+            arbiter.refused = Some((OrderKey { origin, id }, refusal));
+        }
+        // One setpoint may have been written and not told: its sequence byte is not used again.
+        arbiter.next_seq();
+        arbiter.idle_seq = arbiter.wire_seq;
+        let finish = kept.finish.get().unwrap_or(Finish::None);
+        if let (Some(origin), false) = (kept.finished_origin.get(), finish == Finish::None) {
+            let key = OrderKey {
+                origin,
+                id: kept.finished_id,
+            };
+            let ended = Ended { key, finish };
+            arbiter.last = Some(ended);
+            arbiter.ledger.enter(ended);
+        }
+        let current = Command::from_code(kept.current_code).zip(kept.current_origin.get());
+        let was_driven =
+            arbiter.mode == Mode::Manual && current.is_some_and(|(command, _)| moves(command));
+        arbiter.driven = Driven::resume(kept.driven_by_hand, was_driven);
+        if let (Some((command, origin)), false) = (current, arbiter.stopped) {
+            let key = OrderKey {
+                origin,
+                id: kept.current_id,
+            };
+            arbiter.running = Some(Running {
+                key,
+                command,
+                seq: kept.wire_seq,
+                arm_granted: false,
+                lease: Lease::Unclaimed(None),
+                held_until: None,
+                written: Some(Duration::ZERO),
+                search: None,
+            });
+            if arbiter.mode == Mode::Autonomous && origin == Origin::Operator {
+                arbiter.grant = Some(Grant {
+                    key: None,
+                    lease: Lease::Unclaimed(None),
+                });
+            }
+        }
+        arbiter
+    }
+
+    /// Writes the arbiter's part of `link/health`: all that [`Arbiter::resume`] needs.
+    pub fn fill(&self, now: Duration, health: &mut Health) {
+        health.mode = self.mode.into();
+        health.stopped = self.stopped.into();
+        health.orders_refused = self.orders_refused;
+        health.leases_expired = self.leases_expired;
+        health.wire_seq = self.wire_seq;
+        health.blocked = self.blocked().into();
+        health.driven_by_hand = self.driven.sum();
+        let none = OrderKey {
+            origin: Origin::Logic,
+            id: 0,
+        };
+        let running = self.running;
+        let current = running.map_or(none, |running| running.key);
+        health.current_id = current.id;
+        health.current_origin = current.origin.into();
+        health.current_code = running.map_or(0, |running| running.command.code());
+        health.next_lease_ms = running
+            .and_then(|running| running.lease.end())
+            .map_or(0, |end| {
+                let left = end.saturating_sub(now).as_millis();
+                u16::try_from(left).unwrap_or(u16::MAX)
+            });
+        let last = self.last.unwrap_or(Ended {
+            key: none,
+            finish: Finish::None,
+        });
+        health.finished_id = last.key.id;
+        health.finished_origin = last.key.origin.into();
+        health.finish = last.finish.into();
+        let (refused, refusal) = self.refused.unwrap_or((none, Refusal::None));
+        health.refused_id = refused.id;
+        health.refused_origin = refused.origin.into();
+        health.refusal = refusal.into();
+    }
+
+    /// Writes the arbiter's part of `steering/state`: which order runs and which ended last.
+    pub fn fill_report(&self, report: &mut SteeringReport) {
+        let mut health = Health::default();
+        self.fill(Duration::ZERO, &mut health);
+        report.current_id = health.current_id;
+        report.current_origin = health.current_origin;
+        report.finished_id = health.finished_id;
+        report.finished_origin = health.finished_origin;
+        report.finish = health.finish;
+    }
+}

@@ -1,0 +1,72 @@
+//! Nobody drives unseen: what follows when the steering board does not report, is not there, or is
+//! one that must not be driven.
+//!
+//! ```text
+//!            report                     200 ms without a report
+//!  heard <----------- heard ---------------------------------------> silent: what moves ends,
+//!    ^                                                                  |    standby is written,
+//!    +------------------------- report ---------------------------------+    all else is refused
+//! ```
+//!
+//! It is apart from the wire's side because it decides for all origins alike and writes nothing.
+
+use core::time::Duration;
+
+use lager_topics::{Finish, Refusal};
+use lager_wire::Version;
+
+use super::{Arbiter, REPORT_DEADLINE, STANDBY};
+
+impl Arbiter {
+    /// Why the steering board keeps everybody from moving anything.
+    pub(super) fn board_objection(&self, now: Duration) -> Option<Refusal> {
+        match self.board {
+            None => Some(Refusal::NoBoard),
+            Some(Version::Original) => (!self.original_boards).then_some(Refusal::OriginalBoard),
+            Some(Version::One) => self.is_unheard(now).then_some(Refusal::BoardSilent),
+        }
+    }
+
+    fn is_unheard(&self, now: Duration) -> bool {
+        self.reported
+            .is_none_or(|reported| reported + REPORT_DEADLINE <= now)
+    }
+
+    /// Ends what moves without a board that shows it, and notes why nobody may move.
+    pub(super) fn watch_board(&mut self, now: Duration) {
+        let objection = self.board_objection(now);
+        self.silent = objection == Some(Refusal::BoardSilent);
+        if self
+            .running
+            .is_some_and(|running| running.command != STANDBY)
+        {
+            // An order of an earlier life of the bridge waits as long for its board.
+            self.reported.get_or_insert(now);
+            let is_over = match objection {
+                Some(Refusal::NoBoard) => self.is_unheard(now),
+                other => other.is_some(),
+            };
+            if is_over {
+                self.finish_running(Finish::Aborted);
+            }
+        }
+        let objection = objection.unwrap_or(Refusal::None);
+        if self.objection != objection {
+            self.objection = objection;
+            self.revision = self.revision.wrapping_add(1);
+        }
+    }
+
+    /// When silence has to be noticed, if no report comes before.
+    pub(super) fn silence_due(&self) -> Option<Duration> {
+        let is_awaited = match self.board {
+            None => self
+                .running
+                .is_some_and(|running| running.command != STANDBY),
+            Some(Version::One) => !self.silent,
+            Some(Version::Original) => false,
+        };
+        let reported = self.reported.filter(|_| is_awaited)?;
+        Some(reported + REPORT_DEADLINE)
+    }
+}

@@ -1,0 +1,135 @@
+//! How the last calibration of the line sensors went, as `link/health` tells it.
+//!
+//! ```text
+//!                begun                      the board's second answer
+//!   any state ---------> running ------------------------------------> done | partly
+//!                           |
+//!                           +-- the board falls silent or restarts --> broken off
+//! ```
+//!
+//! It is apart from the settings because a calibration is answered twice: when it begins, which
+//! answers the request, and five seconds later when it ends, which nobody waits for in this
+//! process. An end that comes without a beginning is that of a calibration which an earlier
+//! bridge began.
+
+use lager_topics::{Calibration as State, Health};
+use lager_wire::{SettingReply, SettingStatus};
+
+/// The last calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Calibration {
+    state: State,
+    /// Sensors that have a new threshold.
+    sensors: u8,
+    /// How many have ended, wrapping.
+    ended: u8,
+}
+
+impl Calibration {
+    /// As an earlier life of the bridge has told it.
+    pub(crate) fn new(kept: Option<&Health>) -> Self {
+        let kept = kept.copied().unwrap_or_default();
+        Self {
+            state: kept.calibration.get().unwrap_or(State::Never),
+            sensors: kept.calibrated_sensors,
+            ended: kept.calibrations_ended,
+        }
+    }
+
+    /// The board has begun one.
+    pub(crate) fn begin(&mut self) {
+        self.state = State::Running;
+    }
+
+    /// The board has answered, and not for the first time.
+    pub(crate) fn hear(&mut self, reply: &SettingReply) {
+        match (reply.status, reply.value) {
+            // The first answer once more.
+            (SettingStatus::Accepted, 1) => {}
+            (SettingStatus::Accepted, sensors) => self.end(State::Done, sensors),
+            (_, sensors) => self.end(State::Partly, sensors),
+        }
+    }
+
+    /// The board has gone or has restarted.
+    pub(crate) fn break_off(&mut self) {
+        if self.state == State::Running {
+            self.end(State::BrokenOff, 0);
+        }
+    }
+
+    /// Writes its part of `link/health`.
+    pub(crate) fn fill(&self, health: &mut Health) {
+        health.calibration = self.state.into();
+        health.calibrated_sensors = self.sensors;
+        health.calibrations_ended = self.ended;
+    }
+
+    fn end(&mut self, state: State, sensors: i16) {
+        self.state = state;
+        self.sensors = u8::try_from(sensors).unwrap_or(0);
+        self.ended = self.ended.wrapping_add(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_wire::SettingKey;
+
+    use super::*;
+
+    fn reply(status: SettingStatus, value: i16) -> SettingReply {
+        SettingReply {
+            key: SettingKey::Calibrate,
+            seq: 1,
+            value,
+            status,
+        }
+    }
+
+    fn shown(calibration: &Calibration) -> (Option<State>, u8, u8) {
+        let mut health = Health::default();
+        calibration.fill(&mut health);
+        (
+            health.calibration.get(),
+            health.calibrated_sensors,
+            health.calibrations_ended,
+        )
+    }
+
+    #[test]
+    fn the_end_tells_how_many_sensors_have_a_new_threshold() {
+        let mut calibration = Calibration::new(None);
+        assert_eq!(shown(&calibration), (Some(State::Never), 0, 0));
+        calibration.begin();
+        calibration.hear(&reply(SettingStatus::Accepted, 1));
+        assert_eq!(shown(&calibration), (Some(State::Running), 0, 0));
+        calibration.hear(&reply(SettingStatus::Accepted, 11));
+        assert_eq!(shown(&calibration), (Some(State::Done), 11, 1));
+        calibration.begin();
+        calibration.hear(&reply(SettingStatus::OutOfRange, 4));
+        assert_eq!(shown(&calibration), (Some(State::Partly), 4, 2));
+    }
+
+    #[test]
+    fn a_board_that_goes_breaks_off_what_runs_and_nothing_else() {
+        let mut calibration = Calibration::new(None);
+        calibration.break_off();
+        assert_eq!(shown(&calibration), (Some(State::Never), 0, 0));
+        calibration.begin();
+        calibration.break_off();
+        calibration.break_off();
+        assert_eq!(shown(&calibration), (Some(State::BrokenOff), 0, 1));
+    }
+
+    #[test]
+    fn a_restarted_bridge_hears_the_end_of_what_an_earlier_one_began() {
+        let mut calibration = Calibration::new(None);
+        calibration.begin();
+        let mut health = Health::default();
+        calibration.fill(&mut health);
+        let mut successor = Calibration::new(Some(&health));
+        successor.hear(&reply(SettingStatus::Accepted, 11));
+        assert_eq!(shown(&successor), (Some(State::Done), 11, 1));
+    }
+}

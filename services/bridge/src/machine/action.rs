@@ -1,0 +1,97 @@
+//! What the bridge's core wants done, one thing at a time.
+//!
+//! Apart from the core, because whoever carries the actions out needs nothing else of it.
+
+use lager_topics::{ArmProfileState, AskKind, Mode, StopCause};
+use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};
+
+use crate::arbiter::OrderKey;
+use crate::events::BoardUp;
+
+/// One thing to do.
+#[derive(Clone, Copy, Debug)]
+pub enum Action {
+    /// Throw away what waits to be sent at a port: it would be old when it is sent.
+    Discard {
+        /// The port, 0 or 1.
+        place: usize,
+    },
+    /// Write a packet to a port, and tell [`wrote`](super::BridgeCore::wrote).
+    Write(Write),
+    /// Publish what [`fill_health`](super::BridgeCore::fill_health) writes.
+    PublishHealth {
+        /// Whether it says something new to those who act upon it.
+        rings: bool,
+    },
+    /// Publish what [`fill_state`](super::BridgeCore::fill_state) writes.
+    PublishState {
+        /// When the report that causes it was read, in ns of `CLOCK_MONOTONIC`.
+        report_ns: Option<u64>,
+    },
+    /// Tell whoever waits for a stop what the steering board has reported.
+    ShowReport(ShownReport),
+    /// Set a stop of the bridge's own.
+    Stop(StopCause),
+    /// Release the stop in force, and tell [`released`](super::BridgeCore::released).
+    Release,
+    /// Tell people.
+    Say(News),
+}
+
+/// A packet for a port.
+#[derive(Clone, Copy, Debug)]
+pub struct Write {
+    /// The port, 0 or 1.
+    pub place: usize,
+    /// The bytes.
+    pub packet: [u8; PACKET_LENGTH],
+    /// The command in it, if it is one.
+    pub command: Option<SteerCommand>,
+    /// The order in force, if this is its command.
+    pub order: Option<OrderKey>,
+}
+
+/// A report of the steering board, for whoever waits for a stop.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownReport {
+    /// When it was read, in ns of `CLOCK_MONOTONIC`.
+    pub at_ns: u64,
+    /// The duties of the left and the right motor.
+    pub duties: [u8; 2],
+    /// Whether it proves that the wheels are at rest after the stop in force.
+    pub proves_rest: bool,
+}
+
+/// What people are told, beside what is published.
+#[derive(Clone, Copy, Debug)]
+pub enum News {
+    /// A board has come up on a port.
+    Up {
+        /// The port, 0 or 1.
+        place: usize,
+        /// The board.
+        board: BoardUp,
+    },
+    /// The board on a port has fallen silent.
+    Silent {
+        /// The port, 0 or 1.
+        place: usize,
+    },
+    /// The steering board on a port is an original one and is told standby only.
+    OriginalBoard {
+        /// The port, 0 or 1.
+        place: usize,
+    },
+    /// A board keeps resetting, and the robot is stopped for it.
+    KeepsResetting(Callsign),
+    /// The steering board has taken the arm's profile, or has not.
+    Profile(ArmProfileState),
+    /// The switch was pressed.
+    Pressed(Mode),
+    /// A request has set the mode.
+    ModeSet(Mode),
+    /// A request came too late.
+    Late(Option<AskKind>),
+    /// A request would have the boards reset.
+    NoReset,
+}

@@ -1,0 +1,128 @@
+//! Requests: changes of the mode, the release of a stop, and settings of the boards.
+//!
+//! It is apart because an answer may have to wait: for a board, or for the stop word. Whoever runs
+//! the core turns it meanwhile. One request is under way at a time.
+
+use core::time::Duration;
+
+use lager_topics::{Answer, Ask, AskKind, Outcome};
+use lager_wire::{Callsign, SettingKey, Version};
+
+use super::action::News;
+use super::{Asked, BridgeCore};
+use crate::events::Moment;
+use crate::settings::{self, Progress};
+
+impl BridgeCore {
+    /// Begins to carry out a request.
+    pub fn ask(&mut self, now: Moment, ask: &Ask) {
+        use Asked::Answered;
+        self.asked = Some(match (ask.kind.get(), ask.mode.get()) {
+            // Whoever asked was held up, or this process was, and nobody waits for the effect.
+            (kind, _) if ask.is_over(now.ns) => {
+                self.say(News::Late(kind));
+                Answered(Outcome::Late)
+            }
+            (Some(AskKind::SetMode), Some(mode)) => {
+                self.say(News::ModeSet(mode));
+                self.arbiter.set_mode(mode);
+                Answered(Outcome::Done)
+            }
+            (Some(AskKind::Resume), _) => {
+                self.due.release = true;
+                Asked::Releasing
+            }
+            (Some(AskKind::SetGains), _) => {
+                let gains = [ask.gain_p.into(), ask.gain_d.into()];
+                self.set(now.robot, &[SettingKey::GainP, SettingKey::GainD], &gains)
+            }
+            // Done means that it has begun; `link/health` tells its end.
+            (Some(AskKind::Calibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[1]),
+            (Some(AskKind::ResetBoards), _) => {
+                self.say(News::NoReset);
+                Answered(Outcome::Refused)
+            }
+            (Some(AskKind::SetMode), None) | (None, _) => Answered(Outcome::Refused),
+        });
+    }
+
+    /// The answer, once it can be given and what it says is in force.
+    pub fn answer(&mut self) -> Option<Answer> {
+        let Some(Asked::Answered(outcome)) = self.asked else {
+            return None;
+        };
+        self.asked = None;
+        let gain = |key| {
+            let value = self.settings.in_force(key).unwrap_or(0);
+            u8::try_from(value).unwrap_or(0)
+        };
+        Some(Answer {
+            outcome: outcome.into(),
+            mode: self.arbiter.mode().into(),
+            stopped: self.arbiter.is_stopped().into(),
+            gain_p: gain(SettingKey::GainP),
+            gain_d: gain(SettingKey::GainD),
+            ..Answer::default()
+        })
+    }
+
+    /// What became of [`Action::Release`](super::Action::Release): the word is clear, or a newer
+    /// stop holds, which is handed in besides.
+    pub fn released(&mut self, is_clear: bool) {
+        if is_clear {
+            self.stop = None;
+            self.arbiter.resume_from_stop();
+        }
+        self.asked = Some(Asked::Answered(match is_clear {
+            true => Outcome::Done,
+            false => Outcome::Refused,
+        }));
+    }
+
+    /// Sends settings to the board they belong to.
+    fn set(&mut self, now: Duration, keys: &'static [SettingKey], values: &[i16]) -> Asked {
+        let is_calibration = keys == [SettingKey::Calibrate];
+        let board = match is_calibration {
+            true => Callsign::Sensor,
+            false => Callsign::Steering,
+        };
+        match self.boards.version(board) {
+            None => return Asked::Answered(Outcome::NoBoard),
+            // An original board knows no settings.
+            Some(Version::Original) => return Asked::Answered(Outcome::Refused),
+            Some(Version::One) => (),
+        }
+        for (key, value) in keys.iter().zip(values) {
+            self.settings.want(now, *key, *value);
+        }
+        let until = now + settings::LONGEST;
+        Asked::Setting { keys, until }
+    }
+
+    /// Sees whether a board has answered what a request is waiting for.
+    pub(super) fn hear_answer(&mut self, now: Duration) {
+        let Some(Asked::Setting { keys, until }) = self.asked else {
+            return;
+        };
+        let slowest = keys
+            .iter()
+            .map(|key| self.settings.progress(*key))
+            .max_by_key(|progress| match progress {
+                Progress::Accepted => 0,
+                Progress::Refused => 1,
+                Progress::Unanswered => 2,
+                Progress::Pending => 3,
+            });
+        let outcome = match slowest {
+            Some(Progress::Pending) if now < until => return,
+            Some(Progress::Accepted) => Outcome::Done,
+            Some(Progress::Refused) => Outcome::Refused,
+            _ => Outcome::NoBoard,
+        };
+        if outcome == Outcome::Done && keys == [SettingKey::Calibrate] {
+            self.calibration.begin();
+            self.due.health = true;
+        }
+        self.asked = Some(Asked::Answered(outcome));
+    }
+}

@@ -1,0 +1,148 @@
+//! What happens at the ports: boards that come, report, answer and go.
+//!
+//! It is apart from the turn because each of these has its effect at once, whatever else the turn
+//! brings.
+
+use lager_topics::{ArmProfileState, StopCause};
+use lager_wire::link::HostTransmitter;
+use lager_wire::{Callsign, SettingKey, SettingReply, SteerData, Version};
+
+use super::action::{News, ShownReport};
+use super::{BridgeCore, Handshake};
+use crate::arbiter::ArmGate;
+use crate::events::{BoardUp, Moment, PortEvent};
+use crate::frames::ServoTable;
+
+impl BridgeCore {
+    /// Takes what has happened at the port at `place`, 0 or 1.
+    pub fn port(&mut self, now: Moment, place: usize, event: PortEvent) {
+        match event {
+            PortEvent::Opened => self.transmitters[place] = HostTransmitter::new(),
+            PortEvent::Lost => {
+                self.board_down(place);
+                self.boards.gone(place);
+                self.due.health = true;
+            }
+            PortEvent::SendSyn => self.due.handshake[place] = Some(Handshake::Syn),
+            PortEvent::SendAck { version, up } => {
+                self.due.handshake[place] = Some(Handshake::Ack(version));
+                if let Some(up) = up {
+                    self.board_up(now, place, &up);
+                }
+            }
+            PortEvent::Adopt(up) => {
+                self.transmitters[place].adopt(up.up.version);
+                self.board_up(now, place, &up);
+            }
+            PortEvent::Silent => {
+                self.due.discard[place] = true;
+                // `link/health` tells it to everybody.
+                self.say(News::Silent { place });
+                self.board_down(place);
+                self.due.health = true;
+            }
+            PortEvent::Steer { data, at } => self.report(place, data, at),
+            PortEvent::Arm(data) => self.servos.hear(&data),
+            PortEvent::Status(status) => self.boards.status(place, &status),
+            PortEvent::Setting(reply) => self.setting_answered(now, &reply),
+        }
+    }
+
+    /// Keeps the arm where it is unless the board obeys the profile, and tells what it says.
+    pub(super) fn heed_profile(&mut self, before: ArmProfileState) {
+        let state = self.profile.state();
+        self.arbiter.set_arm_gate(match state {
+            // An original board knows no profile and has limits of its own.
+            ArmProfileState::NoBoard | ArmProfileState::Accepted => ArmGate::Open,
+            ArmProfileState::Telling => ArmGate::Held,
+            ArmProfileState::Refused | ArmProfileState::Unanswered => ArmGate::Shut,
+        });
+        match state {
+            _ if state == before => {}
+            ArmProfileState::NoBoard | ArmProfileState::Telling => {}
+            _ => {
+                self.say(News::Profile(state));
+                self.due.health = true;
+            }
+        }
+    }
+
+    fn board_up(&mut self, now: Moment, place: usize, board: &BoardUp) {
+        let up = board.up;
+        // A steering board that was on this port is not there any more.
+        if up.callsign != Callsign::Steering {
+            self.board_down(place);
+        }
+        self.boards.up(place, self.options.baud, board);
+        self.settings.board_up(now.robot, up.callsign);
+        if up.callsign == Callsign::Sensor && up.rebooted {
+            self.calibration.break_off();
+        }
+        if up.callsign == Callsign::Steering {
+            self.report = None;
+            self.servos = ServoTable::default();
+            let before = self.profile.state();
+            self.profile.board_up(now.robot, up.version);
+            self.heed_profile(before);
+            self.arbiter.board_up(now.robot, up.version, up.rebooted);
+            if up.version == Version::Original && !self.options.original_boards {
+                self.say(News::OriginalBoard { place });
+            }
+        }
+        if up.rebooted && self.resets.note(now.robot, up.callsign) {
+            self.say(News::KeepsResetting(up.callsign));
+            self.due.stop = Some(StopCause::BoardResets);
+        }
+        let board = *board;
+        self.say(News::Up { place, board });
+        self.due.health = true;
+    }
+
+    fn board_down(&mut self, place: usize) {
+        match self.boards.down(place) {
+            Some(Callsign::Steering) => {
+                self.arbiter.board_down();
+                self.profile.board_down();
+                self.report = None;
+            }
+            Some(Callsign::Sensor) => self.calibration.break_off(),
+            _ => {}
+        }
+    }
+
+    fn report(&mut self, place: usize, data: SteerData, at: Moment) {
+        if self.boards.place(Callsign::Steering) != Some(place) {
+            return;
+        }
+        self.arbiter.observe(at.robot, &data);
+        if self.boards.version(Callsign::Steering) == Some(Version::One) {
+            self.report = Some((data, at));
+            self.told.report = false;
+            let duties = [data.left_duty, data.right_duty];
+            self.due.shown = Some(ShownReport {
+                at_ns: at.ns,
+                duties,
+                proves_rest: self.rest.report(&data, at.ns),
+            });
+            if let Some(parking) = &mut self.parking
+                && parking.standbys > 0
+            {
+                parking.at_rest = duties == [0, 0];
+            }
+        }
+        self.due.state = Some(at.ns);
+    }
+
+    fn setting_answered(&mut self, now: Moment, reply: &SettingReply) {
+        let before = self.profile.state();
+        if self.profile.answer(now.robot, reply) {
+            self.heed_profile(before);
+        } else if self.settings.answer(reply) {
+            // Before the request is answered: a gain in force outlives this bridge.
+            self.due.health = true;
+        } else if reply.key == SettingKey::Calibrate {
+            self.calibration.hear(reply);
+            self.due.health = true;
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! When a stop has come to its end: the steering board says that the wheels are at rest.
+//!
+//! Apart from the core because it is a proof of its own, from three things: when the stop's
+//! standby was written, when a report was read, and what it says.
+
+use lager_wire::SteerData;
+
+/// Reports with wheels at rest that prove that they are, one after the other.
+const REPORTS: u8 = 2;
+
+/// A report that is read sooner after the standby was written may have been on its way before the
+/// standby came to the board, in ns.
+const ON_ITS_WAY_NS: u64 = 5_000_000;
+
+/// How far the board has come in obeying the stop in force.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rest {
+    /// When the stop in force was first written to the board, in ns.
+    written_ns: Option<u64>,
+    /// Reports since then, one after the other, that show the wheels at rest.
+    reports: u8,
+}
+
+impl Rest {
+    /// The stop in force has been written to the steering board.
+    pub(super) fn written(&mut self, at_ns: u64) {
+        self.written_ns.get_or_insert(at_ns);
+    }
+
+    /// The steering board has reported, as was read at `at_ns`; whether that is the report that
+    /// proves the wheels at rest.
+    pub(super) fn report(&mut self, data: &SteerData, at_ns: u64) -> bool {
+        let on_its_way_until = self.written_ns.map(|written| written + ON_ITS_WAY_NS);
+        if on_its_way_until.is_none_or(|until| at_ns < until) {
+            return false;
+        }
+        self.reports = match [data.left_duty, data.right_duty] == [0, 0] {
+            true => self.reports.saturating_add(1),
+            false => 0,
+        };
+        self.reports == REPORTS
+    }
+}

@@ -1,0 +1,93 @@
+//! What the core tells: the state of everything, and what the steering board does.
+//!
+//! It is apart because it only tells: nothing here decides.
+
+use core::time::Duration;
+
+use lager_topics::{Health, Role, SteeringReport};
+use lager_wire::{Callsign, SteerData, SteerFlags, Version};
+
+use super::action::Action;
+use super::{BridgeCore, HEALTH_PERIOD};
+use crate::counts::Counts;
+use crate::events::Moment;
+use crate::frames::steering_report;
+
+/// A report that has waited longer to be published is not news any more, in robot time; they come
+/// every 5 ms.
+const FRESH: Duration = Duration::from_millis(20);
+
+impl BridgeCore {
+    /// Has `link/health` published, whatever it says.
+    pub fn tell_health(&mut self) {
+        self.due.health = true;
+    }
+
+    /// Writes `link/health`, all but what the bus has lost.
+    pub fn fill_health(&mut self, now: Duration, counts: &Counts, health: &mut Health) {
+        self.boards.measure(counts);
+        self.boards.fill(health);
+        self.arbiter.fill(now, health);
+        self.settings.fill(health);
+        self.presses.fill(health);
+        health.arm_profile = self.profile.state().into();
+        self.calibration.fill(health);
+        if let Some(stop) = self.stop {
+            health.stop_cause = stop.cause().into();
+            health.stop_origin = stop.origin().unwrap_or(Role::Bridge).into();
+            health.stopped_at_ns = stop.at_ns();
+        }
+    }
+
+    /// `link/health` has been published.
+    pub fn health_told(&mut self) {
+        self.told.health = self.arbiter.revision();
+        self.told.mover = Some(self.who_may_move());
+        self.told.setpoint = self.arbiter.has_setpoint();
+    }
+
+    /// Writes `steering/state`: what the steering board does, and how old its word is, since the
+    /// end of an order goes out without a new report. Without a report that means something it is
+    /// what the board was told.
+    pub fn fill_state(&self, now: Duration, state: &mut SteeringReport) {
+        let told = SteerData {
+            code: self
+                .arbiter
+                .current()
+                .map_or(0, |(_, command)| command.code()),
+            left_duty: 0,
+            right_duty: 0,
+            flags: SteerFlags::NONE,
+            line_error: 0,
+            finished_seq: 0,
+            servo_errors: 0,
+            battery_decivolts: 0,
+        };
+        let (data, age_ms) = match (self.report, self.boards.version(Callsign::Steering)) {
+            (Some((data, read)), _) => {
+                let age = now.saturating_sub(read.robot);
+                let age_ms = u16::try_from(age.as_millis()).unwrap_or(u16::MAX);
+                let is_fresh = !self.told.report && age < FRESH;
+                let age_ms = age_ms.clamp(1, SteeringReport::NEVER_HEARD - 1);
+                (data, if is_fresh { 0 } else { age_ms })
+            }
+            (None, Some(Version::Original)) => (told, 0),
+            (None, _) => (told, SteeringReport::NEVER_HEARD),
+        };
+        let epoch = self.boards.epoch(Callsign::Steering);
+        *state = steering_report(epoch, &data, age_ms, &self.servos, &self.arbiter);
+    }
+
+    /// `steering/state` has been published.
+    pub fn state_told(&mut self) {
+        self.told.report = true;
+        self.told.state = self.arbiter.revision();
+        self.told.end = self.arbiter.last_ended();
+    }
+
+    pub(super) fn publish_health(&mut self, now: Moment) -> Action {
+        self.health_due = now.robot + HEALTH_PERIOD;
+        let rings = self.told.mover != Some(self.who_may_move());
+        Action::PublishHealth { rings }
+    }
+}

@@ -1,0 +1,190 @@
+//! The order of the core's actions, in virtual time.
+
+use lager_ports::Stop;
+use lager_topics::{
+    ArmProfileState, Ask, AskKind, Mode, Origin, Outcome, Role, SteeringOrder, StopCause,
+};
+use lager_wire::link::Up;
+use lager_wire::{
+    ArmProfile, Callsign, Command, ResetCause, SteerData, SteerFlags, Version, WheelCommand,
+};
+
+use super::*;
+use crate::events::{BoardUp, PortEvent};
+
+const STEERING: usize = 1;
+
+fn at(millis: u64) -> Moment {
+    let robot = Duration::from_millis(millis);
+    let ns = millis * 1_000_000;
+    Moment { robot, ns }
+}
+
+/// A core with a steering board that has reported, in the hands of a person.
+fn core() -> BridgeCore {
+    let options = CoreOptions {
+        baud: 500_000,
+        raw_line: false,
+        original_boards: false,
+        arm: ArmProfile::default(),
+    };
+    let mut core = BridgeCore::new(options, None);
+    let up = Up {
+        callsign: Callsign::Steering,
+        version: Version::One,
+        epoch: 1,
+        reset: ResetCause::PowerOn,
+        rebooted: false,
+        fresh: true,
+    };
+    let up = Some(BoardUp { up, link_epoch: 1 });
+    let version = Version::One;
+    core.port(at(1_000), STEERING, PortEvent::SendAck { version, up });
+    turn(&mut core, 1_000);
+    report(&mut core, 1_001);
+    turn(&mut core, 1_001);
+    core
+}
+
+fn report(core: &mut BridgeCore, millis: u64) {
+    let data = SteerData {
+        code: 0,
+        left_duty: 0,
+        right_duty: 0,
+        flags: SteerFlags::NONE,
+        line_error: 0,
+        finished_seq: 0,
+        servo_errors: 0,
+        battery_decivolts: 0,
+    };
+    let at = at(millis);
+    core.port(at, STEERING, PortEvent::Steer { data, at });
+}
+
+/// The next action, carried out: a word for it, and the command if it is one.
+fn step(core: &mut BridgeCore, millis: u64) -> Option<(&'static str, Option<u8>)> {
+    let action = core.next(at(millis))?;
+    Some(match action {
+        Action::Write(write) => {
+            core.wrote(&write, true, at(millis));
+            match write.command {
+                Some(command) => ("command", Some(command.code)),
+                None => ("packet", None),
+            }
+        }
+        Action::PublishHealth { .. } => {
+            core.health_told();
+            ("health", None)
+        }
+        Action::PublishState { .. } => {
+            core.state_told();
+            ("state", None)
+        }
+        Action::Discard { .. } => ("discard", None),
+        Action::ShowReport(shown) if shown.proves_rest => ("at rest", None),
+        Action::ShowReport(_) => ("report", None),
+        Action::Stop(_) => ("stop", None),
+        Action::Release => ("release", None),
+        Action::Say(News::Profile(ArmProfileState::Unanswered)) => ("no answer", None),
+        Action::Say(_) => ("news", None),
+    })
+}
+
+/// A turn to its end; what was done.
+fn turn(core: &mut BridgeCore, millis: u64) -> Vec<(&'static str, Option<u8>)> {
+    core.decide(at(millis).robot);
+    std::iter::from_fn(|| step(core, millis)).collect()
+}
+
+fn order(core: &mut BridgeCore, millis: u64, id: u32, command: WheelCommand) {
+    let order = SteeringOrder {
+        id,
+        origin: Origin::Operator.into(),
+        code: Command::Wheel(command).code(),
+        ..SteeringOrder::default()
+    };
+    let now = at(millis).robot;
+    assert!(core.order(now, now, &order).is_some());
+}
+
+fn code(command: WheelCommand) -> Option<u8> {
+    Some(Command::Wheel(command).code())
+}
+
+const FORWARD: WheelCommand = WheelCommand::ManualForward;
+const FOLLOW: WheelCommand = WheelCommand::ActiveForward;
+const STANDBY: WheelCommand = WheelCommand::Standby;
+
+#[test]
+fn the_state_is_told_before_the_bytes_unless_one_setpoint_takes_the_place_of_another() {
+    let mut core = core();
+    order(&mut core, 1_002, 1, FORWARD);
+    let done = turn(&mut core, 1_002);
+    assert_eq!(done[..2], [("health", None), ("command", code(FORWARD))]);
+    order(&mut core, 1_003, 2, FOLLOW);
+    let done = turn(&mut core, 1_003);
+    assert_eq!(done[..2], [("command", code(FOLLOW)), ("health", None)]);
+}
+
+#[test]
+fn a_stop_in_the_middle_of_a_turn_overtakes_what_the_turn_decided() {
+    let mut core = core();
+    order(&mut core, 1_002, 1, FORWARD);
+    core.decide(at(1_002).robot);
+    assert_eq!(step(&mut core, 1_002), Some(("health", None)));
+    core.stop(Stop::new(Role::Operator, StopCause::Ordered, 0));
+    let done: Vec<_> = std::iter::from_fn(|| step(&mut core, 1_002)).collect();
+    let standby = ("command", code(STANDBY));
+    assert_eq!(done[..3], [("discard", None), standby, ("health", None)]);
+    assert!(!done.contains(&("command", code(FORWARD))));
+
+    // Two reports of wheels at rest, read late enough after the standby, prove that they are.
+    let mut shown = Vec::new();
+    for millis in [1_004, 1_008, 1_013] {
+        report(&mut core, millis);
+        shown.extend(step(&mut core, millis));
+        turn(&mut core, millis);
+    }
+    let [early, one, two] = [("report", None), ("report", None), ("at rest", None)];
+    assert_eq!(shown, [early, one, two]);
+}
+
+#[test]
+fn a_request_whose_asker_has_given_up_changes_nothing() {
+    let ask = |millis: u64| Ask {
+        issued_ns: at(millis).ns,
+        lifetime_ms: 500,
+        kind: AskKind::SetMode.into(),
+        mode: Mode::Autonomous.into(),
+        ..Ask::default()
+    };
+    for (asked, found, outcome, mode) in [
+        (1_002, 1_502, Outcome::Late, Mode::Manual),
+        // A time that has not come yet is none of this machine's clock.
+        (1_502, 1_002, Outcome::Late, Mode::Manual),
+        (1_002, 1_501, Outcome::Done, Mode::Autonomous),
+    ] {
+        let mut core = core();
+        core.ask(at(found), &ask(asked));
+        turn(&mut core, found);
+        let answer = core.answer().expect("an answer at once");
+        assert_eq!(
+            answer.outcome, outcome,
+            "asked at {asked}, found at {found}"
+        );
+        assert_eq!(core.mode(), mode, "asked at {asked}, found at {found}");
+    }
+}
+
+#[test]
+fn what_the_last_stage_of_a_turn_finds_out_is_told_in_that_turn() {
+    let mut core = core();
+    for millis in 1_002..1_300 {
+        let done = turn(&mut core, millis);
+        if let Some(told) = done.iter().position(|what| *what == ("no answer", None)) {
+            assert_eq!(done[told - 1], ("health", None));
+            return;
+        }
+    }
+    panic!("the board never answered, and nobody was told");
+}

@@ -1,0 +1,71 @@
+//! What the log says of what the core has noticed.
+//!
+//! It is apart because the sentences are for people, who want to know what to do.
+
+use lager_topics::ArmProfileState;
+use lager_wire::Callsign;
+
+use super::Service;
+use crate::machine::News;
+
+impl Service<'_> {
+    pub(super) fn say(&self, news: &News) {
+        let port = |place: usize| self.config.ports[place].display();
+        match *news {
+            News::Up { place, board } => tracing::info!(
+                port = %port(place),
+                version = ?board.up.version,
+                epoch = board.link_epoch,
+                reset = ?board.up.reset,
+                "the {} board {}",
+                name(board.up.callsign),
+                if board.up.rebooted { "has restarted" } else { "is up" },
+            ),
+            News::Silent { place } => {
+                tracing::info!("the board on {} has fallen silent", port(place));
+            }
+            News::OriginalBoard { place } => tracing::warn!(
+                "the steering board on {} is an original one, whose commands have no age \
+                 limit: if this machine dies, it drives on; it is told standby only, unless \
+                 `[serial] original_boards = true` accepts that",
+                port(place)
+            ),
+            News::KeepsResetting(board) => tracing::error!(
+                "the {} board keeps resetting; the robot is stopped: look at its power and cables",
+                name(board)
+            ),
+            News::Profile(state) => say_profile(state),
+            News::Pressed(mode) => tracing::info!(?mode, "the switch was pressed"),
+            News::ModeSet(mode) => tracing::info!(?mode, "the mode is set"),
+            News::Late(kind) => {
+                tracing::warn!(?kind, "a request came too late and is not carried out");
+            }
+            News::NoReset => tracing::warn!(
+                "the boards cannot be restarted from here: the protocol has no packet for it; \
+                 press the button on the board or switch its power off and on"
+            ),
+        }
+    }
+}
+
+fn name(board: Callsign) -> &'static str {
+    match board {
+        Callsign::Steering => "steering",
+        _ => "sensor",
+    }
+}
+
+fn say_profile(state: ArmProfileState) {
+    match state {
+        ArmProfileState::NoBoard | ArmProfileState::Telling => {}
+        ArmProfileState::Accepted => tracing::info!("the steering board obeys [arm]"),
+        ArmProfileState::Refused => tracing::error!(
+            "the steering board does not take [arm] and keeps the limits it had, so the arm is \
+             not moved; flash the board with the image of this program's source"
+        ),
+        ArmProfileState::Unanswered => tracing::warn!(
+            "the steering board does not answer to [arm], so the arm is not moved; it is told \
+             again every five seconds"
+        ),
+    }
+}

@@ -1,0 +1,24 @@
+//! The communication unit (C1-C9): the robot's side of the conversation with the external computer,
+//! and the only service of the robot with a socket to the network.
+//!
+//! - [`Conversation`]: what is asked, what is made of the answers, and what is told; a pure state
+//!   machine over lines and samples.
+//! - [`run`]: its shell between a socket and the bus.
+//!
+//! It has no right that a person at the robot would not have: it orders, presses and steers as an
+//! operator, and the bridge's arbiter judges it as one. Of all that it needs to go on after it was
+//! killed, the map alone is its own, and lies on the bus; what the robot is doing the others tell.
+
+#![forbid(unsafe_code)]
+
+mod conversation;
+mod driving;
+mod link;
+mod map;
+mod moment;
+mod shell;
+mod speech;
+
+pub use conversation::{Action, Conversation};
+pub use moment::Moment;
+pub use shell::{CommConfig, run};

@@ -1,0 +1,264 @@
+//! The connection to the external computer: a thread that makes it, reads it, and makes it anew for
+//! ever.
+//!
+//! ```text
+//!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, each ± a quarter ──> connecting
+//! ```
+//!
+//! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing is
+//! the other thread's, which never waits: what the peer does not take stays with [`Link`], bounded.
+
+use std::io;
+use std::net::{Shutdown as Direction, TcpStream, ToSocketAddrs};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use lager_lines::splitter::{LineError, LineSplitter};
+use lager_ports::{Clock, Ringer};
+use rustix::net::{SendFlags, send, sockopt};
+
+/// How long one address may take to answer.
+const CONNECT: Duration = Duration::from_secs(2);
+/// The first pause between two tries, doubled up to the longest.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// What cannot be reached is told when the pauses have become longer than this.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// A connection that lasted this long was good: the next pause is the first again.
+const GOOD: Duration = Duration::from_secs(5);
+/// How often a pause looks whether it is to end.
+const GLANCE: Duration = Duration::from_millis(20);
+/// What the peer may leave unread, in bytes, before it is given up; thoughts are left out before.
+const MOST_UNREAD: usize = 64 * 1024;
+/// What is read that nobody has taken yet, in pieces of at most 4 KiB.
+const PIECES: usize = 16;
+/// When the kernel begins to ask a silent peer's machine whether it is there, how often, and when it
+/// gives up. Seconds are the shortest that it counts in; a peer that speaks the extension is found
+/// silent long before.
+const KEEP_ALIVE: Duration = Duration::from_secs(1);
+const UNCONFIRMED_MS: u32 = 3_000;
+
+/// What has become of the connection.
+#[derive(Debug)]
+pub(crate) enum News {
+    /// It is there.
+    Up(TcpStream),
+    /// Lines have come.
+    Lines(Vec<Result<String, LineError>>),
+    /// It has ended.
+    Down(String),
+}
+
+/// The other thread's end.
+#[derive(Debug)]
+pub(crate) struct Link {
+    news: Receiver<News>,
+    stream: Option<TcpStream>,
+    unread: Vec<u8>,
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Link {
+    /// Connects to `station`, a host and a port, from now on.
+    pub(crate) fn new(station: String, ringer: Ringer) -> Self {
+        let ends = Arc::new(AtomicBool::new(false));
+        let (to, news) = sync_channel(PIECES);
+        let thread = Thread {
+            station,
+            to,
+            ringer,
+            ends: Arc::clone(&ends),
+        };
+        Self {
+            news,
+            stream: None,
+            unread: Vec::new(),
+            ends,
+            thread: Some(std::thread::spawn(move || thread.run())),
+        }
+    }
+
+    /// What has become of the connection since the last look.
+    pub(crate) fn next(&mut self) -> Option<News> {
+        let news = self.news.try_recv().ok()?;
+        match &news {
+            News::Up(stream) => {
+                self.stream = stream.try_clone().ok();
+                self.unread.clear();
+            }
+            News::Down(_) => self.stream = None,
+            News::Lines(_) => {}
+        }
+        Some(news)
+    }
+
+    /// Ends the connection; the thread makes another one.
+    pub(crate) fn hang_up(&mut self) {
+        if let Some(stream) = self.stream.take() {
+            let _ = stream.shutdown(Direction::Both);
+        }
+    }
+
+    /// Says a line, as far as the peer takes it at once.
+    pub(crate) fn say(&mut self, line: &str) {
+        if self.stream.is_some() {
+            self.unread.extend_from_slice(line.as_bytes());
+            self.write();
+        }
+    }
+
+    /// Writes what waits, as far as the peer takes it.
+    pub(crate) fn write(&mut self) {
+        let Some(stream) = &self.stream else { return };
+        let flags = SendFlags::DONTWAIT | SendFlags::NOSIGNAL;
+        while !self.unread.is_empty() {
+            match send(stream, &self.unread, flags) {
+                Ok(count) => drop(self.unread.drain(..count)),
+                Err(rustix::io::Errno::INTR) => {}
+                Err(rustix::io::Errno::AGAIN) if self.unread.len() <= MOST_UNREAD => return,
+                // The reading thread finds its end.
+                Err(_) => return self.hang_up(),
+            }
+        }
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::SeqCst);
+        self.hang_up();
+        let start = Instant::now();
+        while let Some(thread) = self.thread.take() {
+            if thread.is_finished() {
+                let _ = thread.join();
+                return;
+            }
+            // It waits for an address to answer, and ends when that has or the process does.
+            if start.elapsed() > FIRST_PAUSE {
+                return;
+            }
+            // Or for a place in the channel, or is about to say that it is up.
+            if let Ok(News::Up(stream)) = self.news.recv_timeout(GLANCE) {
+                let _ = stream.shutdown(Direction::Both);
+            }
+            self.thread = Some(thread);
+        }
+    }
+}
+
+struct Thread {
+    station: String,
+    to: SyncSender<News>,
+    ringer: Ringer,
+    ends: Arc<AtomicBool>,
+}
+
+impl Thread {
+    fn run(&self) {
+        let mut pause = FIRST_PAUSE;
+        let mut said = String::new();
+        while !self.ends.load(Ordering::SeqCst) {
+            let start = Instant::now();
+            match self.connect() {
+                Ok(stream) => {
+                    tracing::info!("connected to the external computer at {}", self.station);
+                    said.clear();
+                    if self.hold(stream).is_none() {
+                        return;
+                    }
+                }
+                Err(error) => {
+                    let why = format!(
+                        "cannot reach the external computer at {}: {error}",
+                        self.station
+                    );
+                    // One that has just been started may not listen yet.
+                    if said != why && pause > PATIENCE {
+                        tracing::warn!("{why}; it is tried for ever");
+                        said = why;
+                    }
+                }
+            }
+            if start.elapsed() >= GOOD {
+                pause = FIRST_PAUSE;
+            }
+            self.wait(jittered(pause));
+            pause = (pause * 2).min(LONGEST_PAUSE);
+        }
+    }
+
+    fn connect(&self) -> io::Result<TcpStream> {
+        let mut failure = io::Error::other("the name has no address");
+        for address in self.station.to_socket_addrs()? {
+            match TcpStream::connect_timeout(&address, CONNECT) {
+                Ok(stream) => {
+                    stream.set_nodelay(true)?;
+                    sockopt::set_socket_keepalive(&stream, true)?;
+                    sockopt::set_tcp_keepidle(&stream, KEEP_ALIVE)?;
+                    sockopt::set_tcp_keepintvl(&stream, KEEP_ALIVE)?;
+                    sockopt::set_tcp_user_timeout(&stream, UNCONFIRMED_MS)?;
+                    return Ok(stream);
+                }
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
+    /// Reads until the connection ends; `None` where nobody listens any more.
+    fn hold(&self, mut stream: TcpStream) -> Option<()> {
+        let ended = match stream.try_clone() {
+            Ok(writer) => {
+                self.tell(News::Up(writer))?;
+                self.read(&mut stream)?
+            }
+            Err(error) => error,
+        };
+        self.tell(News::Down(ended.to_string()))
+    }
+
+    fn read(&self, stream: &mut TcpStream) -> Option<io::Error> {
+        use std::io::Read as _;
+        let mut splitter = LineSplitter::new();
+        let mut buffer = [0; 4096];
+        loop {
+            let count = match stream.read(&mut buffer) {
+                Ok(0) => return Some(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Some(error),
+            };
+            let mut bytes = &buffer[..count];
+            let mut lines = Vec::new();
+            while let Some(line) = splitter.next(&mut bytes) {
+                lines.push(line.map(str::to_owned));
+            }
+            if !lines.is_empty() {
+                self.tell(News::Lines(lines))?;
+            }
+        }
+    }
+
+    fn tell(&self, news: News) -> Option<()> {
+        self.to.send(news).ok()?;
+        self.ringer.ring();
+        Some(())
+    }
+
+    fn wait(&self, pause: Duration) {
+        let start = Instant::now();
+        while start.elapsed() < pause && !self.ends.load(Ordering::SeqCst) {
+            std::thread::sleep(GLANCE);
+        }
+    }
+}
+
+/// Three to five quarters of `pause`, so that many robots do not come back in step.
+fn jittered(pause: Duration) -> Duration {
+    let part = Clock::monotonic_ns() / 1_000 % 1_000;
+    pause * 3 / 4 + pause / 2 * u32::try_from(part).unwrap_or(0) / 1_000
+}

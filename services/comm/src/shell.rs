@@ -1,0 +1,260 @@
+//! The conversation's shell between the socket and the bus: it carries lines and samples and decides
+//! nothing.
+//!
+//! **Safe state**: silence. When this process ends, however it ends, nobody renews the command that
+//! it gave, and the bridge brings the robot to rest when the lease is over, 120 ms later. What logic
+//! was ordered it goes on with.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use lager_lines::{MAX_LINE, Name, to_line};
+use lager_ports::{
+    Bus, Cause, Clock, Policy, PortError, Publisher, ReceiveError, Sample, SendError, Shutdown,
+    StopPage, StopWord, Subscriber, Waiter,
+};
+use lager_topics::{
+    LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, NavMap, NavRoute, NavStatus,
+    OperatorInput, Role, SteeringCommand, SteeringState, StopCause, Topic, WarehouseMap,
+};
+
+use crate::conversation::{Action, Conversation};
+use crate::link::{Link, News};
+use crate::moment::Moment;
+
+/// Longest wait for anything, in real time: most samples ring nobody here, so that the path has
+/// nobody more to wake.
+const LONGEST_WAIT: Duration = Duration::from_millis(10);
+
+/// How often the map is offered to late joiners, in real time.
+const MAP_PERIOD_NS: u64 = 20_000_000;
+
+/// How long a predecessor's map is waited for, in real time.
+const RESUME_WAIT: Duration = Duration::from_millis(500);
+
+/// What comm is told when it starts.
+#[derive(Clone, Debug)]
+pub struct CommConfig {
+    /// The external computer: host and port.
+    pub station: String,
+    /// What the robot calls itself towards it.
+    pub name: Name,
+    /// Whether a predecessor's map is taken up.
+    pub resume: bool,
+}
+
+/// Runs the communication unit until `shutdown` is requested.
+///
+/// # Errors
+/// Comm's place on the bus cannot be had; the sentence says what to do.
+pub fn run(bus: &Bus, config: &CommConfig, shutdown: &Shutdown) -> Result<(), PortError> {
+    let mut shell = Shell::new(bus, config)?;
+    shutdown.wake(shell.waiter.ringer()?);
+    while !shutdown.is_requested() {
+        shell.turn();
+    }
+    Ok(())
+}
+
+struct Shell {
+    clock: Clock,
+    waiter: Waiter,
+    conversation: Conversation,
+    link: Link,
+    stop_word: PathBuf,
+
+    health: Subscriber<LinkHealth>,
+    status: Subscriber<NavStatus>,
+    queue: Subscriber<MissionQueue>,
+    events: Subscriber<MissionEvent>,
+    reports: Subscriber<SteeringState>,
+    route: Subscriber<NavRoute>,
+    thoughts: Subscriber<LogThought>,
+
+    map: Publisher<NavMap>,
+    orders: Publisher<MissionOrder>,
+    inputs: Publisher<OperatorInput>,
+    commands: Publisher<SteeringCommand>,
+    map_ticked_ns: u64,
+    complaints: u32,
+}
+
+impl Shell {
+    fn new(bus: &Bus, config: &CommConfig) -> Result<Self, PortError> {
+        let kept = match config.resume {
+            true => bus.kept::<NavMap>(RESUME_WAIT).unwrap_or_else(|error| {
+                tracing::warn!("the map is asked for anew: {error}");
+                None
+            }),
+            false => None,
+        };
+        let waiter = bus.waiter(Policy::Block)?;
+        let shell = Self {
+            clock: bus.clock(),
+            link: Link::new(config.station.clone(), waiter.ringer()?),
+            waiter,
+            conversation: Conversation::new(config.name.clone(), kept),
+            stop_word: bus.place().folder_of(bus.robot()).join(StopPage::FILE),
+            health: bus.subscriber()?,
+            status: bus.subscriber()?,
+            queue: bus.subscriber()?,
+            events: bus.subscriber()?,
+            reports: bus.subscriber()?,
+            route: bus.subscriber()?,
+            thoughts: bus.subscriber()?,
+            map: bus.publisher()?,
+            orders: bus.publisher()?,
+            inputs: bus.publisher()?,
+            commands: bus.publisher()?,
+            map_ticked_ns: 0,
+            complaints: 0,
+        };
+        if let Some(map) = kept {
+            shell.publish_map(&map);
+        }
+        Ok(shell)
+    }
+
+    fn turn(&mut self) {
+        let due = self.conversation.due();
+        let left = due.map(|due| self.clock.real(due.saturating_sub(self.clock.now())));
+        self.waiter
+            .wait(left.unwrap_or(LONGEST_WAIT).min(LONGEST_WAIT));
+        let now = self.now();
+        self.conversation.turn(now);
+        self.act();
+        // First what the robot does, so that lines find the conversation as it is now.
+        self.take_samples(now);
+        self.take_lines(now);
+        self.act();
+        self.link.write();
+        if now.ns.saturating_sub(self.map_ticked_ns) >= MAP_PERIOD_NS {
+            self.map_ticked_ns = now.ns;
+            self.map.tick();
+        }
+    }
+
+    fn now(&self) -> Moment {
+        Moment {
+            robot: self.clock.now(),
+            ns: Clock::monotonic_ns(),
+        }
+    }
+
+    fn take_samples(&mut self, now: Moment) {
+        if let Some(health) = self.next(|shell| shell.health.latest()) {
+            self.conversation.health(now, &health);
+        }
+        if let Some(queue) = self.next(|shell| shell.queue.latest()) {
+            self.conversation.queue(now, &queue);
+        }
+        if let Some(status) = self.next(|shell| shell.status.latest()) {
+            self.conversation.status(now, &status);
+        }
+        while let Some(event) = self.next(|shell| shell.events.receive()) {
+            self.conversation.event(now, &event);
+        }
+        if let Some(report) = self.next(|shell| shell.reports.latest()) {
+            self.conversation.report(now, &report);
+        }
+        if let Some(route) = self.next(|shell| shell.route.latest()) {
+            self.conversation.route(&route);
+        }
+        while let Some(thought) = self.next(|shell| shell.thoughts.receive()) {
+            self.conversation.thought(&thought);
+        }
+    }
+
+    /// Takes what has come over the link. All lines that have arrived are handed over at once, so
+    /// that a stop among them goes first.
+    fn take_lines(&mut self, now: Moment) {
+        let mut lines = Vec::new();
+        while let Some(news) = self.link.next() {
+            match news {
+                News::Lines(more) => lines.extend(more),
+                News::Up(_) => {
+                    lines.clear();
+                    self.conversation.connected(now);
+                }
+                News::Down(why) => {
+                    // What was said before the end is still heard, a stop above all.
+                    self.conversation.heard(now, &lines);
+                    lines.clear();
+                    tracing::info!("the external computer is away: {why}");
+                    self.conversation.disconnected(now);
+                }
+            }
+        }
+        if !lines.is_empty() {
+            self.conversation.heard(now, &lines);
+        }
+    }
+
+    fn act(&mut self) {
+        for action in self.conversation.actions() {
+            match action {
+                Action::Say(line) => match to_line(&line) {
+                    Ok(line) => self.link.say(&line),
+                    Err(error) => tracing::error!("more than {MAX_LINE} bytes: {error}"),
+                },
+                Action::HangUp(why) => {
+                    tracing::info!("the connection is given up: {why}");
+                    self.link.hang_up();
+                }
+                Action::Map(map) => self.publish_map(&map),
+                Action::Order(order) => {
+                    let sent = self.orders.send(Cause::OWN, order);
+                    self.check(sent);
+                }
+                Action::Press(input) => {
+                    let sent = self.inputs.send(Cause::OWN, input);
+                    self.check(sent);
+                }
+                Action::Steer(order) => {
+                    let sent = self.commands.send(Cause::OWN, order);
+                    self.check(sent);
+                }
+                Action::Stop => {
+                    if let Err(error) =
+                        StopWord::set(&self.stop_word, Role::Comm, StopCause::Ordered)
+                    {
+                        tracing::error!("the robot may still be moving: {error}");
+                    }
+                }
+            }
+        }
+    }
+
+    fn publish_map(&self, map: &WarehouseMap) {
+        if let Err(error) = self.map.send(Cause::OWN, *map) {
+            tracing::error!("{error}");
+        }
+    }
+
+    fn next<T: Topic>(
+        &mut self,
+        receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
+    ) -> Option<Sample<T>> {
+        match receive(self) {
+            Ok(sample) => sample,
+            Err(error) => {
+                self.complain(&error);
+                None
+            }
+        }
+    }
+
+    fn check(&mut self, sent: Result<(), SendError>) {
+        if let Err(error) = sent {
+            self.complain(&error);
+        }
+    }
+
+    /// Says what goes wrong on the bus, but not for ever.
+    fn complain(&mut self, error: &dyn std::error::Error) {
+        self.complaints = self.complaints.wrapping_add(1);
+        if self.complaints.is_power_of_two() {
+            tracing::error!(times = self.complaints, "{error}");
+        }
+    }
+}

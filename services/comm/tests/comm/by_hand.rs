@@ -1,0 +1,213 @@
+//! Manual: what is renewed, what is awaited, and everything that makes the robot stand.
+
+use lager_topics::{Finish, Mode, Origin, Phase, Refusal, SteeringReport};
+
+use crate::robot::Robot;
+
+/// Codes of the steering board.
+const STANDBY: &str = "[steers 1]";
+
+/// A robot that is driven forward by hand.
+fn driven() -> Robot {
+    let mut robot = Robot::connected(Mode::Manual);
+    assert_eq!(robot.hears(&["styrcomm 2"]), ["[steers 2]", "styrcomm"]);
+    robot
+}
+
+fn finished(robot: &Robot, finish: Finish) -> SteeringReport {
+    SteeringReport {
+        finished_id: robot.steered.expect("an order").0,
+        finished_origin: Origin::Operator.into(),
+        finish: finish.into(),
+        ..SteeringReport::default()
+    }
+}
+
+#[test]
+fn a_setpoint_is_renewed_until_the_next_one() {
+    let mut robot = driven();
+    assert_eq!(robot.pass(120), ["[renews 2]", "[renews 2]", "[renews 2]"]);
+    // The operator's 7 is the board's 9 (AMB-2).
+    assert_eq!(robot.hears(&["styrcomm 7"]), ["[steers 9]", "styrcomm"]);
+    assert_eq!(robot.pass(40), ["[renews 9]"]);
+    assert_eq!(robot.hears(&["styrcomm 1"]), [STANDBY, "styrcomm"]);
+    assert_eq!(robot.pass(1_000), [""; 0], "standing needs nobody");
+    assert_eq!(robot.hears(&["styrcomm 4"]), ["[steers 4]", "styrcomm"]);
+}
+
+#[test]
+fn a_one_shot_is_awaited() {
+    let mut robot = Robot::connected(Mode::Manual);
+    assert_eq!(robot.hears(&["styrcomm 8"]), ["[steers 8]"]);
+    assert_eq!(robot.pass(40), ["[renews 8]"]);
+    // Nothing is asked, so this is no answer.
+    assert_eq!(robot.hears(&["styrcomm 2"]), [""; 0]);
+    let report = finished(&robot, Finish::Done);
+    assert_eq!(robot.reports(&report), ["styrcomm"]);
+    // The arm's answer to the wheels' question.
+    assert_eq!(robot.hears(&["armcomm F1"]), ["[steers 241]"]);
+}
+
+#[test]
+fn a_stop_counts_also_where_nothing_is_asked() {
+    let mut robot = Robot::connected(Mode::Manual);
+    robot.hears(&["styrcomm 8"]);
+    assert_eq!(robot.hears(&["styrcomm 1"]), [STANDBY, "styrcomm"]);
+}
+
+#[test]
+fn a_lost_link_makes_the_robot_stand_at_once() {
+    let mut robot = driven();
+    assert_eq!(robot.disconnect(), [STANDBY]);
+    assert_eq!(robot.pass(1_000), [""; 0]);
+    assert_eq!(robot.connect(), ["lager 1 r1", "styrcomm"]);
+    assert_eq!(robot.pass(1_000), [""; 0], "nothing comes back by itself");
+}
+
+#[test]
+fn a_silent_station_that_speaks_the_extension_is_a_lost_link() {
+    let mut robot = Robot::connected(Mode::Manual);
+    robot.hears(&["lager 1 station"]);
+    assert_eq!(robot.hears(&["styrcomm 2"]), ["[steers 2]", "styrcomm"]);
+    for _ in 0..20 {
+        let said = robot.pass(50);
+        assert!(said.contains(&"lager 1 r1".to_owned()), "{said:?}");
+        robot.hears(&["lager 1 station"]);
+    }
+    let said = robot.pass(150);
+    let stands = said.iter().position(|line| line == STANDBY);
+    assert_eq!(stands, Some(said.len() - 2), "{said:?}");
+    assert_eq!(said.last().map(String::as_str), Some("[hangs up]"));
+    assert_eq!(robot.hears(&["styrcomm 2"]), [""; 0]);
+}
+
+#[test]
+fn a_standing_robot_is_patient_with_a_silent_station() {
+    let mut robot = Robot::connected(Mode::Manual);
+    robot.hears(&["lager 1 station"]);
+    let said = robot.pass(4_000);
+    assert!(said.iter().all(|line| line == "lager 1 r1"), "{said:?}");
+    assert!(robot.pass(1_100).contains(&"[hangs up]".to_owned()));
+}
+
+#[test]
+fn a_gag_behind_a_plain_peer_may_be_silent_while_it_drives() {
+    let mut robot = driven();
+    let said = robot.pass(60_000);
+    assert!(said.iter().all(|line| line == "[renews 2]"), "{said:?}");
+}
+
+#[test]
+fn what_was_read_late_moves_nothing() {
+    let mut robot = driven();
+    robot.leap(201);
+    let said = robot.done();
+    assert_eq!(said, [STANDBY, "[hangs up]"]);
+    assert_eq!(robot.hears(&["styrcomm 2"]), [""; 0]);
+    assert_eq!(robot.pass(1_000), [""; 0]);
+}
+
+#[test]
+fn a_pause_as_long_as_the_lease_ends_the_command() {
+    let mut robot = driven();
+    robot.leap(120);
+    let said = robot.done();
+    assert!(said[0].contains("held up for 120 ms"), "{said:?}");
+    assert_eq!(robot.pass(1_000), [""; 0]);
+}
+
+#[test]
+fn a_change_of_the_mode_lets_go_and_asks_first() {
+    let mut robot = driven();
+    robot.does(Phase::WaitingForOrder, None);
+    assert_eq!(robot.mode(Mode::Autonomous), ["sidelength"]);
+    assert_eq!(robot.pass(200), [""; 0]);
+    // What was answered to the question before is passed over.
+    assert_eq!(robot.hears(&["styrcomm 2"]), [""; 0]);
+    assert_eq!(robot.mode(Mode::Manual), ["styrcomm"]);
+}
+
+#[test]
+fn a_refusal_and_an_end_say_why() {
+    let mut robot = driven();
+    robot.health.refused_id = robot.steered.expect("an order").0;
+    robot.health.refused_origin = Origin::Operator.into();
+    robot.health.refusal = Refusal::BoardSilent.into();
+    let said = robot.told();
+    assert!(
+        said[0].starts_with("thought forward is refused: the steering board"),
+        "{said:?}"
+    );
+
+    robot.health.blocked = Refusal::StopLatched.into();
+    robot.told();
+    let said = robot.hears(&["styrcomm 3"]);
+    assert!(said[0].contains("`lager resume`"), "{said:?}");
+    robot.health.blocked = Refusal::None.into();
+    robot.told();
+    robot.pass(200);
+    robot.hears(&["styrcomm 3"]);
+    let report = finished(&robot, Finish::NoTape);
+    let said = robot.reports(&report);
+    assert_eq!(said, ["thought follow-forward has ended: there is no tape"]);
+    assert_eq!(robot.pass(200), [""; 0]);
+}
+
+#[test]
+fn a_stop_overtakes_what_came_before_it() {
+    let mut robot = Robot::connected(Mode::Manual);
+    robot.hears(&["lager 1 station"]);
+    let said = robot.hears(&["styrcomm 2", "stop 5"]);
+    assert_eq!(said, ["[stops]", "styrcomm"]);
+    robot.health.stopped = 1;
+    robot.told();
+    robot.pass(20);
+    let moving = SteeringReport {
+        left_duty: 9,
+        age_ms: 0,
+        ..SteeringReport::default()
+    };
+    assert_eq!(robot.reports(&moving), [""; 0]);
+    let standing = SteeringReport {
+        age_ms: 0,
+        ..SteeringReport::default()
+    };
+    assert_eq!(robot.reports(&standing), ["stopped 5 20"]);
+    assert_eq!(robot.reports(&standing), [""; 0]);
+}
+
+#[test]
+fn a_stop_that_cannot_be_read_stops() {
+    let mut robot = driven();
+    assert_eq!(robot.hears(&["stop now!"]), ["[stops]"]);
+    assert_eq!(robot.pass(1_000), [""; 0]);
+}
+
+#[test]
+fn the_warehouse_is_asked_for_first_where_the_extension_is_spoken() {
+    let mut robot = Robot::with_map(Mode::Manual, None);
+    robot.connect();
+    assert_eq!(robot.hears(&["lager 1 station"]), ["sidelength"]);
+    assert_eq!(robot.hears(&["sidelength 40"]), ["karta"]);
+    assert_eq!(robot.hears(&["karta 4 3 0 0"]), ["prodlis"]);
+    let said = robot.hears(&["prodlis 1 7 1 0 down"]);
+    assert_eq!(said, ["[map 4x3]", "styrcomm"]);
+    // By one connection is enough.
+    robot.disconnect();
+    robot.connect();
+    assert_eq!(robot.hears(&["lager 1 station"]), [""; 0]);
+}
+
+#[test]
+fn a_station_without_a_warehouse_keeps_nobody_from_driving() {
+    let mut robot = Robot::with_map(Mode::Manual, None);
+    robot.connect();
+    assert_eq!(robot.hears(&["lager 1 station"]), ["sidelength"]);
+    let said = robot.pass(1_000);
+    assert_eq!(
+        said.last().map(String::as_str),
+        Some("styrcomm"),
+        "{said:?}"
+    );
+    assert_eq!(robot.hears(&["styrcomm 2"])[0], "[steers 2]");
+}

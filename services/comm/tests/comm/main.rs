@@ -1,0 +1,5 @@
+//! The communication unit's conversation from outside, as its peer and the bus see it.
+
+mod by_hand;
+mod by_itself;
+mod robot;

@@ -1,0 +1,170 @@
+//! A robot played by its samples, with a peer played by its lines.
+
+use core::time::Duration;
+
+use lager_comm::{Action, Conversation, Moment};
+use lager_lines::splitter::LineError;
+use lager_lines::{Name, to_line};
+use lager_topics::{
+    Health, Mode, NavigatorStatus, Order, OrderQueue, Origin, Phase, SteeringReport, WarehouseMap,
+};
+
+/// The conversation and what it has done, as a reader sees it.
+pub(crate) struct Robot {
+    pub(crate) conversation: Conversation,
+    now: Moment,
+    pub(crate) health: Health,
+    pub(crate) map: Option<Box<WarehouseMap>>,
+    pub(crate) ordered: Option<Order>,
+    /// The last steering order that was given or renewed: its id and code.
+    pub(crate) steered: Option<(u32, u8)>,
+}
+
+impl Robot {
+    /// A robot whose bridge has told this mode. In manual mode it has been told some warehouse.
+    pub(crate) fn new(mode: Mode) -> Self {
+        let kept = (mode == Mode::Manual).then(WarehouseMap::default);
+        Self::with_map(mode, kept)
+    }
+
+    pub(crate) fn with_map(mode: Mode, kept: Option<WarehouseMap>) -> Self {
+        let name = Name::new("r1").expect("a name");
+        let mut robot = Self {
+            conversation: Conversation::new(name, kept),
+            now: Moment {
+                robot: Duration::from_secs(1),
+                ns: 1_000_000_000,
+            },
+            health: Health::default(),
+            map: None,
+            ordered: None,
+            steered: None,
+        };
+        robot.conversation.turn(robot.now);
+        robot.mode(mode);
+        robot
+    }
+
+    /// One that is connected to a peer that knows the document's language alone.
+    pub(crate) fn connected(mode: Mode) -> Self {
+        let mut robot = Self::new(mode);
+        let said = robot.connect();
+        assert_eq!(said[0], "lager 1 r1");
+        robot
+    }
+
+    pub(crate) fn connect(&mut self) -> Vec<String> {
+        self.conversation.connected(self.now);
+        self.pass(1)
+    }
+
+    pub(crate) fn disconnect(&mut self) -> Vec<String> {
+        self.conversation.disconnected(self.now);
+        self.done()
+    }
+
+    /// What has been done since the last look: lines as they are, other actions in brackets.
+    pub(crate) fn done(&mut self) -> Vec<String> {
+        let mut done = Vec::new();
+        for action in self.conversation.actions() {
+            done.push(match action {
+                Action::Say(line) => to_line(&line).expect("it fits").trim_end().to_owned(),
+                Action::HangUp(_) => "[hangs up]".into(),
+                Action::Map(map) => {
+                    let said = format!("[map {}x{}]", map.width, map.height);
+                    self.map = Some(map);
+                    said
+                }
+                Action::Order(order) => {
+                    self.ordered = Some(order);
+                    format!("[orders {}]", order.product)
+                }
+                Action::Press(_) => "[picked]".into(),
+                Action::Steer(order) => {
+                    assert_eq!(order.origin.get(), Some(Origin::Operator));
+                    let renewed = self.steered == Some((order.id, order.code));
+                    self.steered = Some((order.id, order.code));
+                    match renewed {
+                        true => format!("[renews {}]", order.code),
+                        false => format!("[steers {}]", order.code),
+                    }
+                }
+                Action::Stop => "[stops]".into(),
+            });
+        }
+        done
+    }
+
+    /// Milliseconds pass, one turn of the loop each 10 ms.
+    pub(crate) fn pass(&mut self, milliseconds: u64) -> Vec<String> {
+        let mut left = milliseconds;
+        while left > 0 {
+            let step = left.min(10);
+            left -= step;
+            self.leap(step);
+        }
+        self.done()
+    }
+
+    /// Milliseconds pass in one turn, as where the process was held up.
+    pub(crate) fn leap(&mut self, milliseconds: u64) {
+        self.now.ns += milliseconds * 1_000_000;
+        self.now.robot += Duration::from_millis(milliseconds);
+        self.conversation.turn(self.now);
+    }
+
+    /// The peer says lines, which arrive together.
+    pub(crate) fn hears(&mut self, lines: &[&str]) -> Vec<String> {
+        let lines: Vec<_> = lines.iter().map(|line| Ok((*line).to_owned())).collect();
+        self.conversation.heard(self.now, &lines);
+        self.done()
+    }
+
+    pub(crate) fn hears_noise(&mut self, error: LineError) -> Vec<String> {
+        self.conversation.heard(self.now, &[Err(error)]);
+        self.done()
+    }
+
+    pub(crate) fn mode(&mut self, mode: Mode) -> Vec<String> {
+        self.health.mode = mode.into();
+        self.told()
+    }
+
+    /// The bridge tells its health.
+    pub(crate) fn told(&mut self) -> Vec<String> {
+        self.conversation.health(self.now, &self.health);
+        self.done()
+    }
+
+    pub(crate) fn reports(&mut self, report: &SteeringReport) -> Vec<String> {
+        self.conversation.report(self.now, report);
+        self.done()
+    }
+
+    /// Logic tells what it does: its phase, and the product under way.
+    pub(crate) fn does(&mut self, phase: Phase, under_way: Option<Order>) -> Vec<String> {
+        let order = under_way.unwrap_or_default();
+        let queue = OrderQueue {
+            order_id: order.id,
+            product: order.product,
+            under_way: under_way.is_some().into(),
+            ..OrderQueue::default()
+        };
+        let status = NavigatorStatus {
+            order_id: order.id,
+            product: order.product,
+            phase: phase.into(),
+            ..NavigatorStatus::default()
+        };
+        self.conversation.queue(self.now, &queue);
+        self.conversation.status(self.now, &status);
+        let mut done = self.done();
+        done.retain(|line| !line.starts_with("set_heading"));
+        done
+    }
+
+    pub(crate) fn event(&mut self, event: &lager_topics::Event) -> Vec<String> {
+        self.conversation.event(self.now, event);
+        self.done()
+    }
+}

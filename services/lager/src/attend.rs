@@ -1,0 +1,351 @@
+//! The service `lager attend`: what `up` needs done on the bus, and must not do itself.
+//!
+//! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file is cut off
+//! ends the process. So the supervisor stays away from the bus, and this child of it keeps each
+//! service's last state for a successor, sweeps what dead processes leave, listens whether all
+//! are heard, tells what the robot does, and plays the operator. Where there is no external computer
+//! it tells the robot its warehouse. Whatever happens
+//! to it, the supervisor starts another one; the script goes on where it was.
+//!
+//! It decides nothing about processes: it says what it hears (`words.rs`), the supervisor acts.
+
+mod ears;
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use lager_ports::{Bus, Cause, Clock, Inventory, OpenError, Publisher, Shutdown};
+use lager_topics::{NavMap, Role};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+use crate::config::Config;
+use crate::hands::Hands;
+use crate::keepers::Keepers;
+use crate::map::bus_map;
+use crate::operator::{Script, ScriptedOperator};
+use crate::report::Narrator;
+use crate::supervisor;
+use crate::words::{Begin, Line, Pulse, Request, Sweep, Word};
+use ears::Ears;
+
+/// The pace of this process's work in robot time, and at most this in real time. What the
+/// supervisor asks is not kept waiting for it.
+const TICK: Duration = Duration::from_millis(40);
+/// The pace while a successor may be waiting for what is kept for it, in real time.
+const HAND_OVER_TICK: Duration = Duration::from_millis(5);
+/// How long a service may take from its start until it has everything that is kept for it.
+const INTRODUCTION: Duration = Duration::from_millis(500);
+/// How often the supervisor hears that this process lives.
+const PULSE: Duration = Duration::from_millis(200);
+/// How often nodes of processes that died are swept from the bus; a service's is at once.
+const SWEEP: Duration = Duration::from_secs(1);
+/// How long the first word may take.
+const FIRST_WORD: Duration = Duration::from_secs(2);
+/// How long nothing but errors may come from the bus.
+const ERRORS: Duration = Duration::from_secs(2);
+
+/// Attends the supervisor `parent` until `shutdown`.
+pub fn run(config: &Config, parent: Option<u32>, shutdown: &Shutdown) -> Result<()> {
+    let stranger = "`lager attend` is a part of `lager up`, which starts it";
+    let line = Line::to_supervisor().context(stranger)?;
+    supervisor::adopt(parent.context(stranger)?, shutdown)?;
+    let begin = first_word(&line)?;
+    let address = config.bus()?;
+    if begin.sweep == Sweep::TheDead || !address.place()?.clear(&address.robot) {
+        lager_ports::remove_stale_nodes(&address)?;
+    }
+    line.send(&Word::Swept)?;
+    if begin.sweep == Sweep::EverythingAndEnd {
+        return Ok(());
+    }
+    let Some(bus) = join(config, &line, shutdown)? else {
+        lager_ports::remove_stale_nodes(&address)?;
+        return Ok(());
+    };
+    let mut attendant = Attendant::new(config, begin, line, bus)?;
+    while !shutdown.is_requested() {
+        attendant.answer()?;
+        attendant.look()?;
+        attendant.wait();
+    }
+    attendant.last_words()
+}
+
+fn first_word(line: &Line) -> Result<Begin> {
+    wait(line, FIRST_WORD);
+    match line.receive()? {
+        Some(Request::Begin(begin)) => Ok(begin),
+        _ => bail!("the supervisor does not say what to begin with"),
+    }
+}
+
+/// Joins the bus, as soon as the body has a clock to follow.
+fn join(config: &Config, line: &Line, shutdown: &Shutdown) -> Result<Option<Bus>> {
+    let bus = config.bus()?;
+    while !shutdown.is_requested() {
+        match Bus::open(&bus, Role::Supervisor) {
+            Err(OpenError::NoClock { .. } | OpenError::ForeignClock(_)) => {}
+            joined => return Ok(Some(joined?)),
+        }
+        line.send(&Word::Pulse(Pulse::default()))?;
+        std::thread::sleep(TICK);
+    }
+    Ok(None)
+}
+
+/// Tells the robot its warehouse.
+fn tell_warehouse(config: &Config, bus: &Bus) -> Result<Publisher<NavMap>> {
+    let map = bus.publisher::<NavMap>()?;
+    map.send(Cause::OWN, bus_map(&config.warehouse()?))?;
+    Ok(map)
+}
+
+/// Everything it does, once it has joined the bus.
+struct Attendant {
+    line: Line,
+    bus: Bus,
+    clock: Clock,
+    /// Real time is counted from here.
+    started: Instant,
+    robot_start: Duration,
+    keepers: Keepers,
+    narrator: Narrator,
+    hands: Hands,
+    /// The warehouse, where comm does not tell it.
+    map: Option<Publisher<NavMap>>,
+    operator: Option<ScriptedOperator>,
+    told: Option<Script>,
+    ears: Ears,
+    inventory: Inventory,
+    complaints: Complaints,
+    pulse_due: Instant,
+    sweep_due: Instant,
+    introduced: Instant,
+}
+
+impl Attendant {
+    fn new(config: &Config, begin: Begin, line: Line, bus: Bus) -> Result<Self> {
+        let keepers = Keepers::new(&bus)?;
+        let joins_late = begin.robot_start.is_some() && begin.sweep == Sweep::TheDead;
+        let narrator = Narrator::new(&bus, joins_late)?;
+        let hands = Hands::new(&bus)?;
+        let map = match config.station.wanted {
+            true => None,
+            false => Some(tell_warehouse(config, &bus)?),
+        };
+        let now = Instant::now();
+        let clock = bus.clock();
+        Ok(Self {
+            line,
+            robot_start: begin.robot_start.unwrap_or_else(|| clock.now()),
+            clock,
+            bus,
+            started: now,
+            keepers,
+            narrator,
+            hands,
+            map,
+            operator: (begin.script).map(|script| ScriptedOperator::new(script, Hands::fresh_id())),
+            told: None,
+            ears: Ears::default(),
+            inventory: Inventory::default(),
+            complaints: Complaints::default(),
+            pulse_due: now,
+            sweep_due: now,
+            introduced: now,
+        })
+    }
+
+    /// Does what the supervisor asks.
+    fn answer(&mut self) -> Result<()> {
+        while let Some(request) = self.line.receive()? {
+            match request {
+                Request::Begin(_) => {}
+                Request::Started(service, pid) => {
+                    self.ears.started(service, pid);
+                    self.introduced = Instant::now() + INTRODUCTION;
+                }
+                Request::HandOver(service) => {
+                    self.keepers.owe(service);
+                    self.hand_over()?;
+                    // What the dead one left is removed as soon as its last word is kept.
+                    self.sweep_due = Instant::now();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn hand_over(&mut self) -> Result<()> {
+        for served in self.keepers.hand_over() {
+            match served {
+                Ok(service) => self.line.send(&Word::HandedOver(service))?,
+                Err(error) => self.complain(Err(error)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at everything, and does at most one thing of the script.
+    fn look(&mut self) -> Result<()> {
+        self.hand_over()?;
+        let remembered = self.keepers.remember();
+        let looked = self.narrator.look(self.clock.now() - self.robot_start);
+        for result in remembered.into_iter().chain([looked]) {
+            self.complain(result);
+        }
+        if self.sweep_due <= Instant::now() {
+            self.sweep()?;
+        }
+        // Late joiners get it, too.
+        self.map.iter().for_each(Publisher::tick);
+        self.play()?;
+        self.listen()?;
+        for note in self.narrator.take_notes() {
+            self.line.send(&Word::Note(note))?;
+        }
+        if self.pulse_due <= Instant::now() {
+            self.pulse_due = Instant::now() + PULSE;
+            self.pulse()?;
+        }
+        self.complaints.end_of_look();
+        if self
+            .complaints
+            .since
+            .is_some_and(|since| since.elapsed() >= ERRORS)
+        {
+            self.line
+                .send(&Word::Damaged(self.complaints.last.clone()))?;
+        }
+        Ok(())
+    }
+
+    fn sweep(&mut self) -> Result<()> {
+        self.sweep_due = Instant::now() + SWEEP;
+        self.bus.sweep();
+        let mut processes = self.ears.processes();
+        processes.push(std::process::id());
+        let missed = self.inventory.look(self.bus.place(), &processes);
+        let why = if !self.bus.is_listed() {
+            "the files of the bus were removed".to_owned()
+        } else if let Some(path) = missed {
+            format!(
+                "{} is in use, and it or its description was removed or written to",
+                path.display()
+            )
+        } else {
+            return Ok(());
+        };
+        self.line.send(&Word::Damaged(why))?;
+        Ok(())
+    }
+
+    /// Plays the operator.
+    fn play(&mut self) -> Result<()> {
+        let Some(operator) = &mut self.operator else {
+            return Ok(());
+        };
+        let act = operator.step(self.clock.now(), self.narrator.seen());
+        if self.told.as_ref() != Some(operator.script()) {
+            // Told before it is done: a successor must know of an order that was given.
+            self.told = Some(operator.script().clone());
+            self.line.send(&Word::Script(operator.script().clone()))?;
+        }
+        if let Some(act) = act {
+            let done = self.hands.carry_out(act);
+            self.complain(done);
+        }
+        Ok(())
+    }
+
+    /// Tells who is silent.
+    fn listen(&mut self) -> Result<()> {
+        for pid in self.narrator.take_heard() {
+            self.ears.heard(pid);
+        }
+        for silence in self.ears.look(self.started.elapsed(), self.clock.now()) {
+            self.line.send(&Word::Silent(silence))?;
+        }
+        Ok(())
+    }
+
+    fn pulse(&self) -> Result<()> {
+        self.line.send(&Word::Pulse(Pulse {
+            robot_time: Some(self.clock.now()),
+            frames: self.narrator.frames(),
+            lost_here: self.narrator.lost_here(),
+            lost_elsewhere: self.narrator.lost_elsewhere(),
+        }))?;
+        Ok(())
+    }
+
+    fn wait(&self) {
+        let tick = match Instant::now() < self.introduced {
+            true => HAND_OVER_TICK,
+            false => self.clock.real(TICK).min(TICK),
+        };
+        wait(&self.line, tick);
+    }
+
+    /// The services have ended: what they said last, and what became of the goods.
+    fn last_words(mut self) -> Result<()> {
+        let looked = self.narrator.look(self.clock.now() - self.robot_start);
+        self.complain(looked);
+        let delivered = self
+            .operator
+            .as_ref()
+            .map_or(&[][..], ScriptedOperator::delivered);
+        let misplaced = delivered.iter().copied();
+        let misplaced = misplaced.filter(|id| self.narrator.truly_delivered(*id) == Some(false));
+        self.line.send(&Word::Misplaced(misplaced.collect()))?;
+        self.pulse()?;
+        for note in self.narrator.take_notes() {
+            self.line.send(&Word::Note(note))?;
+        }
+        self.bus.sweep();
+        Ok(())
+    }
+
+    /// Takes note of what went wrong, and has it told, but not for ever.
+    fn complain(&mut self, result: Result<()>) {
+        if let Err(error) = result
+            && self.complaints.hear(&error)
+        {
+            let times = self.complaints.count;
+            self.narrator
+                .note("up", &format!("{error:#} (seen {times} times)"));
+        }
+    }
+}
+
+fn wait(line: &Line, at_most: Duration) {
+    let at_most = Timespec::try_from(at_most).expect("no wait is as long as the clock's range");
+    let _ = poll(&mut [PollFd::new(line, PollFlags::IN)], Some(&at_most));
+}
+
+/// Errors of the bus that pass: the next attempt may succeed. Those that do not are damage.
+#[derive(Default)]
+struct Complaints {
+    count: u32,
+    last: String,
+    heard: bool,
+    /// Since when every look has met one.
+    since: Option<Instant>,
+}
+
+impl Complaints {
+    /// Counts one; says whether it is to be told.
+    fn hear(&mut self, error: &anyhow::Error) -> bool {
+        self.count = self.count.wrapping_add(1);
+        self.last = format!("{error:#}");
+        self.heard = true;
+        self.since.get_or_insert_with(Instant::now);
+        self.count.is_power_of_two()
+    }
+
+    fn end_of_look(&mut self) {
+        if !core::mem::take(&mut self.heard) {
+            self.since = None;
+        }
+    }
+}

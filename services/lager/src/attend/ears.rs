@@ -1,0 +1,189 @@
+//! Whether the services are heard, as a pure state machine.
+//!
+//! A service that lives and is silent is stopped, hangs, or cannot be reached through the bus; the
+//! process that supervises it sees none of that. Silence is counted in small pieces and by two
+//! clocks. By the real one, since a service that hangs does so in real time; a piece counts no more
+//! than [`LONGEST_PIECE`], so what this process has slept through is nobody's silence. And by the
+//! robot's, since services speak by that: while an emulated body's clock stands still, or crawls,
+//! they have nothing to say; and comm and station have none of their own. Only an emulator that has not said a word yet has no such excuse: the
+//! clock is its own.
+
+use std::time::Duration;
+
+use crate::services::Service;
+use crate::words::Silence;
+
+/// How long a service may be silent in real time.
+const REAL: Duration = Duration::from_secs(2);
+/// How long in robot time: that is five times the rarest of what is listened for.
+const ROBOT: Duration = Duration::from_millis(500);
+/// How long an emulator may take until its first word, in real time.
+const EMULATOR: Duration = Duration::from_secs(5);
+/// The most that counts between two looks.
+const LONGEST_PIECE: Duration = Duration::from_millis(100);
+
+/// One service that is listened for.
+#[derive(Debug)]
+struct Voice {
+    service: Service,
+    pid: u32,
+    was_heard: bool,
+    real: Duration,
+    robot: Duration,
+    told: bool,
+}
+
+impl Voice {
+    fn is_too_long(&self) -> bool {
+        let hangs = self.real >= REAL && self.robot >= ROBOT;
+        let does_not_start = self.service == Service::Emulator && !self.was_heard;
+        hangs || does_not_start && self.real >= EMULATOR
+    }
+}
+
+/// The services that have been started.
+#[derive(Debug, Default)]
+pub struct Ears {
+    voices: Vec<Voice>,
+    looked: Option<(Duration, Duration)>,
+}
+
+impl Ears {
+    /// Listens for a service that has been started as process `pid`, and no longer for the one
+    /// before it.
+    pub fn started(&mut self, service: Service, pid: u32) {
+        self.voices.retain(|voice| voice.service != service);
+        self.voices.push(Voice {
+            service,
+            pid,
+            was_heard: false,
+            real: Duration::ZERO,
+            robot: Duration::ZERO,
+            told: false,
+        });
+    }
+
+    /// The processes of the services, as far as they have been told.
+    pub fn processes(&self) -> Vec<u32> {
+        self.voices.iter().map(|voice| voice.pid).collect()
+    }
+
+    /// Process `pid` has said something.
+    pub fn heard(&mut self, pid: u32) {
+        for voice in self.voices.iter_mut().filter(|voice| voice.pid == pid) {
+            voice.was_heard = true;
+            voice.real = Duration::ZERO;
+            voice.robot = Duration::ZERO;
+            voice.told = false;
+        }
+    }
+
+    /// Looks at both clocks; who has been silent for too long is told once.
+    pub fn look(&mut self, real: Duration, robot: Duration) -> Vec<Silence> {
+        let (real_before, robot_before) =
+            self.looked.replace((real, robot)).unwrap_or((real, robot));
+        let piece = real.saturating_sub(real_before).min(LONGEST_PIECE);
+        let robot_piece = robot.saturating_sub(robot_before);
+        let mut silent = Vec::new();
+        let heard = |voice: &&mut Voice| voice.service.is_heard();
+        for voice in self.voices.iter_mut().filter(heard) {
+            voice.real += piece;
+            voice.robot += robot_piece;
+            if voice.is_too_long() && !voice.told {
+                voice.told = true;
+                silent.push(Silence {
+                    service: voice.service,
+                    pid: voice.pid,
+                    was_heard: voice.was_heard,
+                });
+            }
+        }
+        silent
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK: Duration = Duration::from_millis(40);
+
+    /// Looks for `seconds`, with the robot's clock `speed` times as fast.
+    fn listen(ears: &mut Ears, from: &mut Duration, seconds: u64, speed: f64) -> Vec<Silence> {
+        let end = *from + Duration::from_secs(seconds);
+        let mut silent = Vec::new();
+        while *from < end {
+            *from += TICK;
+            silent.extend(ears.look(*from, from.mul_f64(speed)));
+        }
+        silent
+    }
+
+    #[test]
+    fn silence_is_told_once_and_says_whether_there_was_a_word_before() {
+        let mut ears = Ears::default();
+        ears.started(Service::Bridge, 7);
+        ears.started(Service::Logic, 8);
+        let mut now = Duration::ZERO;
+        ears.heard(7);
+        assert_eq!(listen(&mut ears, &mut now, 1, 1.0), []);
+        ears.heard(7);
+        assert_eq!(
+            listen(&mut ears, &mut now, 9, 1.0),
+            [
+                Silence {
+                    service: Service::Logic,
+                    pid: 8,
+                    was_heard: false
+                },
+                Silence {
+                    service: Service::Bridge,
+                    pid: 7,
+                    was_heard: true
+                },
+            ]
+        );
+        // It speaks again, and its successor has two seconds of its own.
+        ears.heard(7);
+        assert_eq!(listen(&mut ears, &mut now, 1, 1.0), []);
+        ears.started(Service::Bridge, 9);
+        assert_eq!(listen(&mut ears, &mut now, 1, 1.0), []);
+        assert_eq!(listen(&mut ears, &mut now, 2, 1.0).len(), 1);
+    }
+
+    #[test]
+    fn a_standing_clock_and_a_sleeping_listener_are_no_silence() {
+        let mut ears = Ears::default();
+        ears.started(Service::Bridge, 7);
+        let mut now = Duration::ZERO;
+        assert_eq!(listen(&mut ears, &mut now, 60, 0.0), []);
+
+        let mut ears = Ears::default();
+        ears.started(Service::Bridge, 7);
+        let slept = Duration::from_secs(60);
+        assert_eq!(ears.look(Duration::ZERO, Duration::ZERO), []);
+        assert_eq!(ears.look(slept, slept), []);
+    }
+
+    #[test]
+    fn an_emulator_that_does_not_start_is_silent_without_a_clock() {
+        let mut ears = Ears::default();
+        ears.started(Service::Emulator, 7);
+        let mut now = Duration::ZERO;
+        assert_eq!(listen(&mut ears, &mut now, 4, 0.0), []);
+        assert_eq!(listen(&mut ears, &mut now, 4, 0.0).len(), 1);
+        // One that has spoken may be stopped.
+        ears.heard(7);
+        assert_eq!(listen(&mut ears, &mut now, 60, 0.0), []);
+    }
+
+    #[test]
+    fn a_slow_robot_may_be_silent_for_longer() {
+        let mut ears = Ears::default();
+        ears.started(Service::Bridge, 7);
+        let mut now = Duration::ZERO;
+        // At a hundredth of real time health comes every ten seconds.
+        assert_eq!(listen(&mut ears, &mut now, 40, 0.01), []);
+        assert_eq!(listen(&mut ears, &mut now, 20, 0.01).len(), 1);
+    }
+}

@@ -1,0 +1,287 @@
+//! What the words of the command line mean, where clap does not know it by itself: each reader
+//! returns the value, or the sentence that refuses it.
+//!
+//! Whatever makes no sense is refused here, before a bus is opened, so that clap ends with its
+//! exit code for wrong usage and names the argument. Numbers may be negative, so that `-1` is
+//! refused for what it is and not as an unknown flag.
+
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+use lager_lines::{Name, ProductId};
+use lager_ports::RobotName;
+use lager_topics::{TOPICS, UnknownTopic};
+use lager_wire::{OperatorCommand, parse_code};
+
+use crate::config::{BAUD_RATES, SPEEDS};
+
+/// The longest that `lager drive --seconds` holds, in seconds: a day.
+const LONGEST_DRIVE_S: f64 = 86_400.0;
+/// The longest virtual time of `lager simulate`, in seconds: a year.
+const LONGEST_RUN_S: u64 = 365 * 86_400;
+
+/// A host and a port.
+pub fn address(text: &str) -> Result<String, String> {
+    match text.rsplit_once(':') {
+        Some((host, port))
+            if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0) =>
+        {
+            Ok(text.to_owned())
+        }
+        _ => Err(format!(
+            "`{text}` is no address; write a host and a port, as in 192.168.1.5:7420"
+        )),
+    }
+}
+
+/// What a robot is to fetch.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fetch {
+    /// Which robot.
+    pub robot: Name,
+    /// Which products, in this order.
+    pub products: Vec<ProductId>,
+}
+
+/// A robot and the products that it is to fetch.
+pub fn fetch(text: &str) -> Result<Fetch, String> {
+    let usage = || format!("`{text}` is no order; write a robot and its products, as in r1=3,1");
+    let (robot, products) = text.split_once('=').ok_or_else(usage)?;
+    let robot = Name::new(robot).map_err(|error| error.to_string())?;
+    let id = |text: &str| text.parse().ok().and_then(ProductId::new);
+    let products: Option<_> = products.split(',').map(id).collect();
+    Ok(Fetch {
+        robot,
+        products: products.ok_or_else(usage)?,
+    })
+}
+
+/// A command of the wheels, by its name or its code.
+pub fn wheel_command(text: &str) -> Result<OperatorCommand, String> {
+    let command = command(text, OperatorCommand::wheel)?;
+    if matches!(command, OperatorCommand::Arm(_)) {
+        return Err(format!(
+            "0x{:02X} moves the arm; use `lager arm`",
+            command.code()
+        ));
+    }
+    Ok(command)
+}
+
+/// A command of the arm, by its name or its code.
+pub fn arm_command(text: &str) -> Result<OperatorCommand, String> {
+    let command = command(text, OperatorCommand::arm)?;
+    if !matches!(command, OperatorCommand::Arm(_)) {
+        return Err(format!(
+            "0x{:02X} drives the wheels; use `lager drive`",
+            command.code()
+        ));
+    }
+    Ok(command)
+}
+
+/// A command by its name, as `by_name` knows them, or in one of the three forms of its code.
+fn command(
+    text: &str,
+    by_name: fn(&str) -> Option<OperatorCommand>,
+) -> Result<OperatorCommand, String> {
+    let coded = || OperatorCommand::from_code(parse_code(text).ok()?);
+    by_name(text).or_else(coded).ok_or_else(|| {
+        let names: Vec<_> = OperatorCommand::ALL
+            .into_iter()
+            .filter(|command| by_name(command.name()) == Some(*command))
+            .map(OperatorCommand::name)
+            .collect();
+        format!(
+            "`{text}` is no command; the names are {}, and the codes 1 to 9 for the wheels and 0xF1 to 0xFA for the arm",
+            names.join(", ")
+        )
+    })
+}
+
+/// The name of a topic of the table.
+pub fn topic(text: &str) -> Result<String, String> {
+    if TOPICS.iter().any(|entry| entry.name == text) {
+        Ok(text.to_owned())
+    } else {
+        Err(UnknownTopic(text.to_owned()).to_string())
+    }
+}
+
+/// The name of a robot.
+pub fn robot(text: &str) -> Result<String, String> {
+    let name: RobotName = text.parse().map_err(said)?;
+    Ok(name.as_str().to_owned())
+}
+
+/// `7`, or `1..20` with both ends.
+pub fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let seed = |seed: &str| {
+        seed.parse::<u64>().map_err(|_| {
+            format!("`{seed}` is no seed; write --seeds 7 or --seeds 1..20 (both ends run)")
+        })
+    };
+    let (first, last) = match text.split_once("..") {
+        Some((first, last)) => (seed(first)?, seed(last.trim_start_matches('='))?),
+        None => (seed(text)?, seed(text)?),
+    };
+    if last < first {
+        return Err(format!(
+            "{text} is empty; the first seed comes first, as in 1..3"
+        ));
+    }
+    Ok(first..=last)
+}
+
+/// How many, at least one.
+pub fn count(text: &str) -> Result<u64, String> {
+    whole(text, 1..=u64::MAX, "one is the least")
+}
+
+/// How many runs, at least one.
+pub fn runs(text: &str) -> Result<usize, String> {
+    whole(text, 1..=usize::MAX, "one run is the least")
+}
+
+/// A seed of the noise.
+pub fn seed(text: &str) -> Result<u64, String> {
+    whole(text, 0..=u64::MAX, "seeds start at 0")
+}
+
+/// The number of a product.
+pub fn product(text: &str) -> Result<i32, String> {
+    whole(text, 0..=i32::MAX, "products are numbered from 0")
+}
+
+/// How many things stand on the floor.
+pub fn obstacles(text: &str) -> Result<u32, String> {
+    whole(text, 0..=64, "there are 0 to 64 obstacles")
+}
+
+/// A gain of the line following.
+pub fn gain(text: &str) -> Result<u8, String> {
+    whole(text, 0..=u8::MAX, "a gain is from 0 to 255")
+}
+
+/// Virtual time in seconds.
+pub fn limit(text: &str) -> Result<u64, String> {
+    whole(
+        text,
+        1..=LONGEST_RUN_S,
+        "the limit is from one second to a year, in seconds",
+    )
+}
+
+/// A rate that boards are built for.
+pub fn baud(text: &str) -> Result<u32, String> {
+    let [usual, slow] = BAUD_RATES;
+    let known = || format!("`{text}` is no rate of the boards; those are {usual} and {slow}");
+    let baud = text.parse().map_err(|_| known())?;
+    if BAUD_RATES.contains(&baud) {
+        Ok(baud)
+    } else {
+        Err(known())
+    }
+}
+
+/// How many times as fast as real time.
+pub fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().map_err(said)?;
+    if SPEEDS.contains(&speed) {
+        Ok(speed)
+    } else {
+        Err(format!(
+            "the clock runs from {} to {} times as fast as real time (`lager simulate` runs faster)",
+            SPEEDS.start(),
+            SPEEDS.end()
+        ))
+    }
+}
+
+/// How long to drive, in seconds.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(said)?;
+    if seconds > 0.0 && seconds <= LONGEST_DRIVE_S {
+        Ok(seconds)
+    } else {
+        Err(format!(
+            "give a time of more than 0 and at most {LONGEST_DRIVE_S} seconds"
+        ))
+    }
+}
+
+/// A whole number within `range`, or `rule`.
+fn whole<T: FromStr + PartialOrd>(
+    text: &str,
+    range: RangeInclusive<T>,
+    rule: &str,
+) -> Result<T, String> {
+    // What is no number at all and what does not fit into one is refused by the same rule.
+    match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!("it must be a whole number: {rule}")),
+    }
+}
+
+fn said(error: impl Display) -> String {
+    error.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::seeds;
+    use crate::cli::Cli;
+
+    /// What `lager` says to `words`, which it refuses as wrong usage.
+    fn refusal(words: &[&str]) -> String {
+        let error = Cli::try_parse_from(["lager"].iter().chain(words)).expect_err("wrong usage");
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    }
+
+    #[test]
+    fn seeds_are_one_number_or_a_range_with_both_ends() {
+        assert_eq!(seeds("7"), Ok(7..=7));
+        assert_eq!(seeds("1..20"), Ok(1..=20));
+        assert_eq!(seeds("1..=20"), Ok(1..=20));
+        for wrong in ["", "x", "1..", "5..4", "-1"] {
+            assert!(seeds(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused_with_a_sentence_before_anything_is_opened() {
+        for (words, said) in [
+            (&["drive", "bogus"][..], "names are stop, forward"),
+            (&["drive", "0x0F"], "names are stop, forward"),
+            (&["drive", "-1"], "names are stop, forward"),
+            (&["drive", "0xF1"], "use `lager arm`"),
+            (&["arm", "forward"], "names are clockwise"),
+            (&["arm", "2"], "use `lager drive`"),
+            (&["topic", "echo", "sensor/lime"], "sensor/line"),
+            (&["topic", "hz", "sensor/line", "--count", "-1"], "least"),
+            (&["topic", "echo", "sensor/line", "--count", "0"], "least"),
+            (&["simulate", "--seeds", "3..1"], "first seed comes first"),
+            (&["simulate", "--seeds", "x"], "--seeds 1..20"),
+            (&["simulate", "--limit", "-5"], "one second"),
+            (&["fetch", "-1"], "numbered from 0"),
+            (&["up", "--mission", "-1"], "numbered from 0"),
+            (&["up", "--speed", "-1"], "0.01 to 20"),
+            (&["up", "--speed", "nan"], "0.01 to 20"),
+            (&["up", "--baud", "115200"], "500000 and 9600"),
+            (&["up", "--seed", "-1"], "seeds start at 0"),
+            (&["drive", "forward", "--seconds", "-1"], "more than 0"),
+            (&["drive", "forward", "--seconds", "nan"], "more than 0"),
+            (&["gains", "-1", "2"], "0 to 255"),
+            (&["gains", "1", "256"], "0 to 255"),
+            (&["bench", "hop", "--runs", "-2"], "one run"),
+            (&["--name", "R 1", "stop"], "only a-z"),
+        ] {
+            let told = refusal(words);
+            assert!(told.contains(said), "{words:?}: {told}");
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! How a mission ended: the one JSON line, or the sentence, at the end of `lager up`.
+
+use serde::Serialize;
+
+/// How a mission ended.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// The products delivered, in order.
+    pub delivered: Vec<i32>,
+    /// Robot time from start to end.
+    pub sim_seconds: f64,
+    /// Real time from start to end.
+    pub wall_seconds: f64,
+    /// Sensor and steering frames seen on the bus.
+    pub frames: u64,
+    /// Frames lost on any way there: on the wires, and in any subscriber of the bus.
+    pub lost: u64,
+    /// Restarts of services.
+    pub restarts: u32,
+    /// Why the mission was not delivered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
+
+impl Outcome {
+    /// The outcome in words.
+    pub fn sentence(&self) -> String {
+        match &self.failure {
+            Some(why) => format!("the mission failed: {why}"),
+            None => format!(
+                "{} delivered in {:.1} s of robot time; {} frames, {} lost",
+                self.delivered.len(),
+                self.sim_seconds,
+                self.frames,
+                self.lost
+            ),
+        }
+    }
+}

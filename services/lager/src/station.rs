@@ -1,0 +1,125 @@
+//! `lager station`: the external computer in this process, until it is told to end.
+//!
+//! Alone it listens where it is told. As a child of `lager up` its standard output is the socket at
+//! which robots connect, and what it keeps lies in the robot's folder.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::net::TcpListener;
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use lager_lines::Name;
+use lager_ports::Shutdown;
+use lager_station::{Listen, Queues, Server, ServerConfig, Warehouse, save};
+
+use crate::cli::StationArgs;
+use crate::config::Config;
+use crate::runtime::RuntimeFolder;
+use crate::supervisor;
+
+/// What a station calls itself towards robots.
+const NAME: &str = "station";
+
+/// Where a GaG connects unless somebody says otherwise, in the folder of the bus.
+const GAG: &str = "gag";
+
+/// The longest path of a socket, in bytes.
+const LONGEST_SOCKET: usize = 107;
+
+/// Runs it.
+///
+/// # Errors
+/// An address, a socket or the warehouse cannot be had; the sentence says what to do.
+pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<()> {
+    let server = match args.parent {
+        Some(parent) => {
+            supervisor::adopt(parent, shutdown)?;
+            Server::open(supervised(config, args.resume)?)?
+        }
+        None => alone(config, args)?,
+    };
+    server.run(&shutdown.flag())?;
+    Ok(())
+}
+
+/// As somebody has started it.
+fn alone(config: &Config, args: &StationArgs) -> Result<Server> {
+    let gag = match &args.gag {
+        Some(path) => path.clone(),
+        None => default_gag(config)?,
+    };
+    let orders = args.fetch.iter();
+    let orders =
+        orders.flat_map(|fetch| fetch.products.iter().map(|id| (fetch.robot.clone(), *id)));
+    let server = Server::open(ServerConfig {
+        name: name()?,
+        listen: Listen::At(args.listen),
+        gag: Some(gag.clone()),
+        warehouse: args.warehouse.clone(),
+        fetch: orders.collect(),
+    })?;
+    crate::say(&format!(
+        "robots connect to {}, a GaG to {}; {}",
+        server.address()?,
+        gag.display(),
+        warehouse(args.warehouse.as_deref()),
+    ))?;
+    Ok(server)
+}
+
+/// As `lager up` has started it. The first one begins with the robot's warehouse, a successor with
+/// what the one before it has saved.
+fn supervised(config: &Config, resume: bool) -> Result<ServerConfig> {
+    let robots = std::io::stdout().as_fd().try_clone_to_owned()?;
+    let kept = RuntimeFolder::warehouse(config)?;
+    if !(resume && kept.exists()) {
+        save(&kept, &described(config)?)?;
+        match fs::remove_file(Queues::beside(&kept)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
+            _ => {}
+        }
+    }
+    let gag = RuntimeFolder::gag(config)?;
+    if gag.as_os_str().len() > LONGEST_SOCKET {
+        tracing::warn!("no GaG can connect: {} is too long a path", gag.display());
+    }
+    Ok(ServerConfig {
+        name: name()?,
+        listen: Listen::On(TcpListener::from(robots)),
+        gag: (gag.as_os_str().len() <= LONGEST_SOCKET).then_some(gag),
+        warehouse: Some(kept),
+        fetch: Vec::new(),
+    })
+}
+
+/// The robot's warehouse as a station describes it.
+///
+/// # Errors
+/// No station can describe it.
+pub fn described(config: &Config) -> Result<Warehouse> {
+    let described: Warehouse = toml::from_str(&toml::to_string(&config.warehouse()?)?)?;
+    described.check()?;
+    Ok(described)
+}
+
+fn name() -> Result<Name> {
+    Name::new(NAME).context("the station's name")
+}
+
+fn default_gag(config: &Config) -> Result<PathBuf> {
+    Ok(config.bus()?.place()?.folder().join(GAG))
+}
+
+/// What is known of the warehouse, as the end of a sentence.
+fn warehouse(path: Option<&Path>) -> String {
+    match path {
+        None => "a GaG describes the warehouse, which is not saved".into(),
+        Some(path) if path.exists() => format!("the warehouse is {}", path.display()),
+        Some(path) => format!(
+            "there is no {} yet: a GaG describes the warehouse, which is saved there",
+            path.display()
+        ),
+    }
+}

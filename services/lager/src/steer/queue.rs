@@ -1,0 +1,183 @@
+//! The commands about orders: `fetch` and `queue`. What the robot has understood is read from
+//! `mission/queue`, never assumed.
+
+use std::fmt::Write;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use lager_ports::Subscriber;
+use lager_topics::{
+    EventKind, Input, InputKind, MissionEvent, MissionQueue, Mode, Order, OrderQueue,
+};
+
+use super::{Operator, PATIENCE, first};
+use crate::hands::Hands;
+
+/// How long after a word the robot is looked at again, in real time.
+const GLANCE: Duration = Duration::from_millis(50);
+
+impl Operator {
+    /// `lager fetch`: ordered until logic shows that it took the order.
+    pub fn fetch(&mut self, product: i32) -> Result<String> {
+        // It would wait, and the robot would drive off when somebody else changes the mode.
+        if self.health()?.mode.get() != Some(Mode::Autonomous) {
+            bail!(
+                "the robot is in manual mode and fetches nothing; `lager mode autonomous` changes that, and `lager queue add` orders for later"
+            );
+        }
+        self.order(product)
+    }
+
+    /// `lager queue`: the orders with their numbers.
+    pub fn orders(&self) -> Result<String> {
+        let (_, now) = self.queue()?;
+        Ok(listed(&now))
+    }
+
+    /// `lager queue cancel`.
+    pub fn cancel(&self, id: u32) -> Result<String> {
+        let (mut queue, now) = self.queue()?;
+        waits(&now, id)?;
+        let gone = |queue: &OrderQueue| place(queue, id).is_none();
+        self.say_until(InputKind::OrderCancelled, id, &mut queue, gone)?;
+        Ok(format!("order {id} is taken back"))
+    }
+
+    /// `lager queue up`.
+    pub fn move_up(&self, id: u32) -> Result<String> {
+        let (mut queue, now) = self.queue()?;
+        let before = waits(&now, id)?;
+        if before == 0 {
+            return Ok(format!("order {id} is the next one already"));
+        }
+        let is_earlier = |queue: &OrderQueue| place(queue, id).is_none_or(|now| now < before);
+        self.say_until(InputKind::OrderMovedUp, id, &mut queue, is_earlier)?;
+        Ok(format!("order {id} is carried out earlier"))
+    }
+
+    /// `lager queue clear`.
+    pub fn clear_queue(&self) -> Result<String> {
+        let (mut queue, now) = self.queue()?;
+        let is_empty = |queue: &OrderQueue| queue.orders().is_empty();
+        if is_empty(&now) {
+            return Ok("no order waits".into());
+        }
+        self.say_until(InputKind::QueueCleared, 0, &mut queue, is_empty)?;
+        Ok("all waiting orders are taken back".into())
+    }
+
+    /// The queue, and where to learn of its changes.
+    fn queue(&self) -> Result<(Subscriber<MissionQueue>, OrderQueue)> {
+        let mut queue = self.bus.subscriber::<MissionQueue>()?;
+        let now = first(&mut queue, &self.bus, &self.patience)?;
+        Ok((queue, now))
+    }
+
+    /// `lager queue add`: ordered until logic shows that it took the order, or refuses it.
+    pub fn order(&self, product: i32) -> Result<String> {
+        let mut queue = self.bus.subscriber::<MissionQueue>()?;
+        let mut events = self.bus.subscriber::<MissionEvent>()?;
+        let order = Order {
+            id: Hands::fresh_id(),
+            product,
+        };
+        let give_up = Instant::now() + PATIENCE;
+        loop {
+            self.hands.fetch(order)?;
+            self.patience.pause(GLANCE)?;
+            while let Some(event) = events.receive()? {
+                if event.kind.get() == Some(EventKind::Refused) && event.order_id == order.id {
+                    let why = event.failure;
+                    bail!("logic refuses to fetch product {product}: {why}");
+                }
+            }
+            if let Some(queue) = queue.latest()? {
+                if queue.under_way != 0 && queue.order_id == order.id {
+                    return Ok(format!("logic fetches product {product}"));
+                }
+                match place(&queue, order.id) {
+                    Some(0) => return Ok(format!("logic fetches product {product} next")),
+                    Some(before) => {
+                        return Ok(format!(
+                            "logic fetches product {product}; waiting before it: {before}"
+                        ));
+                    }
+                    None => {}
+                }
+            }
+            if Instant::now() >= give_up {
+                bail!("logic does not take the order: it is not up, or does not answer");
+            }
+        }
+    }
+
+    /// Says one thing about the queue, once, since not all of them may be said twice, and waits until
+    /// logic shows the effect.
+    fn say_until(
+        &self,
+        kind: InputKind,
+        order_id: u32,
+        queue: &mut Subscriber<MissionQueue>,
+        done: impl Fn(&OrderQueue) -> bool,
+    ) -> Result<()> {
+        let give_up = Instant::now() + PATIENCE;
+        self.hands.press(Input {
+            kind: kind.into(),
+            order_id,
+            id: Hands::fresh_id(),
+            ..Input::default()
+        })?;
+        loop {
+            self.patience.pause(GLANCE)?;
+            if let Some(queue) = queue.latest()?
+                && done(&queue)
+            {
+                return Ok(());
+            }
+            if Instant::now() >= give_up {
+                bail!("logic does not react; `lager queue` shows what it goes by");
+            }
+        }
+    }
+}
+
+/// How many orders are before this one.
+fn place(queue: &OrderQueue, id: u32) -> Option<usize> {
+    queue.orders().iter().position(|order| order.id == id)
+}
+
+/// How many orders are before this one, which must wait.
+fn waits(queue: &OrderQueue, id: u32) -> Result<usize> {
+    match place(queue, id) {
+        Some(before) => Ok(before),
+        None if queue.under_way != 0 && queue.order_id == id => {
+            bail!("order {id} is under way and waits no more")
+        }
+        None => bail!("no order {id} waits; `lager queue` shows those that do"),
+    }
+}
+
+/// The orders, one a line.
+fn listed(queue: &OrderQueue) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    if queue.under_way != 0 {
+        let (id, product) = (queue.order_id, queue.product);
+        let _ = writeln!(text, "order {id}: product {product}, under way");
+    }
+    for order in queue.orders() {
+        let state = match order.put_off {
+            0 => "waits",
+            _ => "waits for a way",
+        };
+        let _ = writeln!(
+            text,
+            "order {}: product {}, {state}",
+            order.id, order.product
+        );
+    }
+    match text.is_empty() {
+        true => "no order is under way or waits".into(),
+        false => text.trim_end().into(),
+    }
+}

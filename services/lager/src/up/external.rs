@@ -1,0 +1,119 @@
+//! The external computer of a robot that is up: whether it is started here, and where it listens.
+//!
+//! ```text
+//!   --no-station            none: `up` tells the robot its warehouse
+//!   --station HOST:PORT     that one
+//!   127.0.0.1:7420 is free  one of this robot's own, there
+//!   it is taken             by this user's station for the same warehouse: that one
+//!                           by anything else: one of this robot's own, at a port that is free
+//!   no port can be had, or no line can tell the warehouse: none
+//! ```
+//!
+//! The socket is opened here and handed to the station as its standard output, so the port stays the
+//! same over the death of a station, and whoever connects meanwhile waits for its successor.
+
+use std::fs;
+use std::net::TcpListener;
+use std::os::unix::fs::FileTypeExt as _;
+
+use anyhow::Result;
+
+use crate::config::{Config, StationSection};
+use crate::runtime::RuntimeFolder;
+use crate::station;
+
+/// What was chosen, and what there is to tell of it.
+#[derive(Debug)]
+pub struct External {
+    /// Where a station of this robot's own listens.
+    pub listener: Option<TcpListener>,
+    /// What is told of it.
+    pub told: String,
+}
+
+/// Chooses, and puts into `config` what comm is to know.
+///
+/// # Errors
+/// The place of the bus cannot be had.
+pub fn choose(config: &mut Config) -> Result<External> {
+    if !config.station.wanted {
+        return Ok(External {
+            listener: None,
+            told: "there is no external computer; the warehouse is told here".into(),
+        });
+    }
+    if let Some(address) = &config.station.address {
+        return Ok(External {
+            listener: None,
+            told: format!("the external computer is the one at {address}"),
+        });
+    }
+    if let Err(error) = station::described(config) {
+        return Ok(none(config, &error));
+    }
+    let taken = match TcpListener::bind(StationSection::USUAL) {
+        Ok(listener) => return Ok(own(config, listener, "")),
+        Err(error) => error,
+    };
+    if let Some(robot) = neighbour(config)? {
+        let address = StationSection::USUAL.to_owned();
+        let told = format!("the external computer is that of robot `{robot}`, at {address}");
+        config.station.address = Some(address);
+        return Ok(External {
+            listener: None,
+            told,
+        });
+    }
+    let why = format!(", since {} cannot be had: {taken}", StationSection::USUAL);
+    Ok(match TcpListener::bind("127.0.0.1:0") {
+        Ok(listener) => own(config, listener, &why),
+        Err(error) => none(config, &error.into()),
+    })
+}
+
+/// Nobody can be talked to.
+fn none(config: &mut Config, why: &anyhow::Error) -> External {
+    config.station.wanted = false;
+    External {
+        listener: None,
+        told: format!("there is no external computer: {why:#}; the warehouse is told here"),
+    }
+}
+
+fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
+    let address = listener.local_addr().map(|address| address.to_string());
+    let address = address.unwrap_or_else(|_| StationSection::USUAL.to_owned());
+    let told = format!("the external computer listens at {address}{why}");
+    config.station.address = Some(address);
+    External {
+        listener: Some(listener),
+        told,
+    }
+}
+
+/// A robot of this user's on this bus that is up, has a station of its own at the usual address, and
+/// drives in the same warehouse.
+fn neighbour(config: &Config) -> Result<Option<String>> {
+    let bus = config.bus()?;
+    let place = bus.place()?;
+    let warehouse = config.warehouse()?;
+    let is_it = |name: &str| {
+        let theirs = RuntimeFolder::running(&Config {
+            name: name.to_owned(),
+            ..config.clone()
+        });
+        let Ok(Some(theirs)) = theirs else {
+            return false;
+        };
+        let gag = RuntimeFolder::gag(&theirs);
+        let serves = gag
+            .and_then(|gag| Ok(fs::symlink_metadata(gag)?.file_type().is_socket()))
+            .unwrap_or(false);
+        serves
+            && theirs.station.address.as_deref() == Some(StationSection::USUAL)
+            && theirs.warehouse().is_ok_and(|theirs| theirs == warehouse)
+    };
+    let up = place.up();
+    let mut names = up.keys().map(lager_ports::RobotName::as_str);
+    Ok(names.find(|name| is_it(name)).map(str::to_owned))
+}

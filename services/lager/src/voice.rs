@@ -1,0 +1,216 @@
+//! One voice on the terminal: `time  who  what`, a line for each thing told.
+//!
+//! ```text
+//!     6.87 s  logic   drives from (3,0) heading left
+//!     7.02 s  bridge  WARNING: the board on /dev/ttyUSB0 has fallen silent
+//! ```
+//!
+//! What the robot does is told by `up`'s narrator. What goes wrong in a service is an event of
+//! `tracing`, and is told here in the same way on standard error. Traces are for whoever debugs:
+//! they are shown, in the form of `tracing`, only where `RUST_LOG` asks for them, or written to
+//! the file of `--log`.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use lager_ports::Clock;
+use tracing::field::{Field, Visit};
+use tracing::level_filters::LevelFilter;
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::fmt::FmtContext;
+use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{Layer, Registry};
+
+use crate::config::Config;
+
+/// What is traced into a file where `RUST_LOG` does not say.
+const INTO_A_FILE: LevelFilter = LevelFilter::INFO;
+
+/// A line of the terminal.
+pub fn line(time: Duration, who: &str, what: &str) -> String {
+    format!("{:8.2} s  {who:9}  {what}", time.as_secs_f64())
+}
+
+/// Who speaks, and when his time began.
+#[derive(Clone, Copy, Debug)]
+pub enum Speaker {
+    /// A tool that somebody waits for; it says `lager: what`.
+    Tool,
+    /// A process of a robot that is up.
+    Service {
+        /// Its name.
+        who: &'static str,
+        /// When the robot was started, in ns of `CLOCK_MONOTONIC`.
+        started_ns: u64,
+        /// Robot time per real time.
+        speed: f64,
+    },
+}
+
+impl Speaker {
+    /// The service `who`, which `parent` has started if there is one: the robot's time begins
+    /// with its supervisor.
+    pub fn service(who: &'static str, parent: Option<u32>, config: &Config) -> Self {
+        Self::Service {
+            who,
+            started_ns: parent
+                .and_then(started_ns)
+                .unwrap_or_else(Clock::monotonic_ns),
+            speed: config.speed,
+        }
+    }
+
+    /// A line of his.
+    pub fn line(&self, what: &str) -> String {
+        match self {
+            Self::Tool => format!("lager: {what}"),
+            Self::Service {
+                who,
+                started_ns,
+                speed,
+            } => {
+                let real = Duration::from_nanos(Clock::monotonic_ns().saturating_sub(*started_ns));
+                line(real.mul_f64(*speed), who, what)
+            }
+        }
+    }
+}
+
+/// When a process was started, in ns of the machine's clock.
+fn started_ns(process: u32) -> Option<u64> {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The name, in parentheses, may contain anything; the 20th field behind it is in ticks.
+    let ticks: u64 = stat.rsplit(") ").next()?.split(' ').nth(19)?.parse().ok()?;
+    Some(ticks * (1_000_000_000 / rustix::param::clock_ticks_per_second()))
+}
+
+/// From now on warnings of this process are lines of `speaker`, and traces go where they are
+/// wanted.
+///
+/// # Errors
+/// The file cannot be written, or `RUST_LOG` is no list of targets and levels.
+pub fn begin(speaker: Speaker, log: Option<&Path>) -> Result<()> {
+    let wanted = wanted(std::env::var("RUST_LOG").ok().as_deref())?;
+    let file = log.map(open).transpose()?;
+    let (in_file, on_terminal) = match file {
+        Some(file) => {
+            let filter = wanted.unwrap_or_else(|| Targets::new().with_default(INTO_A_FILE));
+            let traces = tracing_subscriber::fmt::layer()
+                .with_writer(Mutex::new(file))
+                .with_ansi(false)
+                .with_filter(filter);
+            (Some(traces), None)
+        }
+        None => (None, wanted),
+    };
+    let terminal: Box<dyn Layer<_> + Send + Sync> = match on_terminal {
+        Some(filter) => tracing_subscriber::fmt::layer()
+            .with_writer(std::io::stderr)
+            .with_ansi(std::io::stderr().is_terminal())
+            .with_filter(filter)
+            .boxed(),
+        None => tracing_subscriber::fmt::layer()
+            .with_writer(std::io::stderr)
+            .event_format(Lines(speaker))
+            .with_filter(LevelFilter::WARN)
+            .boxed(),
+    };
+    Registry::default().with(terminal).with(in_file).init();
+    Ok(())
+}
+
+/// What `RUST_LOG` asks for: nothing if it is unset or empty.
+fn wanted(text: Option<&str>) -> Result<Option<Targets>> {
+    let Some(text) = text.filter(|text| !text.trim().is_empty()) else {
+        return Ok(None);
+    };
+    let targets = text.parse().with_context(|| {
+        format!("RUST_LOG is `{text}`; write levels and targets, such as `info` or `warn,lager_bridge=debug`")
+    })?;
+    Ok(Some(targets))
+}
+
+fn open(path: &Path) -> Result<File> {
+    File::options()
+        .append(true)
+        .create(true)
+        .open(path)
+        .with_context(|| format!("cannot write the log {}", path.display()))
+}
+
+/// Events as lines of a speaker.
+struct Lines(Speaker);
+
+impl<S, N> FormatEvent<S, N> for Lines
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        _: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &Event<'_>,
+    ) -> fmt::Result {
+        let mut said = Said::default();
+        event.record(&mut said);
+        let mark = match *event.metadata().level() {
+            Level::ERROR => "ERROR: ",
+            Level::WARN => "WARNING: ",
+            _ => "",
+        };
+        let Said { what, beside } = said;
+        writeln!(writer, "{}", self.0.line(&format!("{mark}{what}{beside}")))
+    }
+}
+
+/// What an event says, and the values beside it.
+#[derive(Default)]
+struct Said {
+    what: String,
+    beside: String,
+}
+
+impl Visit for Said {
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        use fmt::Write;
+        // Writing to a String cannot fail.
+        let _ = match field.name() {
+            "message" => write!(self.what, "{value:?}"),
+            name => write!(self.beside, " ({name} {value:?})"),
+        };
+    }
+}
+
+/// Says a line on standard error. A closed terminal is no reason to stop a robot.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_asked_for_is_levels_and_targets() {
+        assert!(wanted(None).unwrap().is_none());
+        assert!(wanted(Some(" ")).unwrap().is_none());
+        let targets = wanted(Some("warn,lager_bridge=debug")).unwrap().unwrap();
+        assert!(targets.would_enable("lager_bridge::reader", &Level::DEBUG));
+        assert!(!targets.would_enable("lager_logic", &Level::INFO));
+        let error = wanted(Some("lager_bridge=loud")).unwrap_err().to_string();
+        assert!(
+            error.contains("lager_bridge=loud") && error.contains("`info`"),
+            "{error}"
+        );
+    }
+}

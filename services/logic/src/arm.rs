@@ -1,0 +1,81 @@
+//! What is known of the arm: where its joints are, and what its claw holds.
+
+use lager_topics::{FailureKind, Joint, SERVO_UNKNOWN, SteeringReport};
+use lager_wire::{ArmPose, ArmProfile};
+
+/// Place of the base's servo in a report.
+pub(crate) const BASE: usize = 0;
+/// Place of the shoulder's servo.
+pub(crate) const SHOULDER: usize = 1;
+/// Place of the elbow's servo.
+pub(crate) const ELBOW: usize = 3;
+const WRIST: usize = 5;
+const CLAW: usize = 7;
+
+/// What was last heard of the arm.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ArmSeen {
+    position: [u16; 8],
+    claw_load: i16,
+}
+
+impl Default for ArmSeen {
+    fn default() -> Self {
+        Self {
+            position: [SERVO_UNKNOWN; 8],
+            claw_load: 0,
+        }
+    }
+}
+
+impl ArmSeen {
+    /// A bridge that has just started knows no servo; what was known before still holds, since
+    /// nothing moves the arm but by way of the bridge.
+    pub(crate) fn take(&mut self, report: &SteeringReport) {
+        for (known, heard) in self.position.iter_mut().zip(report.servo_position) {
+            if heard != SERVO_UNKNOWN {
+                *known = heard;
+            }
+        }
+        if report.servo_position[CLAW] != SERVO_UNKNOWN {
+            self.claw_load = report.servo_load[CLAW];
+        }
+    }
+
+    /// Where a servo stands, if it has been heard.
+    pub(crate) fn position(&self, servo: usize) -> Option<u16> {
+        Some(self.position[servo]).filter(|position| *position != SERVO_UNKNOWN)
+    }
+
+    /// The first joint that is not where `pose` has it, where it is, and where it should be.
+    pub(crate) fn joint_off(&self, pose: ArmPose, tolerance: u16) -> Option<(Joint, u16, u16)> {
+        [
+            (Joint::Base, BASE, pose.base),
+            (Joint::Shoulder, SHOULDER, pose.shoulder),
+            (Joint::Elbow, ELBOW, pose.elbow),
+            (Joint::Wrist, WRIST, pose.wrist),
+        ]
+        .into_iter()
+        .map(|(joint, servo, wanted)| (joint, self.position[servo], wanted))
+        .find(|(_, found, wanted)| found.abs_diff(*wanted) > tolerance)
+    }
+
+    /// Why the claw is believed to hold nothing, with what was expected and seen; `None` if it
+    /// holds something. `margin` is how far goods keep it from closing, at least.
+    pub(crate) fn claw_is_empty(
+        &self,
+        profile: &ArmProfile,
+        margin: u16,
+    ) -> Option<(FailureKind, i32, i32)> {
+        let (closed, least) = (profile.gripper_closed, profile.squeeze_load / 2);
+        let load = self.claw_load.unsigned_abs();
+        match self.position(CLAW) {
+            None => Some((FailureKind::ClawUnheard, closed.into(), 0)),
+            Some(position) if position.abs_diff(closed) <= margin => {
+                Some((FailureKind::ClawEmpty, closed.into(), position.into()))
+            }
+            Some(_) if load < least => Some((FailureKind::ClawSlack, least.into(), load.into())),
+            Some(_) => None,
+        }
+    }
+}

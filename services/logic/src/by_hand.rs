@@ -1,0 +1,76 @@
+//! Whether somebody has driven the robot by hand since the navigator was last sure of its place.
+//!
+//! The bridge sums what the wheels turn in manual mode, over all lives of both services, so that
+//! a navigator that was not there finds out as well. This only compares and converts.
+
+use lager_topics::NavigatorStatus;
+
+use crate::odometer::STANDARD_DUTY;
+
+/// The bridge's sum, now and when the robot's place was last known; in duty × µs of both motors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ByHand {
+    here: Option<u64>,
+    now: u64,
+}
+
+impl ByHand {
+    /// As a predecessor left it.
+    pub(crate) fn from_status(sum: u64) -> Self {
+        let here = Some(sum).filter(|sum| *sum != NavigatorStatus::NEVER_HEARD);
+        Self {
+            here,
+            now: here.unwrap_or_default(),
+        }
+    }
+
+    /// All that a successor needs.
+    pub(crate) fn to_status(self) -> u64 {
+        self.here.unwrap_or(NavigatorStatus::NEVER_HEARD)
+    }
+
+    /// The robot's place is known now.
+    pub(crate) fn stand_here(&mut self) {
+        if self.here.is_some() {
+            self.here = Some(self.now);
+        }
+    }
+
+    /// Takes the bridge's sum; the way of the wheels since the place was known, in mm. A bridge
+    /// that has forgotten its sum has stopped the robot for that.
+    pub(crate) fn take(&mut self, sum: u64, cruise_mm_per_s: f32) -> f32 {
+        self.now = sum;
+        let here = *self.here.get_or_insert(sum);
+        let turned = sum.saturating_sub(here) as f32;
+        turned / 2.0 / STANDARD_DUTY * cruise_mm_per_s / 1e6
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Both motors at 100 for so many ms.
+    fn both(millis: u64) -> u64 {
+        200 * 1_000 * millis
+    }
+
+    #[test]
+    fn what_was_driven_before_the_first_look_is_nobodys() {
+        let mut by_hand = ByHand::default();
+        assert_eq!(by_hand.take(both(90_000), 73.3), 0.0);
+        assert!((by_hand.take(both(91_000), 73.3) - 73.3).abs() < 0.01);
+        by_hand.stand_here();
+        assert_eq!(by_hand.take(both(91_000), 73.3), 0.0);
+    }
+
+    #[test]
+    fn a_successor_finds_out_what_was_driven_while_nobody_looked() {
+        let mut by_hand = ByHand::default();
+        by_hand.take(both(500), 73.3);
+        let mut successor = ByHand::from_status(by_hand.to_status());
+        assert!((successor.take(both(1_500), 73.3) - 73.3).abs() < 0.01);
+        let fresh = ByHand::from_status(ByHand::default().to_status());
+        assert_eq!(fresh, ByHand::default());
+    }
+}

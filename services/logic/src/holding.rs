@@ -1,0 +1,81 @@
+//! Standing although the phase would turn the wheels: the steering board is unheard, the arm is
+//! not where goods are carried, or the battery is low.
+//!
+//! ```text
+//!   no report for 200 ms ------> Unheard ---- a report; a turn that was under way is judged --->
+//!   goods, a joint elsewhere --> Arm -------- all joints are where they are carried ---------->
+//!   low for a while, a node ---> Battery ---- charged for a while, or a person's reset ------->
+//!   no line frame for 120 ms --> Blind ------ a line frame ----------------------------------->
+//! ```
+//!
+//! It is apart from the phases because any of them can be held, and goes on where it was. A hold
+//! never begins in the middle of anything but a lost report or frame: the others wait until the
+//! robot stands anyway, or is at a node.
+
+use core::time::Duration;
+
+use lager_topics::{Joint, SERVO_UNKNOWN, Thought, ThoughtKind};
+
+use crate::arm::ArmSeen;
+use crate::config::LogicConfig;
+use crate::output::Output;
+
+/// What keeps the robot standing, but for the battery, which is the mission's.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Holding {
+    /// When the steering board last reported; before its first report, when it was first missed.
+    heard: Option<Duration>,
+    /// No report for too long: stand until one comes.
+    pub(crate) unheard: bool,
+    /// No line frame for too long: stand until one comes.
+    pub(crate) blind: bool,
+    /// The joint that keeps the robot from driving with goods.
+    pub(crate) joint_off: Option<Joint>,
+}
+
+impl Holding {
+    /// The robot stands anyway, and what it is about to do is another matter.
+    pub(crate) fn forget(&mut self) {
+        self.blind = false;
+        self.joint_off = None;
+    }
+
+    /// Stands when the steering board has not reported for too long: every limit counts the
+    /// odometer's mm, and that stands still then. Whether that begins now.
+    pub(crate) fn watch_board(&mut self, now: Duration, config: &LogicConfig) -> bool {
+        let heard = *self.heard.get_or_insert(now);
+        if self.unheard || now.saturating_sub(heard) <= config.unheard_board {
+            return false;
+        }
+        self.unheard = true;
+        true
+    }
+
+    /// The steering board has reported just now. Whether it was unheard before.
+    pub(crate) fn hear_board(&mut self, now: Duration) -> bool {
+        self.heard = Some(now);
+        core::mem::take(&mut self.unheard)
+    }
+
+    /// Lets the wheels turn with goods only when the arm is where it is carried. To be asked
+    /// whenever the robot stands.
+    pub(crate) fn watch_arm(&mut self, arm: &ArmSeen, config: &LogicConfig, out: &mut Output) {
+        let off = arm.joint_off(config.arm.carry, config.carry_tolerance);
+        let before = core::mem::replace(&mut self.joint_off, off.map(|(joint, ..)| joint));
+        match off {
+            Some((joint, ..)) if before == Some(joint) => {}
+            Some((joint, SERVO_UNKNOWN, _)) => out.think(Thought {
+                joint: joint.into(),
+                ..ThoughtKind::JointUnheard.into()
+            }),
+            Some((joint, found, wanted)) => out.think(Thought {
+                joint: joint.into(),
+                expected: wanted.into(),
+                seen: found.into(),
+                ..ThoughtKind::JointOff.into()
+            }),
+            None if before.is_some() => out.think(ThoughtKind::ArmCarried),
+            None => {}
+        }
+    }
+}

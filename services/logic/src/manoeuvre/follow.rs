@@ -1,0 +1,351 @@
+//! Following a line until something comes: the node at its end, a pick station's mark, the cross
+//! bar of the delivery, or the corner on the way back from there.
+//!
+//! The sensors run ahead of the axle, so a drive to a node has two steps:
+//!
+//! ```text
+//!        axle        sensors
+//!   A -----o------------|---------------- B        Seeking: looking for B's mark
+//!   A --------------------------o---------|-- B'   ToNode: the mark is behind the sensors,
+//!                                                  the axle still has the rest to go
+//! ```
+//!
+//! Each judged mark sets the odometer anew: the sensors have just left the tape's far edge. What
+//! the floor promises is looked up once, when the drive begins.
+
+use core::time::Duration;
+
+use lager_topics::{FailureKind, Step, Thought, ThoughtKind};
+use lager_wire::{Command, LineState, WheelCommand};
+
+use super::helm::{Helm, Senses};
+use super::outcome::Outcome;
+use crate::config::LogicConfig;
+use crate::judge::{Edge, Verdict, judge};
+use crate::marks::{Mark, Sides};
+
+/// A pause between line frames in which no mark passes unseen: the sensors take about 200 ms to
+/// cross one.
+const LONGEST_GAP: Duration = Duration::from_millis(100);
+
+/// Frames in a row without the line after which it has ended behind the cross bar.
+const ENDED: u8 = 3;
+
+/// What ends the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Until {
+    /// The node at the end of the edge.
+    Node,
+    /// The mark of the goods' station; failing that, the node.
+    Station,
+    /// The cross bar at the end of the way out.
+    Bar,
+    /// The delivery corner, on the way back.
+    Corner,
+}
+
+/// What the floor promises on the way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Ahead {
+    /// The edge; none on the way out, whose length nobody knows.
+    pub(crate) edge: Option<Edge>,
+    /// Tape goes straight on at its end.
+    pub(crate) goes_on: bool,
+    /// On which side the goods of the order stand.
+    pub(crate) goods: Sides,
+}
+
+/// A drive along a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Follow {
+    pub(crate) until: Until,
+    pub(crate) step: Step,
+    ahead: Ahead,
+    /// Where the line went out of sight, in the odometer's mm.
+    lost_at: Option<f32>,
+    /// When the last line frame came, if they have come all along since this navigator began the
+    /// drive: no mark has passed unseen then.
+    watched: Option<Duration>,
+    /// Frames in a row without the line, behind the cross bar.
+    bare: u8,
+}
+
+impl Follow {
+    /// A drive from where the robot stands, or in the middle of one that a predecessor began.
+    pub(crate) fn new(until: Until, ahead: Ahead) -> Self {
+        Self {
+            until,
+            step: Step::Seeking,
+            ahead,
+            lost_at: None,
+            watched: None,
+            bare: 0,
+        }
+    }
+
+    /// Begins on a line on which the robot stands somewhere. A node that is too near for its mark
+    /// to be relied on is driven to by dead reckoning, corrected by the mark if it comes.
+    pub(crate) fn begin(&mut self, helm: &mut Helm<'_>) {
+        let sensors_at = helm.senses.odometer.travelled_mm + helm.config.sensor_ahead_mm;
+        let is_near = |edge: Edge| edge.length_mm - sensors_at < helm.config.run_up_mm;
+        if self.until != Until::Bar && self.ahead.edge.is_some_and(is_near) {
+            self.step = Step::NearNode;
+        }
+        helm.senses.marks.clear();
+        self.watched = Some(helm.now);
+    }
+
+    /// The floor is known, or known anew, in the middle of the drive.
+    pub(crate) fn look_ahead(&mut self, ahead: Ahead) {
+        self.ahead = ahead;
+    }
+
+    /// What the map promises on the line while the next mark is looked for; none once it is found.
+    pub(crate) fn sought(&self) -> Option<&Edge> {
+        self.ahead
+            .edge
+            .as_ref()
+            .filter(|_| self.step == Step::Seeking && self.until != Until::Bar)
+    }
+
+    /// The command the drive needs now.
+    pub(crate) fn wanted(&self, senses: &Senses, config: &LogicConfig) -> Command {
+        Command::Wheel(match self.is_past_the_line(senses, config) {
+            true => WheelCommand::ManualForward,
+            false => WheelCommand::ActiveForward,
+        })
+    }
+
+    /// Whether the sensors are beyond the node ahead, and no tape goes straight on there.
+    fn is_past_the_line(&self, senses: &Senses, config: &LogicConfig) -> bool {
+        let Some(edge) = &self.ahead.edge else {
+            return false;
+        };
+        matches!(self.step, Step::ToNode | Step::NearNode)
+            && !self.ahead.goes_on
+            && senses.odometer.travelled_mm + config.sensor_ahead_mm >= edge.length_mm
+    }
+
+    /// Takes a line frame, and the mark that ended with it.
+    pub(crate) fn see(
+        &mut self,
+        state: LineState,
+        mark: Option<Mark>,
+        helm: &mut Helm<'_>,
+    ) -> Option<Outcome> {
+        let goes_on = |seen: &Duration| helm.now.saturating_sub(*seen) <= LONGEST_GAP;
+        self.watched = self.watched.filter(goes_on).map(|_| helm.now);
+        let outcome = match (self.until, self.step, mark) {
+            (Until::Bar, ..) => self.look_for_cross_bar(mark, state, helm),
+            (_, Step::Seeking, Some(mark)) => {
+                self.judge_mark(mark, helm);
+                None
+            }
+            (_, Step::NearNode, Some(mark)) => {
+                self.correct_by_node(mark, helm);
+                None
+            }
+            _ => None,
+        };
+        outcome.or_else(|| self.watch_line(state, helm))
+    }
+
+    /// Takes a distance: what stands before the next node, or on it, blocks the way; what stands
+    /// behind it is looked at from there. The way out is not looked at: there is no other one, and
+    /// delivered goods lie at its end.
+    pub(crate) fn range(&self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
+        let between_nodes = matches!(self.until, Until::Node | Until::Station);
+        let edge = self.ahead.edge.filter(|_| between_nodes)?;
+        let (config, senses) = (helm.config, &helm.senses);
+        let ranger_at = senses.odometer.travelled_mm + config.ranger_ahead_mm;
+        let at_mm = ranger_at + f32::from(centimetres) * 10.0;
+        let is_ahead = at_mm < edge.length_mm + config.beyond_node_mm;
+        if config.ranger_cm == 0 || centimetres >= config.halt_cm || !is_ahead || !helm.active {
+            return None;
+        }
+        helm.out.think(Thought {
+            seen: centimetres.into(),
+            ..ThoughtKind::Halts.into()
+        });
+        Some(Outcome::Blocked)
+    }
+
+    fn judge_mark(&mut self, mark: Mark, helm: &mut Helm<'_>) {
+        let Some(edge) = self.ahead.edge else { return };
+        let (config, senses) = (helm.config, &mut *helm.senses);
+        let at_mm = senses.mark_at(config);
+        let tolerance = match core::mem::take(&mut senses.mark_cut_short) {
+            true => config.tolerance_cut_short,
+            false => config.tolerance,
+        };
+        match judge(&edge, mark.sides, at_mm, tolerance) {
+            Verdict::Node => {
+                if self.until == Until::Corner {
+                    // What the robot has measured itself teaches nothing of its wheels.
+                    senses.odometer.forget_way();
+                }
+                senses.set_by_mark(edge.length_mm, config);
+                self.lost_at = None;
+                self.step = Step::ToNode;
+            }
+            Verdict::Station => {
+                senses.set_by_mark(edge.length_mm / 2.0, config);
+                self.lost_at = None;
+                if self.until == Until::Station && mark.sides.meets(self.ahead.goods) {
+                    self.step = Step::ToStation;
+                    helm.out.think(ThoughtKind::StationSeen);
+                }
+            }
+            Verdict::Unexpected => helm.out.think(Thought {
+                sides: mark.sides.to_bits(),
+                seen: at_mm.round() as i32,
+                ..ThoughtKind::MarkUnexpected.into()
+            }),
+        }
+    }
+
+    /// A mark seen from close by: the node's, if it is anywhere near its place.
+    fn correct_by_node(&mut self, mark: Mark, helm: &mut Helm<'_>) {
+        let Some(edge) = self.ahead.edge else { return };
+        let off_mm = (helm.senses.mark_at(helm.config) - edge.length_mm).abs();
+        if mark.sides.meets(edge.crossing) && off_mm < helm.config.run_up_mm {
+            helm.senses.set_by_mark(edge.length_mm, helm.config);
+            self.lost_at = None;
+            self.step = Step::ToNode;
+        }
+    }
+
+    /// The cross bar at the end of the way out is the place of delivery (E4, AMB-18).
+    ///
+    /// Left at an angle the bar can look like a line for some frames more, so the end of the line
+    /// is waited for.
+    fn look_for_cross_bar(
+        &mut self,
+        mark: Option<Mark>,
+        state: LineState,
+        helm: &mut Helm<'_>,
+    ) -> Option<Outcome> {
+        let mark_at = helm.senses.mark_at(helm.config);
+        match mark {
+            Some(mark) if mark.sides == Sides::BOTH => {
+                helm.senses.exit_mm = mark_at;
+                self.step = Step::AtBar;
+            }
+            Some(mark) => helm.out.think(Thought {
+                sides: mark.sides.to_bits(),
+                ..ThoughtKind::MarkOnWayOut.into()
+            }),
+            None => {}
+        }
+        if self.step != Step::AtBar {
+            return None;
+        }
+        // A few frames may be noise, and goods let go of before the bar are not delivered. Those
+        // that made the mark do not say as well that the line has ended.
+        self.bare = match is_no_line(state) {
+            true => self.bare.saturating_add(1),
+            false => 0,
+        };
+        if self.bare >= ENDED {
+            return Some(Outcome::Done);
+        }
+        if mark_at > helm.senses.exit_mm + helm.config.bar_end_mm {
+            self.step = Step::Seeking;
+            helm.out.think(ThoughtKind::CrossingOnWayOut);
+        }
+        None
+    }
+
+    /// Notes where the line went out of sight and gives up when it stays away.
+    fn watch_line(&mut self, state: LineState, helm: &mut Helm<'_>) -> Option<Outcome> {
+        if !is_no_line(state) || self.is_past_the_line(helm.senses, helm.config) {
+            self.lost_at = None;
+            return None;
+        }
+        if self.is_at_unseen_node(state, helm.senses, helm.config) {
+            self.step = Step::NearNode;
+            return None;
+        }
+        let travelled = helm.senses.odometer.travelled_mm;
+        let without = travelled - *self.lost_at.get_or_insert(travelled);
+        let most = helm.config.line_lost_mm;
+        (without > most).then_some(Outcome::Failed(FailureKind::LineLost, most, without))
+    }
+
+    /// Whether the line has ended at the node where it should, and the node's mark may have passed
+    /// while nobody looked.
+    fn is_at_unseen_node(&self, state: LineState, senses: &Senses, config: &LogicConfig) -> bool {
+        let may_be_unseen = self.watched.is_none() && !self.ahead.goes_on;
+        let Some(edge) = self.sought().filter(|_| may_be_unseen) else {
+            return false;
+        };
+        let off_mm = (senses.mark_at(config) - edge.length_mm).abs();
+        senses.sure_sight == Some(state) && off_mm <= edge.length_mm * config.tolerance_cut_short
+    }
+
+    /// Goes on along the line as far as the odometer says.
+    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+        let (config, senses) = (helm.config, &mut *helm.senses);
+        let travelled = senses.odometer.travelled_mm;
+        if self.until == Until::Bar {
+            let longest = config.longest_exit_mm;
+            return (travelled > longest).then_some(Outcome::Failed(
+                FailureKind::BarMissing,
+                longest,
+                travelled,
+            ));
+        }
+        let length_mm = self.ahead.edge?.length_mm;
+        match self.step {
+            Step::ToNode | Step::NearNode if travelled >= length_mm - config.coast_mm => {
+                senses.odometer.travelled_mm -= length_mm;
+                return Some(match self.until {
+                    Until::Station => Outcome::Missed,
+                    _ => Outcome::Done,
+                });
+            }
+            Step::ToStation if travelled >= length_mm / 2.0 - config.coast_mm => {
+                return Some(Outcome::Done);
+            }
+            Step::Seeking
+                if self.until == Until::Corner
+                    && self.is_behind_unseen_corner(length_mm, senses, config) =>
+            {
+                self.step = Step::NearNode;
+            }
+            Step::Seeking if senses.mark_at(config) > length_mm * config.overdue => {
+                let seen = senses.mark_at(config);
+                return Some(Outcome::Failed(FailureKind::NodeMissing, length_mm, seen));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Whether the corner's mark, on the way back, must have passed without being seen.
+    ///
+    /// What was measured on the way out is worth less than the mark: wheels that differ are faster
+    /// round a bend to one side than to the other, and the way back is up to a quarter longer. The
+    /// sensors are that far behind the corner before the axle has come to it only on a short way;
+    /// there the robot may still be beside its line after the turn, and pass beside the mark. Where
+    /// the mark may have passed while nobody looked, what was measured counts at once.
+    fn is_behind_unseen_corner(
+        &self,
+        length_mm: f32,
+        senses: &Senses,
+        config: &LogicConfig,
+    ) -> bool {
+        let late_mm = senses.mark_at(config) - length_mm;
+        match self.watched {
+            None => late_mm > config.tape_mm,
+            Some(_) => {
+                let before_axle = senses.odometer.travelled_mm < length_mm - config.coast_mm;
+                before_axle && late_mm > length_mm * config.tolerance
+            }
+        }
+    }
+}
+
+fn is_no_line(state: LineState) -> bool {
+    matches!(state, LineState::NotOnLine | LineState::DropStation)
+}

@@ -1,0 +1,99 @@
+//! What every manoeuvre works with: what the robot senses of the floor and of itself, and the ways to
+//! say something.
+
+use core::time::Duration;
+
+use lager_topics::Heading;
+use lager_wire::{Command, LineState, WheelCommand};
+
+use crate::arm::ArmSeen;
+use crate::command::Standing;
+use crate::config::LogicConfig;
+use crate::marks::MarkReader;
+use crate::odometer::Odometer;
+use crate::output::Output;
+
+/// Standing still.
+pub(crate) const STANDBY: Command = Command::Wheel(WheelCommand::Standby);
+
+/// What the robot has sensed of the floor and of itself.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Senses {
+    pub(crate) odometer: Odometer,
+    pub(crate) marks: MarkReader,
+    /// The mark under the sensors was begun by a predecessor: perhaps one frame of noise.
+    pub(crate) mark_cut_short: bool,
+    /// The line state last seen, and when.
+    pub(crate) sight: Option<(Duration, LineState)>,
+    /// The line state that two frames in a row have shown, which one frame of noise cannot be.
+    pub(crate) sure_sight: Option<LineState>,
+    /// From the delivery corner to the cross bar, as measured on the way out; 0 = never driven.
+    pub(crate) exit_mm: f32,
+    pub(crate) arm: ArmSeen,
+    /// What is in front, in cm, and when that was heard.
+    pub(crate) distance: Option<(Duration, u8)>,
+    /// When the robot last turned.
+    pub(crate) turned_at: Duration,
+}
+
+impl Senses {
+    /// Takes a line frame.
+    pub(crate) fn see(&mut self, now: Duration, state: LineState) {
+        let before = self.sight.replace((now, state)).map(|(_, before)| before);
+        if before == Some(state) {
+            self.sure_sight = before;
+        }
+    }
+
+    /// Where the middle of a tape is that the sensors have just left, in mm from the last node.
+    pub(crate) fn mark_at(&self, config: &LogicConfig) -> f32 {
+        self.odometer.travelled_mm + config.sensor_ahead_mm - config.tape_mm / 2.0
+    }
+
+    /// Sets the odometer by a tape whose middle is known to be at `at_mm`.
+    pub(crate) fn set_by_mark(&mut self, at_mm: f32, config: &LogicConfig) {
+        let missing_mm = at_mm - self.mark_at(config);
+        self.odometer.correct(missing_mm);
+    }
+}
+
+/// A standstill before what runs once is judged or begun.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Pause {
+    /// None: the robot does what it is about.
+    #[default]
+    None,
+    /// It is to begin.
+    Wanted,
+    /// It ends then.
+    Until(Duration),
+}
+
+impl Pause {
+    /// Goes on; whether it has ended now, which it does only where the robot may drive.
+    pub(crate) fn is_over(&mut self, now: Duration, settle: Duration, active: bool) -> bool {
+        match *self {
+            Self::Wanted => *self = Self::Until(now + settle),
+            Self::Until(end) if now >= end && active => {
+                *self = Self::None;
+                return true;
+            }
+            _ => {}
+        }
+        false
+    }
+}
+
+/// What a manoeuvre may read and change while it decides on one input.
+pub(crate) struct Helm<'a> {
+    pub(crate) now: Duration,
+    pub(crate) config: &'a LogicConfig,
+    /// The navigator may drive, and the steering board is heard.
+    pub(crate) active: bool,
+    pub(crate) senses: &'a mut Senses,
+    /// Where the robot looks.
+    pub(crate) heading: &'a mut Heading,
+    /// The order in force.
+    pub(crate) order: &'a mut Standing,
+    pub(crate) out: &'a mut Output,
+}

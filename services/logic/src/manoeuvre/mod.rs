@@ -1,0 +1,354 @@
+//! What the robot is doing: one manoeuvre at a time, each with its own state, that ends in an
+//! [`Outcome`].
+//!
+//! ```text
+//!             begin             a frame, a report, time
+//!   mission ---------> manoeuvre ----------------------> Outcome ---> mission
+//!                          |
+//!                          +---> the command it needs now
+//! ```
+//!
+//! A manoeuvre knows the line, its marks and the odometer. It never knows what it is good for: that
+//! is the mission's. A new one is a variant here, with its arms, and a place where the mission
+//! begins it.
+
+mod arm;
+mod follow;
+mod helm;
+mod look;
+mod outcome;
+mod turn;
+
+use core::time::Duration;
+
+use lager_topics::{FailureKind, Finish, Heading, NavigatorStatus, Step};
+use lager_wire::{Command, LineState, WheelCommand};
+
+pub(crate) use arm::{ArmSequence, Task};
+pub(crate) use follow::{Ahead, Follow, Until};
+pub(crate) use helm::{Helm, STANDBY, Senses};
+pub(crate) use look::Look;
+pub(crate) use outcome::Outcome;
+pub(crate) use turn::{Spot, Turn};
+
+use crate::config::LogicConfig;
+use crate::heading::{Compass, Spin};
+use crate::marks::Mark;
+use helm::Pause;
+
+/// How old a distance may be that tells whether there is room to turn.
+const IN_SIGHT: Duration = Duration::from_millis(500);
+
+/// What the robot is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Manoeuvre {
+    /// It stands.
+    Stand,
+    /// It stands and looks whether the way ahead is open.
+    Look(Look),
+    /// It follows a line.
+    Follow(Follow),
+    /// It turns on the spot.
+    Turn(Turn),
+    /// It backs away from the cross bar, far enough to turn round.
+    BackUp,
+    /// It backs up until the odometer reads so many mm: to the node that it has just left, as a turn
+    /// so near to it would end on the tape that crosses there; or away from what stands so close
+    /// behind the node that a corner of the body would touch it in the turn.
+    Retreat(f32),
+    /// It moves the arm.
+    Arm(ArmSequence),
+    /// It looks for the short mark of a station that a disturbed turn may have missed.
+    Search(Search),
+}
+
+/// Turns towards the mark, as far as dead reckoning knows where that is, and on until tape is in
+/// sight. If that is the edge's own, it turns back from there; on the edge's tape once more, it has
+/// missed the mark, and ends looking along the edge.
+///
+/// The sensors may reach no more than the mark's end, and come to rest beside it. So a turn that
+/// begins and ends near where the mark must be has met it: only tape ends a turn so early.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Search {
+    /// Which way it turns; none before the first turn.
+    spin: Option<Spin>,
+    /// It has begun a turn on the edge's tape.
+    from_edge: bool,
+    /// It has begun the turn at hand near where the mark must be.
+    from_beside: bool,
+    /// How often it has turned.
+    turns: u8,
+    pause: Pause,
+}
+
+impl Search {
+    /// How far from the mark tape is that of the edge, in degrees.
+    const BESIDE_DEG: f32 = 45.0;
+    /// How often it turns before it gives up.
+    const TURNS: u8 = 8;
+
+    /// One that begins when the robot has come to rest.
+    pub(crate) const NEW: Self = Self {
+        spin: None,
+        from_edge: false,
+        from_beside: false,
+        turns: 0,
+        pause: Pause::Wanted,
+    };
+
+    /// As a predecessor left it, with `ordered` in force.
+    fn restore(&mut self, turns: u8, ordered: Command) {
+        self.turns = turns;
+        // After that many it has met the edge's tape, or will on its way from there.
+        self.from_edge = turns > 1;
+        self.spin = match ordered {
+            Command::Wheel(WheelCommand::LeftPerp) => Some(Spin::Left),
+            Command::Wheel(WheelCommand::RightPerp) => Some(Spin::Right),
+            _ => return,
+        };
+        self.pause = Pause::None;
+    }
+
+    fn wanted(&self) -> Command {
+        Command::Wheel(match self.spin {
+            Some(Spin::Left) if self.pause == Pause::None => WheelCommand::LeftPerp,
+            Some(Spin::Right) if self.pause == Pause::None => WheelCommand::RightPerp,
+            _ => WheelCommand::Standby,
+        })
+    }
+
+    /// The order for a turn has ended: the robot stands before it looks.
+    fn ended(&mut self, finish: Finish, helm: &Helm<'_>) -> Option<Outcome> {
+        if finish == Finish::None {
+            return None;
+        }
+        self.pause = Pause::Wanted;
+        let is_beside = helm.senses.odometer.turned_deg.abs() <= Self::BESIDE_DEG;
+        (finish == Finish::Done && self.from_beside && is_beside).then_some(Outcome::Done)
+    }
+
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+        let settle = helm.config.settle;
+        if !self.pause.is_over(helm.now, settle, helm.active) {
+            return None;
+        }
+        let off_deg = helm.senses.odometer.turned_deg;
+        let is_tape = |seen| !matches!(seen, LineState::NotOnLine | LineState::DropStation);
+        let sees_tape = helm.senses.sure_sight.is_some_and(is_tape);
+        let is_beside = off_deg.abs() <= Self::BESIDE_DEG;
+        if sees_tape && is_beside {
+            return Some(Outcome::Done);
+        }
+        let (beside, back) = match off_deg > 0.0 {
+            true => (Spin::Right, Spin::Left),
+            false => (Spin::Left, Spin::Right),
+        };
+        if sees_tape && self.from_edge {
+            *helm.heading = helm.heading.turned(beside, 1);
+            return Some(Outcome::Missed);
+        }
+        if self.turns == Self::TURNS {
+            let turns = f32::from(self.turns);
+            return Some(Outcome::Failed(FailureKind::MarkUnseen, turns, turns));
+        }
+        self.turns += 1;
+        self.from_edge |= sees_tape;
+        self.from_beside = is_beside;
+        self.spin = match sees_tape {
+            true => Some(back),
+            false => self.spin.or(Some(back)),
+        };
+        helm.order.give_anew();
+        None
+    }
+}
+
+impl Manoeuvre {
+    /// Begins it where the robot is.
+    pub(crate) fn begin(&mut self, helm: &mut Helm<'_>) {
+        if let Self::Turn(turn) = self {
+            let travelled_mm = helm.senses.odometer.travelled_mm;
+            let room_mm = helm.config.turn_room_mm;
+            if matches!(turn.spot, Spot::Along(_)) && travelled_mm < helm.config.nearest_turn_mm() {
+                *self = Self::Retreat(helm.config.coast_mm);
+            } else if turn.spot == Spot::Node && travelled_mm > -room_mm && is_close(helm) {
+                *self = Self::Retreat(-room_mm);
+            }
+        }
+        match self {
+            Self::Stand => helm.senses.marks.clear(),
+            Self::Follow(follow) => follow.begin(helm),
+            Self::Turn(turn) => turn.begin(helm),
+            Self::BackUp | Self::Retreat(_) | Self::Arm(_) | Self::Look(_) | Self::Search(_) => {}
+        }
+    }
+
+    /// The command it needs now.
+    pub(crate) fn wanted(
+        &self,
+        senses: &Senses,
+        heading: Heading,
+        config: &LogicConfig,
+    ) -> Command {
+        match self {
+            Self::Stand | Self::Look(_) => STANDBY,
+            Self::Follow(follow) => follow.wanted(senses, config),
+            Self::Turn(turn) => turn.wanted(heading),
+            Self::BackUp | Self::Retreat(_) => Command::Wheel(WheelCommand::ManualBackward),
+            Self::Arm(arm) => arm.wanted(),
+            Self::Search(search) => search.wanted(),
+        }
+    }
+
+    /// Takes a line frame, and the mark that ended with it.
+    pub(crate) fn see(
+        &mut self,
+        state: LineState,
+        mark: Option<Mark>,
+        helm: &mut Helm<'_>,
+    ) -> Option<Outcome> {
+        match self {
+            Self::Follow(follow) => follow.see(state, mark, helm),
+            _ => None,
+        }
+    }
+
+    /// An order that runs once has ended.
+    pub(crate) fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
+        match self {
+            Self::Turn(turn) => turn.ended(finish, helm),
+            Self::Arm(arm) => arm.ended(finish),
+            Self::Search(search) => search.ended(finish, helm),
+            Self::Stand | Self::Look(_) | Self::Follow(_) | Self::BackUp | Self::Retreat(_) => None,
+        }
+    }
+
+    /// Goes on where time and the odometer allow it.
+    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+        match self {
+            Self::Stand => None,
+            Self::Look(look) => look.go_on(helm),
+            Self::Follow(follow) => follow.go_on(helm),
+            Self::Turn(turn) => turn.go_on(helm),
+            Self::BackUp => {
+                let at = turning_place(helm.senses, helm.config);
+                (helm.senses.odometer.travelled_mm <= at).then_some(Outcome::Done)
+            }
+            Self::Retreat(to_mm) => {
+                let travelled = helm.senses.odometer.travelled_mm;
+                (travelled <= *to_mm).then_some(Outcome::Done)
+            }
+            Self::Arm(arm) => arm.go_on(helm),
+            Self::Search(search) => search.go_on(helm),
+        }
+    }
+
+    /// Takes a distance: something may stand on the way.
+    pub(crate) fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
+        match self {
+            Self::Follow(follow) => follow.range(centimetres, helm),
+            _ => None,
+        }
+    }
+
+    /// The line it follows, if it does.
+    pub(crate) fn line(&self) -> Option<&Follow> {
+        match self {
+            Self::Follow(follow) => Some(follow),
+            _ => None,
+        }
+    }
+
+    /// The step within it, as it is published.
+    pub(crate) fn step(&self) -> Step {
+        self.line().map_or(Step::Seeking, |follow| follow.step)
+    }
+
+    /// Whether it is there to turn the wheels.
+    pub(crate) fn turns_wheels(&self) -> bool {
+        !matches!(self, Self::Stand | Self::Look(_) | Self::Arm(_))
+    }
+
+    /// Has it stand for a moment and judge how far it has come, if it is one that runs once.
+    pub(crate) fn interrupt(&mut self) {
+        match self {
+            Self::Turn(turn) => turn.pause = Pause::Wanted,
+            Self::Arm(arm) => arm.interrupt(),
+            Self::Search(search) => search.pause = Pause::Wanted,
+            _ => {}
+        }
+    }
+
+    /// The board was not heard and is heard again: a turn may have come to its end, or to none.
+    pub(crate) fn hear_again(&mut self) {
+        match self {
+            Self::Turn(turn) => (turn.pause, turn.tries) = (Pause::Wanted, 0),
+            Self::Search(search) => search.pause = Pause::Wanted,
+            _ => {}
+        }
+    }
+
+    /// As a predecessor left it, by what it published of it; `ordered` was in force.
+    pub(crate) fn restore(
+        &mut self,
+        step: Step,
+        status: &NavigatorStatus,
+        ordered: Command,
+        config: &LogicConfig,
+    ) {
+        match self {
+            Self::Follow(follow) => follow.step = step,
+            Self::Turn(turn) if ordered == Command::Wheel(WheelCommand::ManualBackward) => {
+                *self = Self::Retreat(match turn.spot {
+                    Spot::Node => -config.turn_room_mm,
+                    Spot::Edge(_) | Spot::Along(_) => config.coast_mm,
+                });
+            }
+            Self::Turn(turn) => {
+                turn.tries = status.tries;
+                turn.disturbed = status.doubt & 1 != 0;
+            }
+            Self::Arm(arm) => {
+                arm.restore(status.arm_attempt, status.arm_moves, status.tries, ordered);
+            }
+            Self::Search(search) => search.restore(status.tries, ordered),
+            Self::Stand | Self::Look(_) | Self::BackUp | Self::Retreat(_) => {}
+        }
+    }
+
+    /// Writes into a status what a successor needs of it.
+    pub(crate) fn fill(&self, status: &mut NavigatorStatus) {
+        match self {
+            Self::Follow(follow) => status.step = follow.step.into(),
+            Self::Turn(turn) => {
+                status.tries = turn.tries;
+                status.doubt = turn.disturbed.into();
+            }
+            Self::Arm(arm) => {
+                status.tries = arm.tries;
+                (status.arm_attempt, status.arm_moves) = (arm.attempt, arm.moves);
+            }
+            Self::Search(search) => status.tries = search.turns,
+            Self::Stand | Self::Look(_) | Self::BackUp | Self::Retreat(_) => {}
+        }
+    }
+}
+
+/// Whether something stands so close ahead that a corner of the body would touch it in a turn.
+fn is_close(helm: &Helm<'_>) -> bool {
+    let Helm { senses, config, .. } = helm;
+    let has_seen = |(seen_at, cm): (Duration, u8)| {
+        seen_at > senses.turned_at
+            && helm.now.saturating_sub(seen_at) <= IN_SIGHT
+            && cm <= config.turn_room_cm
+    };
+    config.ranger_cm > 0 && senses.distance.is_some_and(has_seen)
+}
+
+/// Where the axle stands to turn round on the way out, in mm from the corner: far enough from the
+/// cross bar and, on a short way out, from the corner, because a turn ends on the first tape that
+/// comes under the sensors.
+fn turning_place(senses: &Senses, config: &LogicConfig) -> f32 {
+    let reach = config.sensor_ahead_mm + config.tape_mm;
+    (senses.exit_mm - config.sensor_ahead_mm - config.back_off_mm).max(reach)
+}

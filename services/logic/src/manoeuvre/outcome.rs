@@ -1,0 +1,19 @@
+//! What a manoeuvre has come to: all that the mission hears of it.
+
+use lager_topics::FailureKind;
+
+/// How a manoeuvre has ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Outcome {
+    /// As it should.
+    Done,
+    /// As it should, as far as anybody can tell: it was cut short, or nobody heard the board.
+    Interrupted,
+    /// The station's mark did not come: the robot is at the node behind it, or has turned to the
+    /// station and sees no tape.
+    Missed,
+    /// Something stands on the way ahead.
+    Blocked,
+    /// It cannot go on: what, what was expected, and what was seen.
+    Failed(FailureKind, f32, f32),
+}

@@ -1,0 +1,516 @@
+//! What to do next: orders, the goal, the decision at each node, and what becomes of a failure.
+//!
+//! ```text
+//!                       map                order
+//!   WaitingForMap ----------> WaitingForOrder ----> Turning <----> Driving
+//!                                   ^                  |   at each node (L6)
+//!                                   |                  v
+//!      Returning <- TurningRound    |             Approaching -> Positioning -> Picking
+//!          |            ^           |                                              | picked (L7)
+//!          |        BackingOff      |                Turning/Driving <-- Leaving <-+
+//!          |            ^           |                       |
+//!          +--> corner -|-----------+                       v  at the delivery corner (L8)
+//!                    Dropping <--------------------------- Exiting
+//!
+//!   at a node, before Driving or Approaching: Looking, whether the way is open (L6)
+//!   Driving, Approaching -> Halted -> TurningBack -> Driving: something stands between the nodes
+//!   any -> Stuck: lost line, missing node, moved by hand (AMB-49); only a reset leads out
+//!   a restart with no state to take up -> Lost; only a reset leads out
+//! ```
+//!
+//! Each phase has its manoeuvre ([`Mission::manoeuvre`]), and the manoeuvre's [`Outcome`] leads to
+//! the next phase ([`Mission::next`]). The mission knows nothing of lines, marks or the odometer.
+
+mod orders;
+mod ways;
+
+use core::time::Duration;
+
+use lager_topics::{
+    EventKind, Failure, FailureKind, Goal, Heading, Order, Phase, Route, Thought, ThoughtKind,
+    WarehouseMap,
+};
+
+use crate::battery::Battery;
+use crate::blocks::Blocks;
+use crate::config::{LogicConfig, Pick};
+use crate::heading::{Compass, Spin};
+use crate::judge::Edge;
+use crate::manoeuvre::{
+    Ahead, ArmSequence, Follow, Look, Manoeuvre, Outcome, Search, Spot, Task, Turn, Until,
+};
+use crate::map::{Map, Station};
+use crate::marks::Sides;
+use crate::node::Node;
+use crate::output::Output;
+use crate::place::Place;
+use crate::queue::Queue;
+use crate::route::Distances;
+
+/// What is large: allocated once, when the navigator is made.
+#[derive(Clone, Debug, Default)]
+struct Tables {
+    blocks: Blocks,
+    distances: Distances,
+}
+
+/// What the robot is for at the moment, and where it is.
+#[derive(Clone, Debug)]
+pub(crate) struct Mission {
+    config: LogicConfig,
+    pub(crate) now: Duration,
+    pub(crate) map: Option<Map>,
+    /// Squares of the floor that a predecessor's blocks are of.
+    blocked_floor: [u8; 2],
+    /// What was published last, and is known or was refused.
+    published: WarehouseMap,
+    tables: Box<Tables>,
+    pub(crate) place: Place,
+    pub(crate) phase: Phase,
+    /// Where it turns to; where it looks while it does not turn.
+    pub(crate) target: Heading,
+    pub(crate) goal: Goal,
+    /// The order it is on; after the delivery still the last one.
+    pub(crate) order: Order,
+    /// The orders that wait.
+    pub(crate) queue: Queue,
+    /// Blocks and queue, by their revisions, with which no waiting order could be begun.
+    none_reachable: Option<(u32, u32)>,
+    pub(crate) delivered: u32,
+    pub(crate) misses: u8,
+    /// How often the ways that were found blocked have been tried again for the goal.
+    tries: u8,
+    /// The operator was believed although the claw does not feel the goods.
+    pub(crate) forced: bool,
+    pub(crate) battery: Battery,
+    /// It stands at the node because the battery is low.
+    pub(crate) parked: bool,
+    /// Why it cannot go on.
+    pub(crate) failure: Failure,
+    pub(crate) route: Route,
+}
+
+impl Mission {
+    /// A mission that waits for its map.
+    pub(crate) fn new(config: LogicConfig) -> Self {
+        let place = Place::default();
+        Self {
+            config,
+            now: Duration::ZERO,
+            map: None,
+            blocked_floor: [0; 2],
+            published: WarehouseMap::default(),
+            tables: Box::default(),
+            target: place.heading,
+            place,
+            phase: Phase::WaitingForMap,
+            goal: Goal::None,
+            order: Order::default(),
+            queue: Queue::default(),
+            none_reachable: None,
+            delivered: 0,
+            misses: 0,
+            tries: 0,
+            forced: false,
+            battery: Battery::default(),
+            parked: false,
+            failure: Failure::default(),
+            route: Route::default(),
+        }
+    }
+
+    /// Nobody kept where the robot is.
+    pub(crate) fn lose_place(&mut self) {
+        self.phase = Phase::Lost;
+        self.failure = self.failure_here(FailureKind::StateLost, 0, 0);
+    }
+
+    /// Whether the robot is anywhere in particular.
+    pub(crate) fn has_a_place(&self) -> bool {
+        self.phase != Phase::WaitingForMap && !self.phase.needs_reset()
+    }
+
+    /// The manoeuvre of the phase, not begun yet. `exit_mm` is the length of the way out.
+    pub(crate) fn manoeuvre(&self, exit_mm: f32) -> Manoeuvre {
+        let turn = |spot| Manoeuvre::Turn(Turn::to(self.target, spot, self.half_turn()));
+        let follow = |until| Manoeuvre::Follow(Follow::new(until, self.ahead(until, exit_mm)));
+        let side_mm = self.map.as_ref().map_or(0.0, Map::side_mm);
+        let middle = Spot::Edge(side_mm / 2.0);
+        let config = &self.config;
+        match self.phase {
+            _ if self.parked => Manoeuvre::Stand,
+            Phase::Picking if self.config.pick == Pick::Auto && self.failure.is_none() => {
+                Manoeuvre::Arm(ArmSequence::new(Task::Pick))
+            }
+            Phase::WaitingForMap
+            | Phase::WaitingForOrder
+            | Phase::Picking
+            | Phase::Stuck
+            | Phase::Lost => Manoeuvre::Stand,
+            Phase::Driving => follow(Until::Node),
+            Phase::Approaching => follow(Until::Station),
+            Phase::Exiting => follow(Until::Bar),
+            Phase::Returning => follow(Until::Corner),
+            Phase::Turning => turn(Spot::Node),
+            // Turned in, but disturbed meanwhile.
+            Phase::Positioning if self.place.heading == self.target => {
+                Manoeuvre::Search(Search::NEW)
+            }
+            Phase::Positioning | Phase::Leaving => turn(middle),
+            Phase::TurningRound => turn(Spot::Along(exit_mm)),
+            Phase::TurningBack => turn(Spot::Along(side_mm)),
+            Phase::Looking => {
+                let side_cm = (side_mm / 10.0).min(f32::from(u8::MAX)) as u8;
+                let reach = side_cm.min(config.ranger_cm);
+                let limit = reach.saturating_sub(config.ranger_margin_cm);
+                Manoeuvre::Look(Look::new(limit, Duration::ZERO))
+            }
+            Phase::Halted => {
+                // Who has halted does not go on for a thing that trembles.
+                let limit = config.halt_cm + config.halt_cm / 5;
+                Manoeuvre::Look(Look::new(limit, config.halt_patience))
+            }
+            Phase::Dropping => Manoeuvre::Arm(ArmSequence::new(Task::Drop)),
+            Phase::BackingOff => Manoeuvre::BackUp,
+        }
+    }
+
+    /// What the floor promises on the line that the phase drives along.
+    pub(crate) fn ahead(&self, until: Until, exit_mm: f32) -> Ahead {
+        let Place { node, heading, .. } = self.place;
+        let Some(map) = &self.map else {
+            return Ahead::default();
+        };
+        let tape_behind = |next| map.has_tape(next, heading);
+        match until {
+            Until::Bar => Ahead::default(),
+            Until::Corner => Ahead {
+                edge: Some(Edge {
+                    length_mm: exit_mm,
+                    stations: Sides::NONE,
+                    crossing: map.crossing_sides(map.delivery(), heading),
+                }),
+                goes_on: true,
+                goods: Sides::NONE,
+            },
+            Until::Node | Until::Station => Ahead {
+                edge: map.edge(node, heading),
+                goes_on: map.neighbour(node, heading).is_some_and(tape_behind),
+                goods: self
+                    .station()
+                    .map_or(Sides::NONE, |station| station.side_for(heading)),
+            },
+        }
+    }
+
+    /// Which way a half turn goes: at a node where the first quarter meets tape too, between nodes
+    /// where no station's mark ends it askew.
+    pub(crate) fn half_turn(&self) -> Spin {
+        let Place { node, heading, .. } = self.place;
+        if self.phase == Phase::TurningBack {
+            let marks = self
+                .map
+                .as_ref()
+                .map(|map| map.station_sides(node, heading));
+            return match marks {
+                Some(Sides { right: true, .. }) => Spin::Left,
+                _ => Spin::Right,
+            };
+        }
+        let tape = |heading| {
+            self.phase == Phase::Turning
+                && self
+                    .map
+                    .as_ref()
+                    .is_some_and(|map| map.has_tape(node, heading))
+        };
+        match tape(heading.right()) || !tape(heading.left()) {
+            true => Spin::Right,
+            false => Spin::Left,
+        }
+    }
+
+    /// What follows from a manoeuvre's end.
+    pub(crate) fn next(&mut self, outcome: Outcome, out: &mut Output) {
+        match (self.phase, outcome) {
+            // The robot stands where it should; a person's hand helps it.
+            (Phase::Picking, Outcome::Failed(kind, expected, seen)) => {
+                self.wait_for_hand(kind, expected.round() as i32, seen.round() as i32, out);
+            }
+            (Phase::Picking, _) => {
+                self.leave(false, out);
+            }
+            (_, Outcome::Failed(kind, expected, seen)) => {
+                self.get_stuck(kind, expected.round() as i32, seen.round() as i32, out);
+            }
+            (Phase::Turning, outcome) => {
+                self.doubt_turn(outcome, false, out);
+                self.set_out(out);
+            }
+            (Phase::Looking, Outcome::Blocked) => {
+                self.block_ahead(out);
+                self.set_out(out);
+            }
+            (Phase::Looking, _) => self.set_out_along(Some(self.place.heading), out),
+            (Phase::Driving | Phase::Approaching, Outcome::Blocked) => self.phase = Phase::Halted,
+            (Phase::Halted, Outcome::Blocked) => {
+                self.block_ahead(out);
+                self.target = self.place.heading.back();
+                self.phase = Phase::TurningBack;
+            }
+            (Phase::Halted, _) => self.phase = self.drive_along(self.place.heading),
+            // It has backed up to the node instead.
+            (Phase::TurningBack, _) if self.place.heading != self.target => self.set_out(out),
+            (Phase::TurningBack, outcome) => self.go_back(outcome, out),
+            (Phase::Leaving, outcome) => {
+                self.doubt_turn(outcome, true, out);
+                self.phase = Phase::Driving;
+            }
+            (Phase::Approaching, Outcome::Missed) => self.miss_station(out),
+            (Phase::Approaching, _) => {
+                if let Some(station) = self.station() {
+                    self.target = station.into;
+                    self.phase = Phase::Positioning;
+                }
+            }
+            (Phase::Positioning, Outcome::Interrupted) => {
+                out.think(Thought {
+                    heading: self.target.into(),
+                    ..ThoughtKind::TurnDisturbed.into()
+                });
+            }
+            // Turned in, and no mark: it is searched for.
+            (Phase::Positioning, Outcome::Missed) if self.place.heading == self.target => {
+                out.think(ThoughtKind::StationPassed);
+            }
+            (Phase::Positioning, Outcome::Missed) => self.go_past_station(out),
+            (Phase::Positioning, _) => self.be_in_position(out),
+            (Phase::Exiting, _) => {
+                self.phase = Phase::Dropping;
+                out.think(ThoughtKind::AtBar);
+            }
+            (Phase::Dropping, _) => self.have_delivered(out),
+            (Phase::BackingOff, _) => {
+                self.target = self.place.heading.back();
+                self.phase = Phase::TurningRound;
+            }
+            (Phase::TurningRound, _) => self.phase = Phase::Returning,
+            (Phase::Returning, _) => {
+                out.announce(EventKind::NextNode, self.place, self.order);
+                self.go_on_from_node(out);
+            }
+            (Phase::Driving, _) => {
+                self.pass_node(out);
+                self.go_on_from_node(out);
+            }
+            // They stand, and standing does not end.
+            (Phase::WaitingForMap | Phase::WaitingForOrder | Phase::Stuck | Phase::Lost, _) => {}
+        }
+    }
+
+    fn doubt_turn(&mut self, outcome: Outcome, on_edge: bool, out: &mut Output) {
+        let Some(map) = self
+            .map
+            .as_ref()
+            .filter(|_| outcome == Outcome::Interrupted)
+        else {
+            return;
+        };
+        self.place.doubt_turn(map, on_edge);
+        if !self.place.doubt.is_none() {
+            out.think(Thought {
+                heading: self.place.heading.into(),
+                ..ThoughtKind::TurnDisturbed.into()
+            });
+        }
+    }
+
+    /// The axle has come to the node at the end of the edge.
+    fn pass_node(&mut self, out: &mut Output) {
+        if let Some(map) = &self.map {
+            self.place.move_on(map);
+        }
+        out.announce(EventKind::NextNode, self.place, self.order);
+    }
+
+    fn go_on_from_node(&mut self, out: &mut Output) {
+        self.set_out(out);
+        if matches!(self.phase, Phase::Driving | Phase::Looking) {
+            let Node { x, y } = self.place.node;
+            out.think(Thought {
+                x,
+                y,
+                seen: self.route.length.into(),
+                ..ThoughtKind::NodePassed.into()
+            });
+        }
+    }
+
+    fn miss_station(&mut self, out: &mut Output) {
+        self.pass_node(out);
+        if self.may_try_again(out) {
+            out.think(ThoughtKind::StationMissed);
+            self.go_on_from_node(out);
+        }
+    }
+
+    /// On the station's edge again without having found its mark: on to the node ahead, and there
+    /// once more from that side.
+    fn go_past_station(&mut self, out: &mut Output) {
+        let along = Some(self.place.heading);
+        let behind = |station: &Station| {
+            let mut ends = station.ends.into_iter();
+            ends.find(|end| station.heading_from(*end) == along)
+        };
+        self.place.node = self.station().and_then(behind).unwrap_or(self.place.node);
+        self.doubt_turn(Outcome::Interrupted, true, out);
+        if self.may_try_again(out) {
+            out.think(ThoughtKind::StationMissed);
+            self.phase = Phase::Driving;
+        }
+    }
+
+    /// Counts a miss; whether there may be another.
+    fn may_try_again(&mut self, out: &mut Output) -> bool {
+        self.misses += 1;
+        let (most, misses) = (self.config.misses.into(), self.misses.into());
+        if self.misses >= self.config.misses {
+            self.get_stuck(FailureKind::StationMissing, most, misses, out);
+        }
+        self.misses < self.config.misses
+    }
+
+    /// The mark under the sensors shows that the robot looks elsewhere than believed.
+    pub(crate) fn believe_other_place(&mut self, out: &mut Output) {
+        self.target = self.place.heading;
+        self.phase = Phase::Driving;
+        let Node { x, y } = self.place.node;
+        out.think(Thought {
+            x,
+            y,
+            heading: self.place.heading.into(),
+            ..ThoughtKind::PlaceCorrected.into()
+        });
+    }
+
+    /// Decides at a node where to go and goes there: turns first, or sets out at once.
+    ///
+    /// Every drive away from a node begins here, and again after each turn at it and each look
+    /// along the way that it is about to take: where that is found blocked, it is taken off the map
+    /// and the decision is made once more (L6).
+    pub(crate) fn set_out(&mut self, out: &mut Output) {
+        self.set_out_along(None, out);
+    }
+
+    /// The same; the way along `seen_open` has just been looked at.
+    fn set_out_along(&mut self, seen_open: Option<Heading>, out: &mut Output) {
+        let next = self.plan(out);
+        if self.parks(out) {
+            return;
+        }
+        let Some(map) = &self.map else { return };
+        let node = self.place.node;
+        let (home, exit) = (node == map.delivery(), map.exit());
+        if let Some(heading) = self.along_station() {
+            return self.go_between(heading, seen_open, out);
+        }
+        match self.goal {
+            Goal::Delivery if home => self.go(exit, Phase::Exiting, out),
+            Goal::Home | Goal::None if home => {
+                self.goal = Goal::None;
+                if !self.begin_next(out) {
+                    self.go(exit.back(), Phase::WaitingForOrder, out);
+                }
+            }
+            _ => match next {
+                Some(heading) => self.go_between(heading, seen_open, out),
+                None if self.put_off(out) => {}
+                None => self.get_stuck(self.no_way(), 0, self.tries.into(), out),
+            },
+        }
+    }
+
+    /// Where the edge of the goods' station leads from the node, while they are the goal and it is
+    /// open.
+    fn along_station(&self) -> Option<Heading> {
+        self.station()
+            .filter(|station| self.goal == Goal::Product && self.is_open(station))
+            .and_then(|station| station.heading_from(self.place.node))
+    }
+
+    /// How to drive from the node along `heading`.
+    fn drive_along(&self, heading: Heading) -> Phase {
+        match self.along_station() == Some(heading) {
+            true => Phase::Approaching,
+            false => Phase::Driving,
+        }
+    }
+
+    /// Goes along `heading` towards the next node, once that way has been looked at.
+    fn go_between(&mut self, heading: Heading, seen_open: Option<Heading>, out: &mut Output) {
+        let looked = self.config.ranger_cm == 0 || seen_open == Some(heading);
+        match looked || heading != self.place.heading {
+            true => self.go(heading, self.drive_along(heading), out),
+            false => self.phase = Phase::Looking,
+        }
+    }
+
+    /// Stands at the node just reached if the battery is low; whether it does.
+    fn parks(&mut self, out: &mut Output) -> bool {
+        if self.battery.forbids() {
+            self.parked = true;
+            out.think_of(ThoughtKind::Parked, self.place.node);
+        }
+        self.parked
+    }
+
+    /// Goes into `phase` if the robot looks along `heading`, else turns there first.
+    fn go(&mut self, heading: Heading, phase: Phase, out: &mut Output) {
+        if heading != self.place.heading {
+            self.phase = Phase::Turning;
+            self.target = heading;
+            let kind = match self.place.heading.quarters_right_to(heading) {
+                1 => ThoughtKind::TurnsRight,
+                2 if self.half_turn() == Spin::Right => ThoughtKind::TurnsRight,
+                _ => ThoughtKind::TurnsLeft,
+            };
+            return out.think_of(kind, self.place.node);
+        }
+        self.phase = phase;
+        match phase {
+            Phase::Approaching => out.think(Thought {
+                product: self.order.product,
+                ..ThoughtKind::SeeksStation.into()
+            }),
+            Phase::Exiting => out.think(ThoughtKind::LeavesToDeliver),
+            Phase::WaitingForOrder => out.think(ThoughtKind::IsBack),
+            _ => {}
+        }
+    }
+
+    /// Where the product of the order is picked.
+    fn station(&self) -> Option<&Station> {
+        self.map.as_ref()?.station(self.order.product)
+    }
+
+    /// Gives up until somebody helps (AMB-49).
+    fn get_stuck(&mut self, kind: FailureKind, expected: i32, seen: i32, out: &mut Output) {
+        self.failure = self.failure_here(kind, expected, seen);
+        self.phase = Phase::Stuck;
+        self.parked = false;
+        out.announce_failure(EventKind::Failed, self.place, self.order, self.failure);
+        self.tell_failure(out);
+    }
+
+    fn tell_failure(&self, out: &mut Output) {
+        out.think(Thought {
+            failure: self.failure,
+            ..ThoughtKind::Failed.into()
+        });
+    }
+
+    fn failure_here(&self, kind: FailureKind, expected: i32, seen: i32) -> Failure {
+        let Node { x, y } = self.place.node;
+        Failure::new(kind, (x, y), expected, seen)
+    }
+}

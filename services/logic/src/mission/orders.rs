@@ -1,0 +1,305 @@
+//! From an order to its delivery: what is taken on, what happens at the goods, and the way from there.
+
+use lager_topics::{
+    EventKind, Failure, FailureKind, Goal, Order, OrderQueue, Phase, Thought, ThoughtKind,
+};
+
+use super::{Mission, Tables};
+use crate::config::Pick;
+use crate::output::Output;
+use crate::queue::Queue;
+
+impl Mission {
+    /// Keeps an order for later, or refuses it with the reason.
+    pub(crate) fn take_order(&mut self, order: &Order, out: &mut Output) {
+        if order.id != 0 && order.id == self.order.id || self.queue.has(order.id) {
+            return;
+        }
+        let Some(map) = &self.map else {
+            return self.refuse(order, FailureKind::NoMap, out);
+        };
+        if map.station(order.product).is_none() {
+            return self.refuse(order, FailureKind::UnknownProduct, out);
+        } else if self.phase.needs_reset() {
+            return self.refuse(order, FailureKind::NeedsReset, out);
+        }
+        let before = self.queue.waiting().len();
+        if !self.queue.push(*order) {
+            return self.refuse(order, FailureKind::QueueFull, out);
+        }
+        out.queue_changed = true;
+        if self.battery.forbids() {
+            think_of_product(ThoughtKind::OrderWaitsForCharge, order.product, out);
+        } else if self.phase != Phase::WaitingForOrder || before > 0 {
+            out.think(Thought {
+                product: order.product,
+                seen: before as i32,
+                ..ThoughtKind::OrderWaits.into()
+            });
+        }
+    }
+
+    /// A person takes a waiting order back.
+    pub(crate) fn cancel(&mut self, id: u32, out: &mut Output) {
+        if let Some(order) = self.queue.cancel(id) {
+            out.queue_changed = true;
+            think_of_product(ThoughtKind::OrderCancelled, order.product, out);
+            self.need_no_way();
+        }
+    }
+
+    /// A person wants a waiting order to be carried out earlier.
+    pub(crate) fn move_up(&mut self, id: u32, out: &mut Output) {
+        if self.queue.move_up(id) {
+            out.queue_changed = true;
+            let product = self.queue.product_of(id).unwrap_or_default();
+            think_of_product(ThoughtKind::OrderMovedUp, product, out);
+        }
+    }
+
+    /// A person takes all waiting orders back.
+    pub(crate) fn clear_queue(&mut self, out: &mut Output) {
+        if self.queue.clear() {
+            out.queue_changed = true;
+            out.think(ThoughtKind::QueueCleared);
+            self.need_no_way();
+        }
+    }
+
+    /// Who waited at home for a way to an order, and has none left, waits for no way.
+    fn need_no_way(&mut self) {
+        if self.phase == Phase::WaitingForOrder && self.queue.waiting().is_empty() {
+            self.failure = Failure::default();
+        }
+    }
+
+    /// The orders as they are published.
+    pub(crate) fn order_queue(&self) -> OrderQueue {
+        let is_under_way = matches!(self.goal, Goal::Product | Goal::Delivery);
+        self.queue.to_payload(is_under_way.then_some(self.order))
+    }
+
+    /// As a predecessor published them.
+    pub(crate) fn restore_queue(&mut self, queue: &OrderQueue) {
+        self.queue = Queue::from_payload(queue, self.order);
+    }
+
+    pub(super) fn refuse(&self, order: &Order, kind: FailureKind, out: &mut Output) {
+        let seen = match kind {
+            FailureKind::QueueFull => self.queue.waiting().len() as i32,
+            _ => order.product,
+        };
+        let failure = self.failure_here(kind, 0, seen);
+        out.announce_failure(EventKind::Refused, self.place, *order, failure);
+        out.think(Thought {
+            product: order.product,
+            failure,
+            ..ThoughtKind::OrderRefused.into()
+        });
+    }
+
+    /// Begins the first of the waiting orders that can be reached from the node it stands on. Those
+    /// before it are put off; where none can be reached, it stands until the ways are others.
+    pub(crate) fn begin_next(&mut self, out: &mut Output) -> bool {
+        if self.queue.waiting().is_empty() || self.battery.forbids() {
+            return false;
+        }
+        self.forget_old_blocks(out);
+        let now = (self.tables.blocks.revision(), self.queue.revision());
+        if self.none_reachable == Some(now) || self.map.is_none() {
+            return false;
+        }
+        if let Some(index) = self.first_reachable() {
+            self.queue_off(index, out);
+            return self.begin_order(index, out);
+        }
+        if self.tables.blocks.is_empty() {
+            // No way will open: the floor has none, or the product no place on it.
+            if let Some(order) = self.queue.take(0) {
+                out.queue_changed = true;
+                self.refuse(&order, FailureKind::NoWay, out);
+            }
+            return false;
+        }
+        self.none_reachable = Some(now);
+        self.queue_off(self.queue.waiting().len(), out);
+        if self.failure.is_none() {
+            self.wait_for_way(FailureKind::NoWay, out);
+        }
+        false
+    }
+
+    /// The order under way cannot be reached now: it waits, and another one that can be reached is
+    /// begun. Whether there is one.
+    pub(super) fn put_off(&mut self, out: &mut Output) -> bool {
+        if self.goal != Goal::Product {
+            return false;
+        }
+        let Some(index) = self.first_reachable() else {
+            return false;
+        };
+        let order = self.order;
+        self.queue.put_back(order);
+        self.begin_order(index + 1, out);
+        think_of_product(ThoughtKind::OrderPutOff, order.product, out);
+        true
+    }
+
+    /// The first waiting order to whose goods there is a way from here.
+    fn first_reachable(&mut self) -> Option<usize> {
+        let map = self.map.as_ref()?;
+        let Tables { blocks, distances } = &mut *self.tables;
+        let node = self.place.node;
+        self.queue.waiting().iter().position(|waiting| {
+            let station = map.station(waiting.order.product);
+            station.is_some_and(|station| {
+                let [end, _] = station.ends;
+                let along = station.heading_from(end);
+                distances.search(map, blocks, station.ends);
+                along.is_some_and(|along| blocks.is_open(map, end, along))
+                    && distances.from(map, node).is_some()
+            })
+        })
+    }
+
+    /// The turn of the first `count` waiting orders has come, and there is no way.
+    fn queue_off(&mut self, count: usize, out: &mut Output) {
+        if self.queue.put_off(count) {
+            out.queue_changed = true;
+            if let Some(waiting) = self.queue.waiting().first() {
+                think_of_product(ThoughtKind::OrderPutOff, waiting.order.product, out);
+            }
+        }
+    }
+
+    /// Begins a waiting order from the node it stands on. Whether there is one at that place.
+    fn begin_order(&mut self, index: usize, out: &mut Output) -> bool {
+        let Some(order) = self.queue.take(index) else {
+            return false;
+        };
+        out.queue_changed = true;
+        self.failure = Failure::default();
+        self.tries = 0;
+        self.order = order;
+        self.forced = false;
+        self.goal = Goal::Product;
+        self.misses = 0;
+        out.announce(EventKind::GettingItem, self.place, order);
+        self.plan(out);
+        out.think(Thought {
+            product: order.product,
+            seen: self.route.length.into(),
+            ..ThoughtKind::Fetching.into()
+        });
+        self.set_out(out);
+        true
+    }
+
+    /// The robot stands at the goods, turned in (L7).
+    pub(super) fn be_in_position(&mut self, out: &mut Output) {
+        self.phase = Phase::Picking;
+        out.announce(EventKind::InPosition, self.place, self.order);
+        let kind = match self.config.pick {
+            Pick::Auto => ThoughtKind::Picking,
+            Pick::Manual => ThoughtKind::AwaitsPickup,
+        };
+        think_of_product(kind, self.order.product, out);
+    }
+
+    /// The robot stands where it is until there is a way.
+    fn wait_for_way(&mut self, kind: FailureKind, out: &mut Output) {
+        self.wait_for_hand(kind, 0, self.tries.into(), out);
+    }
+
+    /// The robot stands where it is and cannot go on without a hand.
+    pub(super) fn wait_for_hand(
+        &mut self,
+        kind: FailureKind,
+        expected: i32,
+        seen: i32,
+        out: &mut Output,
+    ) {
+        self.failure = self.failure_here(kind, expected, seen);
+        out.announce_failure(EventKind::Failed, self.place, self.order, self.failure);
+        self.tell_failure(out);
+    }
+
+    /// The operator says that the goods are in the claw. Goods that are not felt (`empty`) are
+    /// believed only if the operator insists. Whether the robot leaves.
+    pub(crate) fn picked(
+        &mut self,
+        order_id: u32,
+        forced: bool,
+        empty: Option<(FailureKind, i32, i32)>,
+        out: &mut Output,
+    ) -> bool {
+        let meant = order_id == 0 || order_id == self.order.id;
+        if self.phase != Phase::Picking || !meant {
+            return false;
+        }
+        if let Some((kind, expected, seen)) = empty.filter(|_| !forced) {
+            let failure = self.failure_here(kind, expected, seen);
+            out.announce_failure(EventKind::PickupRefused, self.place, self.order, failure);
+            out.think(Thought {
+                product: self.order.product,
+                failure,
+                ..ThoughtKind::PickupRefused.into()
+            });
+            return false;
+        }
+        self.leave(forced, out)
+    }
+
+    /// Leaves with the goods: back onto the edge, towards the end from which the delivery corner is
+    /// nearer. Whether there is a way.
+    pub(super) fn leave(&mut self, forced: bool, out: &mut Output) -> bool {
+        let (Some(map), Some(station)) = (&self.map, self.station()) else {
+            return false;
+        };
+        let station = *station;
+        let Tables { blocks, distances } = &mut *self.tables;
+        distances.search(map, blocks, [map.delivery(); 2]);
+        let best = station
+            .ends
+            .into_iter()
+            .filter_map(|end| Some((distances.from(map, end)?, end)))
+            .min_by_key(|(edges, _)| *edges);
+        let Some((_, towards)) = best else {
+            self.forced = forced;
+            self.wait_for_way(self.no_way(), out);
+            return true;
+        };
+        let from = station.other_end(towards).unwrap_or(towards);
+        let Some(heading) = station.heading_from(from) else {
+            return false;
+        };
+        self.place.node = from;
+        self.goal = Goal::Delivery;
+        self.tries = 0;
+        self.forced = forced;
+        self.failure = Failure::default();
+        self.plan_from_edge(towards, heading, out);
+        think_of_product(ThoughtKind::HasGoods, self.order.product, out);
+        self.target = heading;
+        self.phase = Phase::Leaving;
+        true
+    }
+
+    /// The goods lie at the place of delivery (L8).
+    pub(super) fn have_delivered(&mut self, out: &mut Output) {
+        self.delivered = self.delivered.wrapping_add(1);
+        out.announce(EventKind::ItemDelivered, self.place, self.order);
+        think_of_product(ThoughtKind::Delivered, self.order.product, out);
+        self.goal = Goal::Home;
+        out.queue_changed = true;
+        self.forced = false;
+        self.phase = Phase::BackingOff;
+    }
+}
+
+fn think_of_product(kind: ThoughtKind, product: i32, out: &mut Output) {
+    out.think(Thought {
+        product,
+        ..kind.into()
+    });
+}

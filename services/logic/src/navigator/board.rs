@@ -1,0 +1,108 @@
+//! What the steering board reports: how the order in force fares, what the wheels did, the arm and
+//! the battery.
+
+use core::time::Duration;
+
+use lager_topics::{Goal, Mode, Phase, SteeringReport, Thought, ThoughtKind};
+
+use super::Navigator;
+use crate::battery::Limits;
+use crate::command::News;
+use crate::manoeuvre::STANDBY;
+use crate::output::Output;
+
+impl Navigator {
+    /// Takes a report.
+    pub(super) fn steering(&mut self, now: Duration, report: &SteeringReport, out: &mut Output) {
+        if report.age_ms == 0 {
+            self.senses.odometer.report(now, report, &self.config);
+            self.hear_board(now, report, out);
+        }
+        if self.mode == Some(Mode::Manual) {
+            return;
+        }
+        let one_shot = self.command.command().is_one_shot();
+        let patience = if one_shot {
+            self.config.unheard_one_shot
+        } else {
+            self.config.unheard_setpoint
+        };
+        match self.command.news(now, report, patience) {
+            News::None => {}
+            News::Ended(finish) if one_shot => {
+                let outcome = self.steer(now, out, |manoeuvre, helm| manoeuvre.ended(finish, helm));
+                if let Some(outcome) = outcome {
+                    self.conclude(now, outcome, out);
+                }
+            }
+            News::Unheard if one_shot && self.active => self.manoeuvre.interrupt(),
+            // A setpoint ends by a stop, a lease that ran out or a board that restarted. It is
+            // given anew, but not faster than the bridge can answer.
+            News::Ended(_) | News::Unheard => {
+                if self.active
+                    && self
+                        .command
+                        .is_older_than(now, self.config.unheard_setpoint)
+                {
+                    self.command.give_anew();
+                }
+            }
+        }
+    }
+
+    /// The steering board has reported just now.
+    fn hear_board(&mut self, now: Duration, report: &SteeringReport, out: &mut Output) {
+        self.senses.arm.take(report);
+        let again = self.holding.hear_board(now);
+        if again && self.active && self.manoeuvre.turns_wheels() {
+            self.manoeuvre.hear_again();
+            out.think(ThoughtKind::BoardHeard);
+        }
+        self.watch_arm(out);
+        self.watch_battery(now, report.battery_decivolts, out);
+    }
+
+    /// Asks whether the arm is where goods are carried, whenever the robot stands with them.
+    pub(super) fn watch_arm(&mut self, out: &mut Output) {
+        let carries = self.mission.goal == Goal::Delivery
+            && matches!(
+                self.mission.phase,
+                Phase::Leaving
+                    | Phase::Driving
+                    | Phase::Turning
+                    | Phase::Looking
+                    | Phase::Halted
+                    | Phase::TurningBack
+                    | Phase::Exiting
+            );
+        if !carries || self.mission.forced {
+            self.holding.joint_off = None;
+        } else if self.command.command() == STANDBY || !self.active {
+            self.holding.watch_arm(&self.senses.arm, &self.config, out);
+        }
+    }
+
+    /// Believes the battery to be low, or charged, when it has been so for a while.
+    fn watch_battery(&mut self, now: Duration, decivolts: u8, out: &mut Output) {
+        let limits = Limits {
+            low: self.config.low_battery_decivolts,
+            charged_by: self.config.charged_by_decivolts,
+            steady: self.config.battery_steady,
+        };
+        let Some(is_low) = self.mission.battery.read(now, decivolts, limits) else {
+            return;
+        };
+        let kind = match is_low {
+            true => ThoughtKind::BatteryLow,
+            false => ThoughtKind::BatteryCharged,
+        };
+        out.think(Thought {
+            seen: decivolts.into(),
+            ..kind.into()
+        });
+        if !is_low && core::mem::take(&mut self.mission.parked) {
+            self.mission.set_out(out);
+            self.begin(now, out);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! What people and the bridge say: the map, orders, hands on the robot, and who may drive.
+
+use core::time::Duration;
+
+use lager_topics::{FailureKind, Heading, Mode, ThoughtKind, WarehouseMap};
+
+use super::{Input, Navigator};
+use crate::blocks::Block;
+use crate::manoeuvre::{Manoeuvre, Outcome, STANDBY};
+use crate::node::Node;
+use crate::output::Output;
+
+/// Way of the wheels in manual mode, in mm, after which the known position is worth nothing.
+/// Rolling out after the change of mode is less.
+const DISPLACED_MM: f32 = 15.0;
+
+impl Navigator {
+    /// Takes what people and the bridge say.
+    pub(super) fn take_word(&mut self, now: Duration, input: Input<'_>, out: &mut Output) {
+        // The bridge says the same again and again.
+        out.status_changed |= match input {
+            Input::DrivenByHand(_) => false,
+            Input::Mode { mode, stopped } => (self.mode, self.stopped) != (Some(mode), stopped),
+            _ => true,
+        };
+        match input {
+            Input::Map(map) => self.take_map(now, map, out),
+            Input::Order(order) => self.mission.take_order(order, out),
+            Input::Cancel(id) => self.mission.cancel(id, out),
+            Input::MoveUp(id) => self.mission.move_up(id, out),
+            Input::ClearQueue => self.mission.clear_queue(out),
+            Input::PickupDone { order_id, forced } => self.picked(now, order_id, forced, out),
+            Input::DrivenByHand(sum) => self.watch_manual_driving(now, sum, out),
+            Input::Reset => self.put_down(None, out),
+            Input::Placed { node, heading } => self.put_down(Some((node, heading)), out),
+            Input::Way {
+                node,
+                heading,
+                open,
+                source,
+            } => {
+                let block = Block {
+                    node,
+                    heading,
+                    since: now,
+                    source,
+                };
+                if self.mission.take_way(block, open, out) {
+                    self.begin(now, out);
+                }
+            }
+            Input::Mode { mode, stopped } => self.set_mode(mode, stopped),
+            Input::Line(_) | Input::Distance(_) | Input::Steering(_) | Input::Tick => {}
+        }
+    }
+
+    fn set_mode(&mut self, mode: Mode, stopped: bool) {
+        // A successor may not have seen what happened before it.
+        if self.mode == Some(Mode::Autonomous) && mode == Mode::Manual {
+            self.by_hand.stand_here();
+        }
+        self.mode = Some(mode);
+        self.stopped = stopped;
+        self.learn_whether_active();
+    }
+
+    fn learn_whether_active(&mut self) {
+        let may_drive = self.mode == Some(Mode::Autonomous) && !self.stopped;
+        self.active = may_drive && self.mission.map.is_some();
+    }
+
+    fn take_map(&mut self, now: Duration, map: &WarehouseMap, out: &mut Output) {
+        let (known, phase) = (self.mission.map.is_some(), self.mission.phase);
+        if self.mission.take_map(map, out) {
+            self.stand_here();
+        }
+        self.learn_whether_active();
+        if self.mission.phase != phase {
+            self.begin(now, out);
+        } else if self.mission.map.is_some() {
+            self.look_ahead(known);
+        }
+    }
+
+    /// The floor is known, or known anew, in the middle of a manoeuvre.
+    fn look_ahead(&mut self, was_known: bool) {
+        match &mut self.manoeuvre {
+            Manoeuvre::Follow(follow) => {
+                let ahead = self.mission.ahead(follow.until, self.senses.exit_mm);
+                follow.look_ahead(ahead);
+            }
+            Manoeuvre::Turn(turn) if !was_known => {
+                if let Manoeuvre::Turn(known) = self.mission.manoeuvre(self.senses.exit_mm) {
+                    (turn.spot, turn.half) = (known.spot, known.half);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A person has put the robot down.
+    fn put_down(&mut self, place: Option<(Node, Heading)>, out: &mut Output) {
+        if self.active && self.command.command() != STANDBY {
+            return out.think(ThoughtKind::MovesAlone);
+        }
+        if self.mission.put_down(place, out) {
+            self.stand_here();
+        }
+    }
+
+    /// The robot stands where the mission says, with nothing left of what was before.
+    fn stand_here(&mut self) {
+        self.manoeuvre = Manoeuvre::Stand;
+        self.holding.forget();
+        self.senses.odometer.travelled_mm = 0.0;
+        self.senses.odometer.forget_way();
+        self.senses.marks.clear();
+        self.by_hand.stand_here();
+    }
+
+    fn picked(&mut self, now: Duration, order_id: u32, forced: bool, out: &mut Output) {
+        let empty = self
+            .senses
+            .arm
+            .claw_is_empty(&self.config.arm, self.config.held_margin);
+        let picks = matches!(self.manoeuvre, Manoeuvre::Arm(_));
+        if picks && !forced && empty.is_none() {
+            // The routine brings the arm to its end, and finds out by itself.
+            return;
+        }
+        if self.mission.picked(order_id, forced, empty, out) {
+            self.begin(now, out);
+            self.watch_arm(out);
+        }
+    }
+
+    fn watch_manual_driving(&mut self, now: Duration, sum: u64, out: &mut Output) {
+        let known = self.by_hand.to_status();
+        let driven_mm = self.by_hand.take(sum, self.config.cruise_mm_per_s);
+        out.status_changed |= self.by_hand.to_status() != known;
+        if self.mission.has_a_place() && driven_mm > DISPLACED_MM {
+            let why = Outcome::Failed(FailureKind::DrivenByHand, DISPLACED_MM, driven_mm);
+            self.conclude(now, why, out);
+        }
+    }
+}

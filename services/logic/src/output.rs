@@ -1,0 +1,68 @@
+//! What the navigator has to say after an input: events, a thought, and what has changed.
+
+use lager_topics::{Event, EventKind, Failure, Order, Role, Thought, ThoughtKind};
+
+use crate::node::Node;
+use crate::place::Place;
+
+/// What the navigator has to say after an input.
+#[derive(Clone, Debug, Default)]
+pub struct Output {
+    /// What has happened on the mission, in order.
+    pub events: heapless::Vec<Event, 6>,
+    /// What it thinks; the last one if there were several.
+    pub thought: Option<Thought>,
+    /// [`Navigator::route`](crate::Navigator::route) is another one now.
+    pub route_changed: bool,
+    /// [`Navigator::blocks`](crate::Navigator::blocks) are others now.
+    pub blocks_changed: bool,
+    /// [`Navigator::queue`](crate::Navigator::queue) is another one now.
+    pub queue_changed: bool,
+    /// [`Navigator::status`](crate::Navigator::status) is another one now, in more than what
+    /// changes with every frame: it has to go out at once.
+    pub status_changed: bool,
+}
+
+impl Output {
+    pub(crate) fn think(&mut self, thought: impl Into<Thought>) {
+        self.thought = Some(Thought {
+            from: Role::Logic.into(),
+            ..thought.into()
+        });
+    }
+
+    /// Thinks something of a node.
+    pub(crate) fn think_of(&mut self, kind: ThoughtKind, Node { x, y }: Node) {
+        self.think(Thought {
+            x,
+            y,
+            ..kind.into()
+        });
+    }
+
+    pub(crate) fn announce(&mut self, kind: EventKind, at: Place, order: Order) {
+        self.announce_failure(kind, at, order, Failure::default());
+    }
+
+    pub(crate) fn announce_failure(
+        &mut self,
+        kind: EventKind,
+        at: Place,
+        order: Order,
+        failure: Failure,
+    ) {
+        let event = Event {
+            kind: kind.into(),
+            x: at.node.x,
+            y: at.node.y,
+            heading: at.heading.into(),
+            order_id: order.id,
+            product: order.product,
+            failure,
+        };
+        self.status_changed = true;
+        // One input leads to at most five: a node, a blocked way, a failure, a refusal and a new
+        // order.
+        let _ = self.events.push(event);
+    }
+}

@@ -1,0 +1,198 @@
+//! Where the robot is: the node last passed, where it looks, and where it may be besides since a
+//! turn was disturbed.
+//!
+//! The end of a turn that was cut short, or that nobody heard the reports of, is judged by dead
+//! reckoning and by the tape under the sensors; but one tape looks like another, and the robot may
+//! look a quarter or two further. So it drives on as it believes and keeps the other headings in
+//! mind. Each mark is asked which of them it fits, and how well; what does not fit is forgotten,
+//! and what fits better than the belief takes its place:
+//!
+//! ```text
+//!   a disturbed turn ends        a mark that fits          a mark that fits another better
+//!   ---------------------> doubt -----------------> less ----------------------------> that one
+//!        others where there is tape     doubt     doubt                             believed now
+//! ```
+//!
+//! The others keep their angle to the belief whatever the robot does, so only their nodes are
+//! state. It never turns the robot: whoever plans does, from the node that is believed now.
+
+use lager_topics::{Heading, NavigatorStatus};
+
+use crate::heading::{Compass, Spin};
+use crate::judge::{Edge, Verdict, judge};
+use crate::map::Map;
+use crate::marks::Sides;
+use crate::node::Node;
+
+/// Where the robot is believed to be, and where else it may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// Node last passed.
+    pub(crate) node: Node,
+    /// Where it looks.
+    pub(crate) heading: Heading,
+    /// The others.
+    pub(crate) doubt: Doubt,
+}
+
+impl Default for Place {
+    fn default() -> Self {
+        Self::at(Node::default(), Heading::Right)
+    }
+}
+
+/// The other possible places, by how many quarters further to the right the robot would look: one
+/// at index 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Doubt {
+    nodes: [Option<Node>; 3],
+}
+
+impl Doubt {
+    /// None but the belief.
+    pub(crate) fn is_none(&self) -> bool {
+        self.nodes.iter().all(Option::is_none)
+    }
+
+    /// Writes the state into a status.
+    pub(crate) fn fill(&self, status: &mut NavigatorStatus) {
+        for (index, node) in self.nodes.iter().enumerate() {
+            if let Some(node) = node {
+                status.doubt |= 2 << index;
+                (status.doubt_x[index], status.doubt_y[index]) = (node.x, node.y);
+            }
+        }
+    }
+
+    /// The state from a status.
+    pub(crate) fn of(status: &NavigatorStatus) -> Self {
+        let mut doubt = Self::default();
+        for (index, node) in doubt.nodes.iter_mut().enumerate() {
+            if status.doubt & (2 << index) != 0 {
+                *node = Some(Node::new(status.doubt_x[index], status.doubt_y[index]));
+            }
+        }
+        doubt
+    }
+
+    /// The others as (quarters to the right of the belief, node).
+    fn others(self) -> impl Iterator<Item = (u8, Node)> {
+        (1..)
+            .zip(self.nodes)
+            .filter_map(|(quarters, node)| Some((quarters, node?)))
+    }
+
+    /// The others as seen from the one `quarters` to the right, which becomes the belief; `old` is
+    /// the node of what was believed, if that is still possible.
+    fn seen_from(self, quarters: u8, old: Option<Node>) -> Self {
+        let mut seen = Self::default();
+        let index = |other: u8| usize::from((other + 4 - quarters) % 4) - 1;
+        for (other, node) in self.others().filter(|(other, _)| *other != quarters) {
+            seen.nodes[index(other)] = Some(node);
+        }
+        seen.nodes[index(0)] = old;
+        seen
+    }
+
+    /// Keeps the others for which `keep` yields a node.
+    fn retain(&mut self, mut keep: impl FnMut(u8, Node) -> Option<Node>) {
+        for (quarters, node) in (1..).zip(&mut self.nodes) {
+            *node = node.and_then(|at| keep(quarters, at));
+        }
+    }
+}
+
+impl Place {
+    /// A place nobody doubts.
+    pub(crate) fn at(node: Node, heading: Heading) -> Self {
+        Self {
+            node,
+            heading,
+            doubt: Doubt::default(),
+        }
+    }
+
+    /// A disturbed turn has ended here: the robot may look elsewhere. On the middle of an edge
+    /// (`on_edge`) the other way along it begins at its other end.
+    pub(crate) fn doubt_turn(&mut self, map: &Map, on_edge: bool) {
+        let mut doubt = Doubt::default();
+        for quarters in 1..=3 {
+            let heading = self.heading.turned(Spin::Right, quarters);
+            doubt.nodes[usize::from(quarters) - 1] = match (on_edge, quarters) {
+                (false, _) => Some(self.node),
+                (true, 2) => map.neighbour(self.node, self.heading),
+                (true, _) => None,
+            }
+            .filter(|node| map.has_tape(*node, heading));
+        }
+        if !doubt.is_none() {
+            self.doubt = doubt;
+        }
+    }
+
+    /// The axle has come to the next node, in any of the possible places.
+    pub(crate) fn move_on(&mut self, map: &Map) {
+        let believed = self.heading;
+        self.node = map.neighbour(self.node, believed).unwrap_or(self.node);
+        self.doubt
+            .retain(|quarters, node| map.neighbour(node, believed.turned(Spin::Right, quarters)));
+    }
+
+    /// Asks a mark which of the possible places it fits, and believes one of them if the belief
+    /// itself, on `edge`, does not fit. Whether it believes another one now.
+    pub(crate) fn ask_mark(
+        &mut self,
+        map: &Map,
+        edge: &Edge,
+        sides: Sides,
+        at_mm: f32,
+        tolerance: f32,
+    ) -> bool {
+        let fit = |edge: &Edge| fit(edge, sides, at_mm, tolerance);
+        let believed = self.heading;
+        let mut fitting = self.doubt;
+        let mut best = (fit(edge), None);
+        fitting.retain(|quarters, node| {
+            let heading = believed.turned(Spin::Right, quarters);
+            let fits = fit(&map.edge(node, heading)?);
+            if fits > best.0 {
+                best = (fits, Some((quarters, node)));
+            }
+            (fits > Fit::No).then_some(node)
+        });
+        let (_, Some((quarters, node))) = best else {
+            // A mark that fits nobody is dirt.
+            if best.0 > Fit::No {
+                self.doubt = fitting;
+            }
+            return false;
+        };
+        let old = (fit(edge) > Fit::No).then_some(self.node);
+        self.node = node;
+        self.heading = believed.turned(Spin::Right, quarters);
+        self.doubt = fitting.seen_from(quarters, old);
+        true
+    }
+}
+
+/// How well a mark fits an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Fit {
+    /// Nothing on the edge looks like that.
+    No,
+    /// The node at its end, of which one side was not seen.
+    Half,
+    /// A station, or the node with all its sides.
+    Whole,
+}
+
+/// As [`judge`], but a mark with a side that the node does not have is not that node: in doubt a
+/// border tells one place from another.
+fn fit(edge: &Edge, sides: Sides, at_mm: f32, tolerance: f32) -> Fit {
+    match judge(edge, sides, at_mm, tolerance) {
+        Verdict::Station => Fit::Whole,
+        Verdict::Node if sides == edge.crossing => Fit::Whole,
+        Verdict::Node if sides.is_within(edge.crossing) => Fit::Half,
+        Verdict::Node | Verdict::Unexpected => Fit::No,
+    }
+}

@@ -1,0 +1,108 @@
+//! The robot picks by itself: it finds the goods, aims elsewhere where there are none, and says so
+//! when it finds nothing at all.
+
+use std::time::Duration;
+
+use lager_logic::{Input, LogicConfig, Pick};
+use lager_topics::{EventKind, FailureKind, Phase, Remedy, Side};
+
+use crate::double::Trouble;
+use crate::floor::Exit;
+use crate::trial::{Trial, warehouse};
+
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A robot with goods, if there are any, where its base has to look along `goods_at`.
+fn at_the_goods(goods_at: Option<u16>) -> Trial {
+    let config = LogicConfig {
+        pick: Pick::Auto,
+        ..LogicConfig::default()
+    };
+    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Up)]);
+    let mut trial = Trial::with(config, map, Exit::Straight(450.0), Trouble::NONE, 3);
+    trial.body.goods_at = goods_at;
+    trial.order(1, 1);
+    let came = trial.run_until(SECOND * 90, |trial| trial.phase() == Phase::Picking);
+    assert!(came, "{}", trial.story());
+    trial
+}
+
+#[test]
+fn goods_ahead_or_to_either_side_are_picked_and_delivered() {
+    for at in [512, 533, 491, 554, 470] {
+        let mut trial = at_the_goods(Some(at));
+        let order = trial.navigator.current_order().unwrap();
+        assert_eq!(order.arm_granted, 0, "the arm is the robot's own");
+        trial.deliver(1);
+        assert_eq!(trial.count(EventKind::ItemDelivered), 1);
+    }
+}
+
+#[test]
+fn where_there_is_nothing_a_hand_is_waited_for() {
+    let mut trial = at_the_goods(None);
+    let gave_up = trial.run_until(SECOND * 300, |trial| {
+        !trial.navigator.status().failure.is_none()
+    });
+    assert!(gave_up, "{}", trial.story());
+    let failure = trial.navigator.status().failure;
+    assert_eq!(
+        (failure.kind.get(), failure.remedy.get(), failure.seen),
+        (Some(FailureKind::GoodsMissing), Some(Remedy::Hand), 5)
+    );
+    assert_eq!(trial.count(EventKind::Failed), 1);
+    assert_eq!(trial.phase(), Phase::Picking);
+    // Its successor does not begin anew, and a person may move the arm.
+    trial.kill(SECOND / 5);
+    trial.run_for(SECOND);
+    let order = trial.navigator.current_order().unwrap();
+    assert_eq!((order.code, order.arm_granted), (1, 1));
+    trial.body.servos = crate::double::CARRYING;
+    trial.body.claw_load = -311;
+    trial.run_for(SECOND / 5);
+    let order_id = trial.status.order_id;
+    trial.tell(Input::PickupDone {
+        order_id,
+        forced: false,
+    });
+    assert!(trial.navigator.status().failure.is_none());
+    trial.deliver(1);
+}
+
+#[test]
+fn picking_survives_a_kill_at_any_moment() {
+    let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
+    let mut trial = at_the_goods(Some(533));
+    let mut kills = 0;
+    while trial.phase() == Phase::Picking {
+        let mut fork = trial.clone();
+        fork.kill(outages[kills % outages.len()]);
+        fork.thoughts
+            .push(format!("(killed at {:?})", trial.body.now));
+        fork.deliver(1);
+        kills += 1;
+        trial.run_for(Duration::from_millis(35));
+    }
+    assert!(kills > 100, "only {kills} moments");
+}
+
+#[test]
+fn refused_and_aborted_steps_are_given_again() {
+    let mut trial = at_the_goods(Some(512));
+    trial.run_for(SECOND);
+    trial.body.refuse = 3;
+    trial.run_for(SECOND * 2);
+    trial.body.end_work(lager_topics::Finish::Aborted);
+    trial.deliver(1);
+    assert_eq!(trial.body.refuse, 0);
+}
+
+#[test]
+fn an_arm_that_never_obeys_ends_in_a_failure() {
+    let mut trial = at_the_goods(Some(512));
+    trial.body.refuse = u32::MAX;
+    let gave_up = trial.run_until(SECOND * 30, |trial| {
+        trial.navigator.status().failure.kind == FailureKind::BoardRefuses
+    });
+    assert!(gave_up, "{}", trial.story());
+}

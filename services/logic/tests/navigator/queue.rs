@@ -1,0 +1,231 @@
+//! The orders that wait (F3): in the order given, put off where there is no way, changed while the
+//! robot drives, and kept over a kill at any moment.
+
+use std::time::Duration;
+
+use lager_logic::node::Node;
+use lager_logic::queue::MOST_ORDERS;
+use lager_logic::{Input, LogicConfig, Navigator};
+use lager_topics::{BlockSource, EventKind, FailureKind, Heading, OrderQueue, Phase, Side};
+
+use crate::double::{Body, Trouble};
+use crate::floor::Exit;
+use crate::trial::{Trial, warehouse};
+
+const EXIT: Exit = Exit::Straight(450.0);
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A robot with nothing to do. Product 2 is on its way to product 1, and 3 elsewhere.
+fn robot() -> Trial {
+    let products = [(1, 0, Side::Right), (0, 0, Side::Down), (0, 0, Side::Left)];
+    let map = warehouse((2, 1), (0, 0), 45, &products);
+    Trial::new(map, EXIT, Trouble::NONE, 3)
+}
+
+/// The same, with orders 1, 2, 3, … for these products, the first of them under way.
+fn busy(products: &[i32]) -> Trial {
+    let mut trial = robot();
+    for (id, product) in (1..).zip(products) {
+        trial.order(id, *product);
+    }
+    trial.run_for(SECOND);
+    trial
+}
+
+fn waiting(trial: &Trial) -> Vec<u32> {
+    trial.queue.orders().iter().map(|order| order.id).collect()
+}
+
+/// The orders of the events of one kind, each time it happened.
+fn orders(trial: &Trial, wanted: EventKind) -> Vec<u32> {
+    let of_kind = trial.events.iter().filter(|(kind, ..)| *kind == wanted);
+    of_kind.map(|(_, id, _)| *id).collect()
+}
+
+/// A person closes or opens the way upwards and to the right of the robot's start, or one of them.
+fn way(trial: &mut Trial, node: (u8, u8), heading: Heading, open: bool) {
+    trial.tell(Input::Way {
+        node: Node::new(node.0, node.1),
+        heading,
+        open,
+        source: BlockSource::Person,
+    });
+}
+
+#[test]
+fn orders_are_carried_out_in_the_order_given() {
+    let mut trial = busy(&[1, 3, 2, 1]);
+    assert_eq!((trial.queue.under_way, trial.queue.order_id), (1, 1));
+    assert_eq!(waiting(&trial), [2, 3, 4]);
+    trial.deliver(4);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [1, 2, 3, 4]);
+    assert_eq!(
+        trial.queue,
+        OrderQueue {
+            order_id: 0,
+            product: 0,
+            ..trial.queue
+        }
+    );
+    assert_eq!((trial.queue.under_way, trial.queue.count), (0, 0));
+}
+
+#[test]
+fn waiting_orders_are_cancelled_moved_up_and_cleared_while_it_drives() {
+    let mut trial = busy(&[1, 2, 3, 1]);
+    trial.tell(Input::MoveUp(4));
+    assert_eq!(waiting(&trial), [2, 4, 3]);
+    trial.tell(Input::MoveUp(4));
+    trial.tell(Input::MoveUp(4));
+    assert_eq!(
+        waiting(&trial),
+        [4, 2, 3],
+        "before the first there is no place"
+    );
+    trial.tell(Input::Cancel(2));
+    trial.tell(Input::Cancel(1));
+    trial.tell(Input::Cancel(77));
+    trial.tell(Input::MoveUp(77));
+    assert_eq!(waiting(&trial), [4, 3], "what is under way does not wait");
+    let mut cleared = trial.clone();
+    trial.deliver(3);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [1, 4, 3]);
+    cleared.tell(Input::ClearQueue);
+    assert_eq!(waiting(&cleared), [0; 0]);
+    cleared.deliver(1);
+}
+
+#[test]
+fn a_full_queue_refuses_and_says_how_many_wait() {
+    let mut trial = busy(&[1]);
+    for id in 2..MOST_ORDERS as u32 + 2 {
+        trial.order(id, 2);
+    }
+    assert_eq!(trial.queue.orders().len(), MOST_ORDERS);
+    assert_eq!(orders(&trial, EventKind::Refused), [0; 0]);
+    trial.order(99, 2);
+    assert_eq!(orders(&trial, EventKind::Refused), [99]);
+    let said = trial.thoughts.last().unwrap();
+    assert!(said.contains("31 orders are waiting already"), "{said}");
+    trial.order(98, 12);
+    let said = trial.thoughts.last().unwrap();
+    assert!(said.contains("product 12"), "{said}");
+}
+
+#[test]
+fn an_order_without_a_way_is_put_off_and_carried_out_when_one_opens() {
+    let mut trial = robot();
+    // Nothing leads to the left edge any more: it is itself what is closed.
+    way(&mut trial, (0, 0), Heading::Up, false);
+    trial.order(1, 3);
+    trial.order(2, 2);
+    trial.order(3, 1);
+    trial.deliver_but(2, 1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2, 3]);
+    assert_eq!(waiting(&trial), [1]);
+    assert_eq!(trial.queue.orders()[0].put_off, 1);
+    way(&mut trial, (0, 0), Heading::Up, true);
+    trial.deliver(3);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2, 3, 1]);
+    assert_eq!(orders(&trial, EventKind::Refused), [0; 0]);
+}
+
+#[test]
+fn an_order_that_loses_its_way_waits_while_another_one_is_carried_out() {
+    let mut trial = busy(&[1, 2]);
+    assert_eq!(trial.queue.order_id, 1);
+    // The edge of product 1 is closed while the robot is on its way there.
+    way(&mut trial, (2, 0), Heading::Up, false);
+    trial.deliver_but(1, 1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2]);
+    assert_eq!(waiting(&trial), [1]);
+    way(&mut trial, (2, 0), Heading::Up, true);
+    trial.deliver(2);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2, 1]);
+}
+
+#[test]
+fn who_waits_at_home_for_a_way_to_a_cancelled_order_waits_no_more() {
+    let mut trial = robot();
+    way(&mut trial, (0, 0), Heading::Up, false);
+    trial.order(1, 3);
+    trial.step();
+    let failure = trial.navigator.status().failure;
+    assert_eq!(failure.kind.get(), Some(FailureKind::NoWay));
+    trial.tell(Input::Cancel(1));
+    assert!(trial.navigator.status().failure.is_none());
+    trial.order(2, 2);
+    trial.deliver(1);
+}
+
+#[test]
+fn a_reset_gives_up_what_is_under_way_and_nothing_that_waits() {
+    let mut trial = busy(&[1, 2]);
+    trial.body.stopped = true;
+    trial.tell_mode();
+    trial.run_for(SECOND);
+    let start = Body::new(&trial.published, EXIT, Trouble::NONE, 3);
+    (trial.body.x, trial.body.y, trial.body.angle) = (start.x, start.y, start.angle);
+    trial.tell(Input::Reset);
+    assert_eq!(orders(&trial, EventKind::Refused), [1]);
+    trial.body.stopped = false;
+    trial.tell_mode();
+    trial.deliver(1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2]);
+}
+
+#[test]
+fn every_order_survives_a_kill_at_every_step() {
+    let mut trial = busy(&[2]);
+    // One has no way until the others are delivered, so that it is put off as well.
+    way(&mut trial, (1, 0), Heading::Right, false);
+    way(&mut trial, (1, 1), Heading::Right, false);
+    trial.order(2, 1);
+    trial.order(3, 3);
+    let mut kills = 0;
+    while orders(&trial, EventKind::ItemDelivered) != [1, 3] {
+        // Killed between any two of its words: with what it had published of each.
+        let (before, queue) = (trial.status, trial.queue);
+        trial.step();
+        kills += 1;
+        let all_known = |navigator: &Navigator, delivered: &[u32]| {
+            let queue = navigator.queue();
+            let mut known: Vec<u32> = queue.orders().iter().map(|order| order.id).collect();
+            known.extend((queue.under_way != 0).then_some(queue.order_id));
+            known.extend(delivered);
+            known.sort_unstable();
+            known.dedup();
+            known
+        };
+        for (status, queue) in [
+            (before, queue),
+            (before, trial.queue),
+            (trial.status, trial.queue),
+        ] {
+            let config = LogicConfig::default();
+            let successor = Navigator::resume(config, &status, &trial.blocks, &queue);
+            let delivered = orders(&trial, EventKind::ItemDelivered);
+            assert_eq!(
+                all_known(&successor, &delivered),
+                [1, 2, 3],
+                "{}",
+                trial.story()
+            );
+            let again = successor.queue();
+            let numbers: Vec<u32> = again.orders().iter().map(|order| order.id).collect();
+            assert!(
+                !numbers.contains(&again.order_id) || again.under_way == 0,
+                "{again:?}"
+            );
+        }
+        if kills % 400 == 0 {
+            let mut fork = trial.clone();
+            fork.kill(Duration::from_millis(300));
+            way(&mut fork, (1, 0), Heading::Right, true);
+            fork.deliver(3);
+        }
+        assert!(trial.body.now < SECOND * 200, "{}", trial.story());
+    }
+    assert!(kills > 4_000, "only {kills} steps");
+    assert_ne!(trial.phase(), Phase::Stuck);
+}

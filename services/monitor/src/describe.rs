@@ -1,0 +1,155 @@
+//! `topic list` and `topic info`: what is on the bus, and what one topic is.
+
+use std::io::Write;
+
+use lager_ports::Layout;
+use lager_topics::{TOPICS, UnknownTopic};
+use serde_json::json;
+
+use crate::{Count, ToolError, Tools};
+
+impl<W: Write> Tools<'_, W> {
+    /// `topic list`: every topic that is open on the bus, of every robot or only of the tools'.
+    ///
+    /// # Errors
+    /// The bus cannot be looked at, or the output cannot be written.
+    pub fn list(&mut self, every_robot: bool) -> Result<(), ToolError> {
+        let topics = self
+            .watchdog
+            .over("listing the topics", || self.bus.topics())?;
+        let mut topics: Vec<_> = topics
+            .into_iter()
+            .filter(|topic| every_robot || topic.robot == *self.bus.robot())
+            .collect();
+        topics.sort_by(|a, b| a.robot.cmp(&b.robot));
+        if topics.is_empty() && !self.as_json {
+            let of = match every_robot {
+                true => "on this bus".to_owned(),
+                false => format!("of the robot `{}`", self.bus.robot()),
+            };
+            writeln!(self.out, "no topic {of} is open; `lager up` starts a robot")?;
+        }
+        for topic in topics {
+            if self.as_json {
+                let value = json!({
+                    "robot": topic.robot.as_str(), "topic": topic.name,
+                    "publishers": topic.publishers, "subscribers": topic.subscribers,
+                    "observers": topic.observers, "ours": topic.layout == Layout::Ours,
+                });
+                writeln!(self.out, "{value}")?;
+                continue;
+            }
+            let name = format!("lager/{}/{}", topic.robot, topic.name);
+            match topic.layout {
+                Layout::Ours => {
+                    let publishers = Count(topic.publishers, "publisher").to_string();
+                    let subscribers = Count(topic.subscribers, "subscriber").to_string();
+                    let observers = Count(topic.observers, "observer");
+                    writeln!(
+                        self.out,
+                        "{name:30}  {publishers:>13}  {subscribers:>14}, {observers} among them"
+                    )?;
+                }
+                _ => writeln!(
+                    self.out,
+                    "{name:30}  of another build: its layout is not this one's"
+                )?,
+            }
+        }
+        Ok(())
+    }
+
+    /// `topic info`: what one topic carries, its limits, and who is on it now.
+    ///
+    /// # Errors
+    /// No topic has that name, or the output cannot be written.
+    pub fn info(&mut self, name: &str) -> Result<(), ToolError> {
+        let entry = TOPICS
+            .iter()
+            .find(|entry| entry.name == name)
+            .ok_or_else(|| UnknownTopic(name.to_owned()))?;
+        let live = self
+            .watchdog
+            .over("looking at the topic", || {
+                self.bus.topics_of(self.bus.robot())
+            })
+            .into_iter()
+            .find(|topic| topic.name == name);
+        let (publishers, subscribers) = live
+            .as_ref()
+            .map_or((0, 0), |topic| (topic.publishers, topic.subscribers));
+        let woken: Vec<u32> = live
+            .iter()
+            .flat_map(|topic| topic.woken.iter().map(|peer| peer.pid))
+            .collect();
+        let actors: Vec<String> = entry.qos.actors.iter().map(ToString::to_string).collect();
+        if self.as_json {
+            let fields: Vec<_> = entry
+                .fields
+                .iter()
+                .map(|field| {
+                    json!({"name": field.name, "type": field.type_name, "offset": field.offset})
+                })
+                .collect();
+            let value = json!({
+                "name": name, "summary": entry.summary, "type": entry.type_name,
+                "hash": format!("{:016x}", entry.hash), "size": entry.size, "fields": fields,
+                "buffer": entry.qos.buffer, "history": entry.qos.history, "actors": actors,
+                "publishers": publishers, "subscribers": subscribers, "woken": woken,
+            });
+            writeln!(self.out, "{value}")?;
+            return Ok(());
+        }
+        let out = &mut *self.out;
+        writeln!(out, "{name}: {}", entry.summary)?;
+        writeln!(
+            out,
+            "  carries     {}, {}, schema {:016x}",
+            entry.type_name,
+            Count(entry.size, "byte"),
+            entry.hash
+        )?;
+        for field in entry.fields {
+            writeln!(
+                out,
+                "    {:4}  {:24} {}",
+                field.offset, field.name, field.type_name
+            )?;
+        }
+        writeln!(
+            out,
+            "  keeps       {} for each subscriber, {}",
+            Count(entry.qos.buffer, "sample"),
+            match entry.qos.history {
+                0 => "nothing for late joiners",
+                _ => "the last one for late joiners",
+            }
+        )?;
+        let awake = if actors.is_empty() {
+            "nobody".to_owned()
+        } else {
+            actors.join(", ")
+        };
+        writeln!(out, "  wakes       {awake}")?;
+        writeln!(
+            out,
+            "  has now     {}, {}",
+            Count(publishers, "publisher"),
+            Count(subscribers, "subscriber")
+        )?;
+        let ends = live.iter().flat_map(|topic| {
+            let writers = topic.writers.iter().map(|peer| ("written", peer));
+            let readers = topic.readers.iter().map(|peer| ("read", peer));
+            let woken = topic.woken.iter().map(|peer| ("woken", peer));
+            writers.chain(readers).chain(woken)
+        });
+        for (done, peer) in ends {
+            let role = peer
+                .role
+                .map_or("a stranger".into(), |role| role.to_string());
+            let by = if done == "woken" { "is" } else { "by" };
+            writeln!(out, "    {done:7} {by} {role}, process {}", peer.pid)?;
+        }
+        Ok(())
+    }
+}

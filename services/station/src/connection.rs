@@ -1,0 +1,187 @@
+//! One connection: bytes to lines and lines to bytes, without ever waiting for its peer.
+//!
+//! What is kept of a peer is bounded: one line that it has not ended, and [`MOST_UNREAD`] bytes
+//! that it has not read. Whoever is slower than that is closed, see [`Connection::overdue`].
+
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use lager_lines::splitter::{LineError, LineSplitter};
+
+/// What a peer may leave unread, in bytes: some sixty of the longest lines.
+const MOST_UNREAD: usize = 64 * 1024;
+
+/// How long a peer may take from the beginning of a line to its end, and to read anything of what
+/// waits for it.
+const SLOWEST: Duration = Duration::from_secs(5);
+
+/// How long somebody may be connected without having said a line.
+const SILENT: Duration = Duration::from_secs(10);
+
+/// Bytes that are read at a time. What a peer sends beyond them waits for its next turn, so that
+/// one that never ends keeps nobody else waiting.
+const READ: usize = 4096;
+
+/// A stream of either kind.
+#[derive(Debug)]
+pub(crate) enum Stream {
+    Tcp(TcpStream),
+    Unix(UnixStream),
+}
+
+impl Stream {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Tcp(stream) => stream.read(buffer),
+            Self::Unix(stream) => stream.read(buffer),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Tcp(stream) => stream.write(bytes),
+            Self::Unix(stream) => stream.write(bytes),
+        }
+    }
+}
+
+impl AsFd for Stream {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        match self {
+            Self::Tcp(stream) => stream.as_fd(),
+            Self::Unix(stream) => stream.as_fd(),
+        }
+    }
+}
+
+/// A connection whose stream does not block.
+#[derive(Debug)]
+pub(crate) struct Connection {
+    stream: Stream,
+    splitter: LineSplitter,
+    unread: Vec<u8>,
+    /// Since when there is something the peer has not read.
+    unread_since: Instant,
+    /// Since when a line is begun and not ended.
+    begun_since: Option<Instant>,
+    opened: Instant,
+    /// Whether its first line is still awaited.
+    is_silent: bool,
+}
+
+impl Connection {
+    /// A new connection; `speaks_first` is whether its peer has to say something soon.
+    pub(crate) fn new(stream: Stream, now: Instant, speaks_first: bool) -> Self {
+        Self {
+            stream,
+            splitter: LineSplitter::new(),
+            unread: Vec::new(),
+            unread_since: now,
+            begun_since: None,
+            opened: now,
+            is_silent: speaks_first,
+        }
+    }
+
+    /// Whether something waits to be written.
+    pub(crate) fn wants_to_write(&self) -> bool {
+        !self.unread.is_empty()
+    }
+
+    /// Takes what has arrived and hands on each line.
+    ///
+    /// # Errors
+    ///
+    /// The connection has ended; the lines before its end have been handed on.
+    pub(crate) fn read(
+        &mut self,
+        now: Instant,
+        mut hear: impl FnMut(Result<&str, LineError>),
+    ) -> io::Result<()> {
+        let mut buffer = [0; READ];
+        let count = match self.stream.read(&mut buffer) {
+            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(count) => count,
+            Err(error) if is_nothing(&error) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        let mut bytes = &buffer[..count];
+        let mut ended = false;
+        while let Some(line) = self.splitter.next(&mut bytes) {
+            self.is_silent = false;
+            ended = true;
+            hear(line);
+        }
+        match self.splitter.pending() {
+            0 => self.begun_since = None,
+            _ if ended || self.begun_since.is_none() => self.begun_since = Some(now),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Says a line, as far as the peer takes it at once; the rest waits.
+    ///
+    /// # Errors
+    ///
+    /// The connection has ended, or the peer has left too much unread.
+    pub(crate) fn say(&mut self, now: Instant, line: &str) -> io::Result<()> {
+        if self.unread.is_empty() {
+            self.unread_since = now;
+        }
+        self.unread.extend_from_slice(line.as_bytes());
+        self.write(now)?;
+        if self.unread.len() > MOST_UNREAD {
+            return Err(io::Error::other("it does not read what it is told"));
+        }
+        Ok(())
+    }
+
+    /// Writes what waits, as far as the peer takes it.
+    ///
+    /// # Errors
+    ///
+    /// The connection has ended.
+    pub(crate) fn write(&mut self, now: Instant) -> io::Result<()> {
+        while !self.unread.is_empty() {
+            match self.stream.write(&self.unread) {
+                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+                Ok(count) => {
+                    self.unread.drain(..count);
+                    self.unread_since = now;
+                }
+                Err(error) if is_nothing(&error) => return Ok(()),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// Why it is closed now, if its peer has taken too long over something.
+    pub(crate) fn overdue(&self, now: Instant) -> Option<&'static str> {
+        let over = |since: Instant, most| now.saturating_duration_since(since) > most;
+        if self.wants_to_write() && over(self.unread_since, SLOWEST) {
+            return Some("it does not read what it is told");
+        }
+        if self.begun_since.is_some_and(|since| over(since, SLOWEST)) {
+            return Some("it has begun a line and does not end it");
+        }
+        (self.is_silent && over(self.opened, SILENT)).then_some("it says nothing")
+    }
+}
+
+impl AsFd for Connection {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.stream.as_fd()
+    }
+}
+
+fn is_nothing(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+    )
+}

@@ -1,0 +1,402 @@
+//! The conversation with one robot as the external computer sees it. The external computer answers
+//! by itself, or passes on what a GaG answers while one speaks for this robot.
+//!
+//! ```text
+//!  the robot asks            it is answered
+//!  sidelength, karta,        from the warehouse, at once or when there is one (AMB-42)
+//!  prodlis
+//!  fetchprod                 with the first product of the queue, or when one is put in (AMB-43)
+//!  styrcomm, armcomm         with the first command that waits, or when one is given (C5)
+//!  armcomm                   with pickup_done, once a person has said so and no command waits
+//! ```
+//!
+//! - One question is held; a new one takes its place, and nothing is said to the old one any more.
+//! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
+//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. When the robot asks
+//!   for something else, or its connection ends, they are dropped: nobody's old command moves it
+//!   later.
+//! - A product leaves the queue when the robot is told it. If the connection ends before the robot
+//!   has said another word, it is put back, since it may not have arrived.
+//! - The queue outlives connections.
+//! - While a GaG speaks for the robot only commands are answered from here, those that were given
+//!   besides the GaG's: a stop above all.
+//!
+//! Time is no part of it: how long a robot has not been heard is the matter of who carries the
+//! lines.
+
+use std::collections::VecDeque;
+
+use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
+use lager_lines::extension::{Hello, Order, Report, State};
+use lager_lines::gag::{Answer, Query, Request, Telemetry};
+use lager_lines::{Coord, Direction, Map, Name, ProductId, Products, SideLength, Text};
+use lager_wire::OperatorCommand;
+use thiserror::Error;
+
+use crate::warehouse::{Warehouse, WarehouseError};
+
+/// What a robot is doing, as far as its questions tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Doing {
+    /// It is not connected.
+    #[default]
+    Away,
+    /// It is connected and asks about the warehouse.
+    Starting,
+    /// It waits to be told what to fetch.
+    Idle,
+    /// It fetches a product by itself.
+    Fetching,
+    /// It stands at the goods and asks for steps of the arm (C7).
+    Picking,
+    /// It is driven by hand (C4).
+    ByHand,
+}
+
+impl Doing {
+    /// Whether it takes commands.
+    pub const fn takes_commands(self) -> bool {
+        matches!(self, Self::Picking | Self::ByHand)
+    }
+}
+
+/// Why a command is not given to a robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum CommandRefused {
+    /// It does not ask for any.
+    #[error(
+        "the robot takes no commands now; it does when it is switched to manual or stands at goods"
+    )]
+    NotAsked,
+    /// It is slower than whoever gives them.
+    #[error(
+        "{} commands wait already; wait until the robot has taken some, or stop it",
+        Robot::MOST_COMMANDS
+    )]
+    Full,
+    /// There are no goods to be picked up.
+    #[error("the robot does not stand at goods, so nothing was picked up")]
+    NotPicking,
+}
+
+/// Why a product is not put in a robot's queue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum FetchRefused {
+    /// There is no such product.
+    #[error("there is no product {product} in the warehouse")]
+    Unknown {
+        /// Its number.
+        product: ProductId,
+    },
+    /// Too many wait.
+    #[error(
+        "{} products wait already; wait until some are delivered",
+        Robot::MOST_PRODUCTS
+    )]
+    Full,
+}
+
+/// One robot.
+#[derive(Clone, Debug, Default)]
+pub struct Robot {
+    doing: Doing,
+    held: Held,
+    hello: Option<Hello>,
+    warehouse: Option<(SideLength, Map, Products)>,
+    queue: VecDeque<ProductId>,
+    /// The product that it was told last.
+    told: Option<ProductId>,
+    /// Whether it has not been heard since it was told.
+    is_unanswered: bool,
+    commands: VecDeque<OperatorCommand>,
+    is_picked: bool,
+    has_gag: bool,
+    stops: u32,
+    node: Option<Coord>,
+    looks: Option<Direction>,
+    thought: Option<Text>,
+    state: Option<State>,
+}
+
+/// What a person wants of it. What is returned is said to the robot, in this order.
+impl Robot {
+    /// Commands that may wait, at most (C5).
+    pub const MOST_COMMANDS: usize = 32;
+    /// Products that may wait, at most.
+    pub const MOST_PRODUCTS: usize = 256;
+
+    /// The warehouse is known, or is another one.
+    ///
+    /// # Errors
+    ///
+    /// When there can be no such warehouse; the one before is kept.
+    pub fn set_warehouse(
+        &mut self,
+        warehouse: &Warehouse,
+    ) -> Result<Option<StationLine>, WarehouseError> {
+        self.warehouse = Some(warehouse.check()?);
+        Ok(self.answer())
+    }
+
+    /// Gives a command. A stop takes the place of all that wait.
+    ///
+    /// # Errors
+    ///
+    /// When the robot does not ask for commands or too many wait.
+    pub fn command(
+        &mut self,
+        command: OperatorCommand,
+    ) -> Result<Option<StationLine>, CommandRefused> {
+        if !self.doing.takes_commands() {
+            return Err(CommandRefused::NotAsked);
+        }
+        if command == OperatorCommand::Stop {
+            self.commands.clear();
+        }
+        if self.commands.len() == Self::MOST_COMMANDS {
+            return Err(CommandRefused::Full);
+        }
+        self.commands.push_back(command);
+        Ok(self.answer())
+    }
+
+    /// Stops the robot: in the extension's lane of its own if it speaks that, else by a command.
+    ///
+    /// # Errors
+    ///
+    /// When it speaks only the document's language and does not ask for commands.
+    pub fn stop(&mut self) -> Result<Option<StationLine>, CommandRefused> {
+        if self.hello.is_none() {
+            return self.command(OperatorCommand::Stop);
+        }
+        self.commands.clear();
+        self.stops = self.stops.wrapping_add(1);
+        let number = Some(self.stops);
+        Ok(Some(StationLine::Order(Order::Stop { number })))
+    }
+
+    /// The goods are in the gripper (Q5). Commands that wait are given first.
+    ///
+    /// # Errors
+    ///
+    /// When the robot does not stand at goods.
+    pub fn picked_up(&mut self) -> Result<Option<StationLine>, CommandRefused> {
+        if self.doing != Doing::Picking {
+            return Err(CommandRefused::NotPicking);
+        }
+        self.is_picked = true;
+        Ok(self.answer())
+    }
+
+    /// Has a product fetched after those that wait (F3).
+    ///
+    /// # Errors
+    ///
+    /// When the warehouse does not have it or too many wait.
+    pub fn fetch(&mut self, product: ProductId) -> Result<Option<StationLine>, FetchRefused> {
+        let products = self.warehouse.iter().flat_map(|(_, _, all)| all.as_slice());
+        if !products.into_iter().any(|one| one.id == product) {
+            return Err(FetchRefused::Unknown { product });
+        }
+        if self.queue.len() == Self::MOST_PRODUCTS {
+            return Err(FetchRefused::Full);
+        }
+        self.queue.push_back(product);
+        Ok(self.answer())
+    }
+
+    /// Takes the first of the products that wait with this number out of the queue; tells whether
+    /// there was one.
+    pub fn cancel(&mut self, product: ProductId) -> bool {
+        let place = self.queue.iter().position(|waits| *waits == product);
+        place.and_then(|place| self.queue.remove(place)).is_some()
+    }
+}
+
+/// What a GaG says for it.
+impl Robot {
+    /// Whether a GaG speaks for it from now on.
+    pub fn set_gag(&mut self, has_gag: bool) -> Option<StationLine> {
+        self.has_gag = has_gag;
+        self.answer()
+    }
+
+    /// Passes on what the GaG answers.
+    ///
+    /// # Errors
+    ///
+    /// When the robot asks nothing, or something else. It is not told.
+    pub fn given(&mut self, answer: Answer) -> Result<StationLine, AnswerRefused> {
+        let query = self.held.answer(&answer)?;
+        match answer {
+            Answer::Fetch(product) => {
+                self.begin(product);
+                // If it does not arrive, the robot asks again and the GaG with it.
+                self.is_unanswered = false;
+            }
+            Answer::PickupDone => self.doing = Doing::Fetching,
+            Answer::Command(OperatorCommand::Stop) => self.commands.clear(),
+            _ => {}
+        }
+        Ok(StationLine::Answer(answer.spelled_as(query)))
+    }
+}
+
+/// What the robot does.
+impl Robot {
+    /// It has connected.
+    pub fn connected(&mut self) {
+        self.disconnected();
+        self.doing = Doing::Starting;
+    }
+
+    /// Its connection has ended.
+    pub fn disconnected(&mut self) {
+        if let Some(product) = self.told.take_if(|_| self.is_unanswered) {
+            self.queue.push_front(product);
+        }
+        self.doing = Doing::Away;
+        self.held.clear();
+        self.hello = None;
+        self.is_unanswered = false;
+        self.drop_commands();
+    }
+
+    /// It has said something. What is returned is said to it.
+    pub fn heard(&mut self, line: RobotLine) -> Option<StationLine> {
+        // An announcement is repeated as a sign of life, and may have been under way before.
+        if !matches!(line, RobotLine::Hello(_)) {
+            self.is_unanswered = false;
+        }
+        match line {
+            RobotLine::Request(Request::Query(query)) => return self.asked(query),
+            RobotLine::Request(Request::Telemetry(telemetry)) => match telemetry {
+                Telemetry::Thought(thought) => self.thought = Some(thought),
+                Telemetry::Robot(node) => self.node = Some(node),
+                Telemetry::Heading(looks) => self.looks = Some(looks),
+            },
+            RobotLine::Hello(hello) => self.hello = Some(hello),
+            RobotLine::Report(Report::State(state)) => self.state = Some(*state),
+            RobotLine::Report(_) => {}
+        }
+        None
+    }
+
+    fn asked(&mut self, query: Query) -> Option<StationLine> {
+        self.doing = match query {
+            Query::SideLength | Query::Map | Query::Products(_) => Doing::Starting,
+            Query::Fetch => Doing::Idle,
+            Query::Arm => Doing::Picking,
+            Query::Wheels => Doing::ByHand,
+        };
+        if self.doing != Doing::Picking {
+            self.is_picked = false;
+        }
+        if !self.doing.takes_commands() {
+            self.drop_commands();
+        }
+        self.held.ask(query);
+        self.answer()
+    }
+
+    /// It is told to fetch `product`.
+    fn begin(&mut self, product: ProductId) {
+        self.told = Some(product);
+        self.is_unanswered = true;
+        self.doing = Doing::Fetching;
+    }
+
+    fn drop_commands(&mut self) {
+        self.commands.clear();
+        self.is_picked = false;
+    }
+
+    /// The answer to the question that is held, if it can be given now.
+    fn answer(&mut self) -> Option<StationLine> {
+        let query = self.held.get()?;
+        if self.has_gag && !matches!(query, Query::Arm | Query::Wheels) {
+            return None;
+        }
+        let warehouse = self.warehouse.as_ref();
+        let answer = match query {
+            Query::SideLength => Answer::SideLength(warehouse?.0),
+            Query::Map => Answer::Map(warehouse?.1),
+            Query::Products(word) => Answer::Products(word, warehouse?.2.clone()),
+            Query::Fetch => {
+                let product = self.queue.pop_front()?;
+                self.begin(product);
+                Answer::Fetch(product)
+            }
+            Query::Arm | Query::Wheels => match self.commands.pop_front() {
+                Some(command) => Answer::Command(command),
+                None if query == Query::Arm && self.is_picked => {
+                    self.is_picked = false;
+                    self.doing = Doing::Fetching;
+                    Answer::PickupDone
+                }
+                None => return None,
+            },
+        };
+        self.held.clear();
+        Some(StationLine::Answer(answer))
+    }
+}
+
+/// What is known of it.
+impl Robot {
+    /// What it is doing.
+    pub const fn doing(&self) -> Doing {
+        self.doing
+    }
+
+    /// Its name, once it has announced the extension.
+    pub fn name(&self) -> Option<&Name> {
+        self.hello.as_ref().map(|hello| &hello.name)
+    }
+
+    /// The question that is held.
+    pub const fn held(&self) -> Option<Query> {
+        self.held.get()
+    }
+
+    /// The product that it was told last.
+    pub const fn told(&self) -> Option<ProductId> {
+        self.told
+    }
+
+    /// The products that wait, the next one first.
+    pub fn queue(&self) -> impl Iterator<Item = ProductId> {
+        self.queue.iter().copied()
+    }
+
+    /// The same, with the product before them that it was told and may not have heard.
+    pub fn unfetched(&self) -> impl Iterator<Item = ProductId> {
+        let told = self.told.filter(|_| self.is_unanswered);
+        told.into_iter().chain(self.queue())
+    }
+
+    /// The commands that wait, the next one first.
+    pub fn commands(&self) -> impl Iterator<Item = OperatorCommand> {
+        self.commands.iter().copied()
+    }
+
+    /// The node it told last, to which it goes.
+    pub const fn node(&self) -> Option<Coord> {
+        self.node
+    }
+
+    /// Where it said last that it looks.
+    pub const fn looks(&self) -> Option<Direction> {
+        self.looks
+    }
+
+    /// What it said last.
+    pub const fn thought(&self) -> Option<&Text> {
+        self.thought.as_ref()
+    }
+
+    /// Its last state, if it speaks the extension.
+    pub const fn state(&self) -> Option<&State> {
+        self.state.as_ref()
+    }
+}

@@ -1,0 +1,425 @@
+//! The sockets: robots by TCP, one GaG by a unix socket of this user alone, in one thread that
+//! waits for all of them.
+//!
+//! - At most [`Server::MOST_ROBOTS`] connections of robots are open; a further one is closed at
+//!   once, and so is the one of a GaG while there is one.
+//! - Whoever is too slow is closed (`connection.rs`); of a peer that is gone without a word the
+//!   kernel says so: it asks every silent peer after 5 s and gives one up that has not answered for
+//!   10 s, or has not confirmed for 10 s what it was sent.
+//! - Each connection reads at most 4 KiB a turn.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Read as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::os::fd::AsFd;
+use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_lines::{Name, ProductId};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::net::sockopt;
+use thiserror::Error;
+
+use crate::connection::{Connection, Stream};
+use crate::handle::Handle;
+use crate::queues::Queues;
+use crate::saver::{Changes, Saver};
+use crate::station::{Output, Peer, Station, WishRefused};
+use crate::warehouse::{LoadError, Warehouse, WarehouseError, load};
+
+/// How often slow peers and the wish to end are looked for when nothing happens.
+const GLANCE: Duration = Duration::from_millis(100);
+/// When the kernel begins to ask a silent peer whether it is there, and how often.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+const KEEP_ALIVE_AGAIN: Duration = Duration::from_secs(2);
+/// When the kernel gives up a peer that does not confirm, in ms.
+const UNCONFIRMED_MS: u32 = 10_000;
+
+/// Where a station listens and what it knows.
+#[derive(Debug)]
+pub struct ServerConfig {
+    /// What the station calls itself.
+    pub name: Name,
+    /// Where robots connect.
+    pub listen: Listen,
+    /// Where a GaG connects, if one may.
+    pub gag: Option<PathBuf>,
+    /// The file of the warehouse, in which changes are saved. It need not be there yet: then a GaG
+    /// or another user of the station describes the warehouse. The robots' queues lie beside it.
+    pub warehouse: Option<PathBuf>,
+    /// What robots are to fetch after what waits for them already.
+    pub fetch: Vec<(Name, ProductId)>,
+}
+
+/// Where robots connect.
+#[derive(Debug)]
+pub enum Listen {
+    /// At an address; port 0 is one that is free.
+    At(SocketAddr),
+    /// At a socket that listens already.
+    On(TcpListener),
+}
+
+/// Why there is no station.
+#[derive(Debug, Error)]
+pub enum ServerError {
+    /// Robots could not connect.
+    #[error("cannot listen for robots at {at}: {error}; --listen takes another address")]
+    Listen {
+        /// Where.
+        at: SocketAddr,
+        /// Why.
+        error: io::Error,
+    },
+    /// A GaG could not connect.
+    #[error("cannot listen for a GaG at {}: {error}; --gag takes another path", .path.display())]
+    Gag {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// Somebody else listens there.
+    #[error("another station listens for a GaG at {}; end it, or give --gag another path", .path.display())]
+    GagInUse {
+        /// Where.
+        path: PathBuf,
+    },
+    /// The warehouse's file is none.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// There can be no such warehouse.
+    #[error(transparent)]
+    Warehouse(#[from] WarehouseError),
+    /// A robot cannot be told to fetch that.
+    #[error("robot {robot} is not told to fetch product {product}: {why}")]
+    Fetch {
+        /// Which.
+        robot: Name,
+        /// What.
+        product: ProductId,
+        /// Why not.
+        why: WishRefused,
+    },
+    /// The machine does not let it wait.
+    #[error("the station cannot go on: {0}")]
+    Machine(#[from] io::Error),
+}
+
+/// The station with its sockets.
+#[derive(Debug)]
+pub struct Server {
+    robots: TcpListener,
+    gag: Option<(UnixListener, PathBuf)>,
+    wakes: UnixStream,
+    handle: Handle,
+    saver: Saver,
+    /// The queues as they are saved.
+    saved: Queues,
+    connections: BTreeMap<Peer, Connection>,
+    next_link: u64,
+}
+
+impl Server {
+    /// Connections of robots that are open at a time, at most.
+    pub const MOST_ROBOTS: usize = 64;
+
+    /// Opens the sockets and reads the warehouse. Who connects waits until [`Server::run`].
+    ///
+    /// # Errors
+    ///
+    /// When a socket cannot be had or the warehouse cannot be.
+    pub fn open(config: ServerConfig) -> Result<Self, ServerError> {
+        let mut station = Station::new(config.name.clone(), read(config.warehouse.as_deref())?)?;
+        let saved = match &config.warehouse {
+            Some(warehouse) => Queues::load(&Queues::beside(warehouse))?,
+            None => Queues::default(),
+        };
+        put_back(&mut station, &saved);
+        for (robot, product) in config.fetch {
+            let put = station.fetch(&robot, product);
+            put.map_err(|why| ServerError::Fetch {
+                robot,
+                product,
+                why,
+            })?;
+        }
+        let robots = match config.listen {
+            Listen::On(robots) => robots,
+            Listen::At(at) => {
+                TcpListener::bind(at).map_err(|error| ServerError::Listen { at, error })?
+            }
+        };
+        robots.set_nonblocking(true)?;
+        let gag = match &config.gag {
+            None => None,
+            Some(path) => Some((listen_for_gag(path)?, path.clone())),
+        };
+        let (wakes, waker) = UnixStream::pair()?;
+        wakes.set_nonblocking(true)?;
+        waker.set_nonblocking(true)?;
+        let handle = Handle::new(station, waker);
+        Ok(Self {
+            robots,
+            gag,
+            wakes,
+            saver: Saver::new(config.warehouse, handle.clone()),
+            saved,
+            handle,
+            connections: BTreeMap::new(),
+            next_link: 0,
+        })
+    }
+
+    /// Where robots connect.
+    ///
+    /// # Errors
+    ///
+    /// When the machine does not say.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.robots.local_addr()
+    }
+
+    /// What other threads use.
+    pub fn handle(&self) -> Handle {
+        self.handle.clone()
+    }
+
+    /// Serves until `shutdown` is set.
+    ///
+    /// # Errors
+    ///
+    /// When the machine does not let it wait for its sockets.
+    pub fn run(mut self, shutdown: &AtomicBool) -> Result<(), ServerError> {
+        while !shutdown.load(Ordering::SeqCst) {
+            let ready = self.wait()?;
+            let now = Instant::now();
+            for peer in ready.write {
+                let written = self.connections.get_mut(&peer).map(|one| one.write(now));
+                if let Some(Err(error)) = written {
+                    self.end(peer, &error.to_string());
+                }
+            }
+            for peer in ready.read {
+                self.hear(now, peer);
+            }
+            self.say(now);
+            self.let_in(now);
+            self.close_overdue(now);
+            self.say(now);
+            self.save();
+        }
+        Ok(())
+    }
+
+    /// Has what has changed saved.
+    fn save(&mut self) {
+        let warehouse = self.handle.take(Station::unsaved);
+        let queues = self.handle.look(Station::queues);
+        let queues = (queues != self.saved).then_some(queues);
+        if let Some(queues) = &queues {
+            self.saved.clone_from(queues);
+        }
+        self.saver.save(Changes { warehouse, queues });
+    }
+
+    /// Waits until there is something to do.
+    fn wait(&self) -> io::Result<Ready> {
+        let mut waited: Vec<PollFd<'_>> = vec![
+            PollFd::new(&self.robots, PollFlags::IN),
+            PollFd::new(&self.wakes, PollFlags::IN),
+        ];
+        let first = waited.len();
+        for connection in self.connections.values() {
+            let mut wants = PollFlags::IN;
+            wants.set(PollFlags::OUT, connection.wants_to_write());
+            waited.push(PollFd::from_borrowed_fd(connection.as_fd(), wants));
+        }
+        if let Some((gag, _)) = &self.gag {
+            waited.push(PollFd::new(gag, PollFlags::IN));
+        }
+        let glance = Timespec {
+            tv_sec: 0,
+            tv_nsec: GLANCE.as_nanos() as i64,
+        };
+        match poll(&mut waited, Some(&glance)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let mut woken = [0; 64];
+        while (&self.wakes).read(&mut woken).is_ok_and(|count| count > 0) {}
+        let mut ready = Ready::default();
+        for (peer, waited) in self.connections.keys().zip(&waited[first..]) {
+            let events = waited.revents();
+            if events.contains(PollFlags::OUT) {
+                ready.write.push(*peer);
+            }
+            if events.intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR) {
+                ready.read.push(*peer);
+            }
+        }
+        Ok(ready)
+    }
+
+    /// Lets in who has connected.
+    fn let_in(&mut self, now: Instant) {
+        while let Ok((stream, _)) = self.robots.accept() {
+            let robots = self.connections.keys().filter(|peer| **peer != Peer::Gag);
+            if robots.count() >= Self::MOST_ROBOTS {
+                tracing::warn!("a connection is refused: {} are open", Self::MOST_ROBOTS);
+                continue;
+            }
+            let peer = Peer::Robot(self.next_link);
+            self.next_link += 1;
+            match prepare(&stream) {
+                Ok(()) => self.greet(now, peer, Stream::Tcp(stream)),
+                Err(error) => tracing::warn!("a connection is refused: {error}"),
+            }
+        }
+        while let Some(Ok((stream, _))) = self.gag.as_ref().map(|(gag, _)| gag.accept()) {
+            let is_own = sockopt::socket_peercred(&stream)
+                .is_ok_and(|peer| peer.uid == rustix::process::geteuid());
+            let is_free = !self.connections.contains_key(&Peer::Gag);
+            if is_own && is_free && stream.set_nonblocking(true).is_ok() {
+                self.greet(now, Peer::Gag, Stream::Unix(stream));
+            } else {
+                tracing::warn!("a GaG is refused: there is one, or it is another user's");
+            }
+        }
+    }
+
+    fn greet(&mut self, now: Instant, peer: Peer, stream: Stream) {
+        // A GaG speaks when it is asked, which may take as long as it likes.
+        let speaks_first = peer != Peer::Gag;
+        let connection = Connection::new(stream, now, speaks_first);
+        self.connections.insert(peer, connection);
+        self.handle.change(|station| station.connected(peer));
+    }
+
+    fn hear(&mut self, now: Instant, peer: Peer) {
+        let Some(connection) = self.connections.get_mut(&peer) else {
+            return;
+        };
+        let handle = &self.handle;
+        let heard = connection.read(now, |line| {
+            handle.change(|station| station.heard(peer, line));
+        });
+        if let Err(error) = heard {
+            self.end(peer, &error.to_string());
+        }
+    }
+
+    /// Does what the station wants done to connections.
+    fn say(&mut self, now: Instant) {
+        loop {
+            let outputs = self.handle.take(Station::outputs);
+            if outputs.is_empty() {
+                return;
+            }
+            for output in outputs {
+                match output {
+                    Output::Say { to, line } => {
+                        let said = self.connections.get_mut(&to).map(|one| one.say(now, &line));
+                        if let Some(Err(error)) = said {
+                            self.end(to, &error.to_string());
+                        }
+                    }
+                    Output::Close { peer, why } => self.end(peer, &why),
+                }
+            }
+        }
+    }
+
+    fn close_overdue(&mut self, now: Instant) {
+        let overdue = |(peer, one): (&Peer, &Connection)| Some((*peer, one.overdue(now)?));
+        let overdue: Vec<_> = self.connections.iter().filter_map(overdue).collect();
+        for (peer, why) in overdue {
+            self.end(peer, why);
+        }
+    }
+
+    fn end(&mut self, peer: Peer, why: &str) {
+        if self.connections.remove(&peer).is_some() {
+            tracing::info!(?peer, "a connection has ended: {why}");
+            self.handle.change(|station| station.disconnected(peer));
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        if let Some((_, path)) = &self.gag {
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+/// Who has something to read or takes something.
+#[derive(Debug, Default)]
+struct Ready {
+    read: Vec<Peer>,
+    write: Vec<Peer>,
+}
+
+fn prepare(stream: &TcpStream) -> io::Result<()> {
+    stream.set_nonblocking(true)?;
+    // A command is one small packet that waits for nothing.
+    stream.set_nodelay(true)?;
+    sockopt::set_socket_keepalive(stream, true)?;
+    sockopt::set_tcp_keepidle(stream, KEEP_ALIVE)?;
+    sockopt::set_tcp_keepintvl(stream, KEEP_ALIVE_AGAIN)?;
+    sockopt::set_tcp_user_timeout(stream, UNCONFIRMED_MS)?;
+    Ok(())
+}
+
+/// Has robots fetch what waited for them when the queues were saved.
+fn put_back(station: &mut Station, queues: &Queues) {
+    for (name, products) in &queues.0 {
+        for product in products {
+            let put = match (Name::new(name.clone()), ProductId::new(*product)) {
+                (Ok(name), Some(product)) => {
+                    let put = station.fetch(&name, product);
+                    put.map_err(|error| error.to_string())
+                }
+                _ => Err("there is no such robot or product".into()),
+            };
+            if let Err(why) = put {
+                tracing::warn!("robot {name} does not fetch product {product} any more: {why}");
+            }
+        }
+    }
+}
+
+fn read(path: Option<&Path>) -> Result<Option<Warehouse>, LoadError> {
+    match path {
+        Some(path) if path.exists() => load(path).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// A socket for this user alone. One that a killed station has left is taken away.
+fn listen_for_gag(path: &Path) -> Result<UnixListener, ServerError> {
+    let failed = |error| ServerError::Gag {
+        path: path.to_owned(),
+        error,
+    };
+    if let Ok(there) = fs::symlink_metadata(path)
+        && there.file_type().is_socket()
+    {
+        if UnixStream::connect(path).is_ok() {
+            return Err(ServerError::GagInUse {
+                path: path.to_owned(),
+            });
+        }
+        fs::remove_file(path).map_err(failed)?;
+    }
+    let listener = UnixListener::bind(path).map_err(failed)?;
+    // Whoever was quicker than this is refused for his user when he is let in.
+    fs::set_permissions(path, fs::Permissions::from_mode(0o600)).map_err(failed)?;
+    listener.set_nonblocking(true).map_err(failed)?;
+    Ok(listener)
+}

@@ -1,0 +1,185 @@
+//! The warehouse file: what cannot be is refused, and saving replaces the file whole.
+
+use std::fs;
+use std::path::PathBuf;
+
+use lager_station::{LoadError, SaveError, load, save};
+
+use crate::transcript::{WAREHOUSE, warehouse};
+
+/// A folder of its own that is removed in the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let name = format!("lager-station-{name}-{}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        fs::create_dir_all(&folder).expect("a folder");
+        Self(folder)
+    }
+
+    fn file(&self) -> PathBuf {
+        self.0.join("warehouse.toml")
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.0).expect("the folder");
+        let name = |entry: std::io::Result<fs::DirEntry>| entry.expect("an entry").file_name();
+        let mut names: Vec<_> = entries
+            .map(|entry| name(entry).to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn what_was_saved_is_read() {
+    let folder = Folder::new("saved");
+    fs::write(folder.file(), WAREHOUSE).expect("a file");
+    let mut warehouse = load(&folder.file()).expect("a warehouse");
+    assert_eq!(warehouse.find("screws"), Some(7));
+    assert_eq!(warehouse.find("12"), Some(12));
+    assert_eq!(warehouse.find("nails"), None);
+
+    warehouse.products.pop();
+    warehouse.delivery = [4, 3];
+    save(&folder.file(), &warehouse).expect("saved");
+    assert_eq!(load(&folder.file()).expect("a warehouse"), warehouse);
+    assert_eq!(
+        folder.names(),
+        ["warehouse.toml"],
+        "nothing is left beside it"
+    );
+}
+
+#[test]
+fn what_only_others_read_is_kept() {
+    let folder = Folder::new("kept");
+    let text = format!(
+        "{WAREHOUSE}\n[exit]\nlength_cm = 90\n\n[[obstacle]]\nbetween = [[0, 0], [1, 0]]\n"
+    );
+    fs::write(folder.file(), text).expect("a file");
+    let warehouse = load(&folder.file()).expect("a warehouse");
+    save(&folder.file(), &warehouse).expect("saved");
+    let again: toml::Table = fs::read_to_string(folder.file())
+        .expect("the file")
+        .parse()
+        .expect("TOML");
+    assert_eq!(again["exit"]["length_cm"].as_integer(), Some(90));
+    assert_eq!(again["obstacle"][0]["between"][1][0].as_integer(), Some(1));
+    assert_eq!(again["product"][0]["name"].as_str(), Some("screws"));
+}
+
+#[test]
+fn a_disk_that_does_not_take_it_leaves_the_file_as_it_was() {
+    let folder = Folder::new("full");
+    fs::write(folder.file(), WAREHOUSE).expect("a file");
+    // Nothing can be written under the name of a folder, whoever asks.
+    fs::create_dir(folder.0.join("warehouse.toml.new")).expect("a folder");
+    let mut changed = warehouse();
+    changed.products.clear();
+    let error = save(&folder.file(), &changed).expect_err("not saved");
+    assert!(matches!(error, SaveError::Write { .. }), "{error}");
+    assert_eq!(
+        fs::read_to_string(folder.file()).expect("the file"),
+        WAREHOUSE
+    );
+}
+
+#[test]
+fn what_a_killed_one_left_is_in_nobody_s_way() {
+    let folder = Folder::new("killed");
+    fs::write(folder.0.join("warehouse.toml.new"), "size = [").expect("a file");
+    save(&folder.file(), &warehouse()).expect("saved");
+    assert_eq!(load(&folder.file()).expect("a warehouse"), warehouse());
+    assert_eq!(folder.names(), ["warehouse.toml"]);
+}
+
+#[test]
+fn a_warehouse_that_cannot_be_is_refused_in_a_sentence() {
+    let change = |from: &str, to: &str| {
+        let text = WAREHOUSE.replacen(from, to, 1);
+        assert_ne!(text, WAREHOUSE, "{from} is not in it");
+        let warehouse: lager_station::Warehouse = toml::from_str(&text).expect("TOML");
+        warehouse.check().expect_err(to).to_string()
+    };
+    for (from, to, sentence) in [
+        (
+            "[4, 3]",
+            "[0, 3]",
+            "a warehouse of 0 x 3 squares has none; each must be from 1 to 255",
+        ),
+        (
+            "= 40",
+            "= 0",
+            "side_length_cm is 0; it must be from 1 to 65535 cm",
+        ),
+        (
+            "delivery = [0, 0]",
+            "delivery = [1, 0]",
+            "(1, 0) is no corner of the warehouse; \
+             the delivery is at (0, 0), (0, 3), (4, 0) or (4, 3)",
+        ),
+        (
+            "id = 7",
+            "id = -7",
+            "product -7 has a negative number; numbers start at 0",
+        ),
+        (
+            "id = 7",
+            "id = 12",
+            "product 12 is listed twice; every product needs a number of its own",
+        ),
+        (
+            "\"down\"",
+            "\"south\"",
+            "product 7 is reached from \"south\"; write left, up, right or down",
+        ),
+        (
+            "[1, 0]",
+            "[4, 0]",
+            "product 7 stands in the square [4, 0], but the last one is [3, 2]",
+        ),
+    ] {
+        assert_eq!(change(from, to), sentence);
+    }
+}
+
+#[test]
+fn more_products_than_fit_in_a_line_are_refused() {
+    let mut many = warehouse();
+    let one = many.products[1].clone();
+    many.products = (0..100)
+        .map(|id| lager_station::StoredProduct { id, ..one.clone() })
+        .collect();
+    assert_eq!(
+        many.check().expect_err("too many").to_string(),
+        "the warehouse has 100 products, which do not fit in one line of the robot's language; \
+         list fewer"
+    );
+}
+
+#[test]
+fn a_file_that_is_none_is_named() {
+    let folder = Folder::new("none");
+    let error = load(&folder.file()).expect_err("no file");
+    assert!(matches!(error, LoadError::Read { .. }), "{error}");
+    fs::write(folder.file(), "size = [4, 3]\nside_length_cm = \"forty\"").expect("a file");
+    let error = load(&folder.file()).expect_err("no number");
+    assert!(
+        error
+            .to_string()
+            .contains("warehouse.toml: TOML parse error at line 2"),
+        "{error}"
+    );
+    fs::write(folder.file(), WAREHOUSE.replacen("[4, 3]", "[0, 3]", 1)).expect("a file");
+    let error = load(&folder.file()).expect_err("no squares");
+    assert!(matches!(error, LoadError::Warehouse { .. }), "{error}");
+}

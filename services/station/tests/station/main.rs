@@ -1,0 +1,8 @@
+//! The external computer from outside: a robot's lines in, what it is told out; a GaG that speaks
+//! for it; a warehouse saved and read; and all of it through its sockets.
+
+mod conversation;
+mod file;
+mod gag;
+mod sockets;
+mod transcript;

@@ -1,0 +1,265 @@
+//! Nothing comes back by itself, and nobody drives unseen: frozen processes, requests that come too
+//! late, a cable whose half towards the bridge is cut, and one that is noisy in each turn.
+
+use std::time::Duration;
+
+use lager_ports::{Clock, Subscriber};
+use lager_tests::{Cable, Domain, Running, is_stopped, pid, wait_for};
+use lager_topics::{Health, LinkHealth, Mode, NavStatus, Phase, Refusal, TruthPose};
+use rustix::process::{Signal, kill_process};
+
+/// What an observer sees of the robot.
+struct Watch {
+    truth: Subscriber<TruthPose>,
+    health: Subscriber<LinkHealth>,
+}
+
+impl Watch {
+    fn new(domain: &Domain) -> Self {
+        let bus = domain.observe("r1", 1.0);
+        Self {
+            truth: bus.subscriber().expect("a topic"),
+            health: bus.subscriber().expect("a topic"),
+        }
+    }
+
+    fn wait_for_health(&mut self, what: &str, wanted: impl Fn(&Health) -> bool) -> Health {
+        wait_for(what, || {
+            let health = self.health.latest().expect("readable")?;
+            wanted(&health).then_some(*health)
+        })
+    }
+
+    fn wait_to_stand(&mut self) {
+        wait_for("the robot to stand", || self.moves().filter(|moves| !moves));
+    }
+
+    /// Whether its wheels turn, if the world has news.
+    fn moves(&mut self) -> Option<bool> {
+        let truth = self.truth.latest().expect("readable")?;
+        Some(truth.left_duty != 0 || truth.right_duty != 0)
+    }
+
+    /// The robot stands in everything the world shows from now on, for half a second of it.
+    fn assert_stands(&mut self) {
+        let from = Clock::monotonic_ns();
+        let mut seen = 0;
+        while seen < 20 {
+            let truth = wait_for("the world", || self.truth.latest().expect("readable"));
+            if truth.stamp().publish_time_ns > from {
+                assert_eq!((truth.left_duty, truth.right_duty), (0, 0));
+                seen += 1;
+            }
+            drop(truth);
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+/// Runs `lager` with `args` until it succeeds.
+fn insist(domain: &Domain, args: &[&str]) {
+    wait_for(&format!("{args:?}"), || {
+        domain.run(args).status.success().then_some(())
+    });
+}
+
+fn freeze(process: u32) {
+    kill_process(pid(process), Signal::STOP).expect("a living process");
+    wait_for("the process to stop", || is_stopped(process).then_some(()));
+}
+
+/// A simulated robot in manual mode, driven forward by hand.
+fn driven_by_hand(domain: &Domain) -> (Running, Watch, Running) {
+    let up = domain.start(&["up"]);
+    let mut watch = Watch::new(domain);
+    watch.wait_for_health("the steering board", |health| health.steering.up != 0);
+    insist(domain, &["mode", "manual"]);
+    let drive = driving(domain, &mut watch, &["drive", "forward"]);
+    (up, watch, drive)
+}
+
+/// Somebody who drives the robot, which moves. One who was held up for longer than his order lasts
+/// has ended with a sentence, and somebody else drives: once the robot stands, so that it is his
+/// order that it is seen to move by.
+fn driving(domain: &Domain, watch: &mut Watch, drive: &[&str]) -> Running {
+    let mut driver = domain.start(drive);
+    wait_for("the robot to drive", || {
+        if !driver.is_running() {
+            watch.wait_to_stand();
+            driver = domain.start(drive);
+        }
+        watch.moves().filter(|moves| *moves).map(|_| ())
+    });
+    driver
+}
+
+#[test]
+fn a_frozen_drive_does_not_move_the_robot_again() {
+    let domain = Domain::new();
+    let (up, mut watch, mut drive) = driven_by_hand(&domain);
+    freeze(drive.pid());
+    watch.wait_to_stand();
+    // Long enough for every memory of the order to be gone.
+    std::thread::sleep(Duration::from_millis(1_500));
+    drive.signal(Signal::CONT);
+    watch.assert_stands();
+    assert_eq!(drive.wait(), Some(1), "{}", drive.log());
+    let log = drive.log();
+    assert!(
+        log.contains("held up") || log.contains("cut short"),
+        "it says so: {log}"
+    );
+    insist(&domain, &["drive", "forward", "--seconds", "0.2"]);
+    drop((up, watch, drive));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_request_that_a_frozen_bridge_finds_later_changes_nothing() {
+    let domain = Domain::new();
+    let up = domain.start(&["up"]);
+    let mut watch = Watch::new(&domain);
+    watch.wait_for_health("the steering board", |health| health.steering.up != 0);
+    insist(&domain, &["mode", "manual"]);
+    watch.wait_for_health("manual mode", |health| health.mode == Mode::Manual);
+    let bridge = up.service("bridge").expect("a bridge");
+    freeze(bridge);
+    let refused = domain.run(&["mode", "autonomous"]);
+    assert!(!refused.status.success());
+    // The question of an asker that ends goes with it. Of one that is frozen as well it is still
+    // there, and only its age tells that nobody waits any more.
+    let mut asker = domain.start(&["mode", "autonomous"]);
+    std::thread::sleep(Duration::from_millis(250));
+    freeze(asker.pid());
+    std::thread::sleep(Duration::from_millis(500));
+    let from = Clock::monotonic_ns();
+    kill_process(pid(bridge), Signal::CONT).expect("a living process");
+    for _ in 0..5 {
+        let health = wait_for("the bridge to go on", || {
+            let health = watch.health.latest().expect("readable");
+            health.filter(|health| health.stamp().publish_time_ns > from)
+        });
+        assert_eq!(health.mode, Mode::Manual);
+    }
+    // It ends in order, whether it had put its question by then or puts it now.
+    asker.signal(Signal::CONT);
+    asker.wait();
+    drop((up, watch));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_robot_whose_steering_board_is_not_heard_stands_and_goes_on_by_a_new_order_only() {
+    let domain = Domain::new();
+    let (body, plugged, config) = boards_at_a_cable(&domain);
+    let bridge = domain.start(&["--config", &config, "bridge"]);
+    let mut watch = Watch::new(&domain);
+    watch.wait_for_health("both boards", |health| {
+        health.steering.up != 0 && health.sensor.up != 0
+    });
+    insist(&domain, &["--config", &config, "mode", "manual"]);
+    insist(&domain, &["--config", &config, "resume"]);
+    let forward = ["--config", &config, "drive", "forward"];
+    let mut drive = driving(&domain, &mut watch, &forward);
+
+    plugged.cut_reports(true);
+    watch.wait_for_health("people to see why", |health| {
+        health.blocked == Refusal::BoardSilent
+    });
+    watch.wait_to_stand();
+    assert_eq!(drive.wait(), Some(1), "{}", drive.log());
+    let log = drive.log();
+    let why = "steering board does not report";
+    // One that was kept from its core meanwhile says that instead.
+    assert!(log.contains(why) || log.contains("held up"), "{log}");
+    let other = domain.run_renewed(&forward);
+    assert!(!other.status.success());
+    let said = String::from_utf8_lossy(&other.stderr);
+    assert!(said.contains(why), "{said}");
+    watch.assert_stands();
+
+    plugged.cut_reports(false);
+    watch.wait_for_health("the board to be heard", |health| {
+        health.blocked == Refusal::None
+    });
+    watch.assert_stands();
+    let seconds = ["--config", &config, "drive", "forward", "--seconds", "0.5"];
+    let again = domain.run_renewed(&seconds);
+    assert!(again.status.success(), "{again:?}");
+    drop((bridge, plugged, body, watch, drive));
+    domain.assert_clean();
+}
+
+/// Boards as a process, a cable at the steering board, and the configuration of who is wired to them.
+fn boards_at_a_cable(domain: &Domain) -> (Running, Cable, String) {
+    let file = |name: &str| domain.folder().join(name);
+    let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);
+    let write = |name: &str, steering: &std::path::Path| {
+        let path = file(name);
+        let serial = format!("[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+        std::fs::write(&path, format!("body = \"serial\"\n{serial}")).expect("a configuration");
+        path.to_str().expect("a path in UTF-8").to_owned()
+    };
+    let (boards, config) = (
+        write("boards.toml", &steering),
+        write("bridge.toml", &cable),
+    );
+    let body = domain.start(&["--config", &boards, "simulator"]);
+    let plugged = wait_for("the boards' port", || {
+        steering.exists().then(|| Cable::plug(&steering, &cable))
+    });
+    (body, plugged, config)
+}
+
+#[test]
+fn noise_on_the_cable_in_each_turn_costs_no_mission() {
+    let domain = Domain::new();
+    let (body, cable, config) = boards_at_a_cable(&domain);
+    let mut up = domain.start(&[
+        "--config",
+        &config,
+        "up",
+        "--script",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--json",
+    ]);
+    let bus = domain.observe("r1", 1.0);
+    let mut status = bus.subscriber::<NavStatus>().expect("a topic");
+    insist(&domain, &["--config", &config, "resume"]);
+    let mut turns = 0;
+    let mut turning = false;
+    while up.is_running() {
+        if let Some(status) = status.latest().expect("readable") {
+            let in_turns = [
+                Phase::Turning,
+                Phase::Positioning,
+                Phase::Leaving,
+                Phase::TurningRound,
+            ];
+            let turns_now = in_turns.into_iter().any(|phase| status.phase == phase);
+            if turns_now && !turning {
+                turns += 1;
+                drop(status);
+                // In the middle: a turn takes some two seconds.
+                std::thread::sleep(Duration::from_millis(400));
+                cable.make_noise(true);
+                std::thread::sleep(Duration::from_secs(1));
+                cable.make_noise(false);
+            }
+            turning = turns_now;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    assert!(turns >= 2, "{turns} turns");
+    assert_eq!(
+        up.json()["delivered"],
+        serde_json::json!([1]),
+        "{}",
+        up.log()
+    );
+    drop((body, cable, status, bus));
+    domain.assert_clean();
+}

@@ -1,0 +1,428 @@
+//! The robot and the external computer as processes. Whoever plays the one or the other here shares
+//! no code with them: he speaks from the grammar alone.
+
+use std::fs;
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use lager_ports::Subscriber;
+use lager_tests::{Domain, Running, pid, wait_for};
+use lager_topics::{EventKind, LinkHealth, MissionEvent, TruthPose};
+use rustix::process::{Signal, kill_process};
+
+/// How long a line is waited for before the test has failed.
+const WATCHDOG: Duration = Duration::from_secs(120);
+
+/// One end of a conversation in lines.
+struct Peer<S>(BufReader<S>);
+
+impl<S: Read + Write> Peer<S> {
+    /// The next line without its end; `None` where the conversation is over.
+    fn hears(&mut self) -> Option<String> {
+        let mut line = String::new();
+        match self.0.read_line(&mut line) {
+            Ok(0) => None,
+            Ok(_) => Some(line.trim_end().to_owned()),
+            Err(error) if error.kind() == ErrorKind::ConnectionReset => None,
+            Err(error) => panic!("no line came: {error}"),
+        }
+    }
+
+    /// The next line that begins with one of `words`; what it passes over needs no answer.
+    fn waits_for(&mut self, words: &[&str]) -> String {
+        loop {
+            let line = self.hears().expect("the conversation goes on");
+            let first = line.split(' ').next().unwrap_or_default();
+            if words.contains(&first) {
+                return line;
+            }
+            assert!(
+                ["thought", "set_robot", "set_heading", "lager"].contains(&first),
+                "{line:?} instead of {words:?}"
+            );
+        }
+    }
+
+    /// Says a line; a peer that has gone meanwhile is no failure.
+    fn says(&mut self, line: &str) {
+        let _ = self.0.get_mut().write_all(format!("{line}\n").as_bytes());
+    }
+}
+
+impl Peer<TcpStream> {
+    /// The next line that begins with `word`, if the connection lasts so long. The sign of life is
+    /// answered.
+    fn hears_answering(&mut self, word: &str) -> Option<String> {
+        loop {
+            let line = self.hears()?;
+            if line.starts_with(word) {
+                return Some(line);
+            }
+            if line == "lager 1 r1" {
+                self.says("lager 1 tester");
+            }
+        }
+    }
+}
+
+/// An external computer that the test plays, for a robot that is up and stands in manual mode.
+struct Scene {
+    listener: TcpListener,
+    truth: Subscriber<TruthPose>,
+    up: Running,
+    _body: Running,
+    domain: Domain,
+}
+
+impl Scene {
+    fn new() -> Self {
+        let domain = Domain::new();
+        // Real boards, as far as `up` knows: it starts in manual mode and no script drives.
+        let [sensor, steering] =
+            ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
+        let config = domain.folder().join("lager.toml");
+        let text =
+            format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+        fs::write(&config, text).expect("a configuration file");
+        let body = domain.start(&["simulator"]);
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address").to_string();
+        let up = domain.start(&["up", "--station", &address]);
+        let bus = domain.observe("r1", 1.0);
+        let mut health = bus.subscriber::<LinkHealth>().expect("a topic");
+        wait_for("both boards to be connected, and the robot stopped", || {
+            let health = health.latest().expect("readable")?;
+            let connected = health.sensor.up != 0 && health.steering.up != 0;
+            (connected && health.stopped != 0).then_some(())
+        });
+        wait_for("the stop to be released", || {
+            domain.run(&["resume"]).status.success().then_some(())
+        });
+        Self {
+            truth: bus.subscriber().expect("a topic"),
+            listener,
+            up,
+            _body: body,
+            domain,
+        }
+    }
+
+    /// The robot's next connection.
+    fn robot(&self) -> Peer<TcpStream> {
+        let (stream, _) = self.listener.accept().expect("it connects");
+        stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
+        stream.set_nodelay(true).expect("a socket");
+        Peer(BufReader::new(stream))
+    }
+
+    /// The duties at the motors, as the world has them now.
+    fn duties(&mut self) -> Option<(u8, u8)> {
+        let truth = self.truth.latest().expect("readable")?;
+        Some((truth.left_duty, truth.right_duty))
+    }
+
+    fn wait_until_it_stands(&mut self) {
+        wait_for("the robot to stand", || {
+            self.duties().filter(|duties| *duties == (0, 0))
+        });
+    }
+
+    /// Drives the robot forward until its wheels turn. A machine that was held up for as long as a
+    /// lease ends the command, so it is given as often as it is asked for.
+    fn drive(&mut self, is_extended: bool) -> Peer<TcpStream> {
+        'connected: loop {
+            let mut robot = self.robot();
+            loop {
+                let Some(line) = robot.hears() else {
+                    continue 'connected;
+                };
+                match line.as_str() {
+                    "styrcomm" => robot.says("styrcomm 2"),
+                    "lager 1 r1" if is_extended => robot.says("lager 1 tester"),
+                    _ => {}
+                }
+                if self
+                    .duties()
+                    .is_some_and(|(left, right)| left > 0 && right > 0)
+                {
+                    return robot;
+                }
+                if !is_extended && line == "styrcomm" {
+                    // It says nothing more before the next command.
+                    while !self.moves_within(Duration::from_millis(500)) {
+                        robot.says("styrcomm 2");
+                    }
+                    return robot;
+                }
+            }
+        }
+    }
+
+    fn moves_within(&mut self, patience: Duration) -> bool {
+        let start = Instant::now();
+        while start.elapsed() < patience {
+            if self
+                .duties()
+                .is_some_and(|(left, right)| left > 0 && right > 0)
+            {
+                return true;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        false
+    }
+}
+
+#[test]
+fn a_cut_link_makes_the_robot_stand_and_it_connects_again() {
+    let mut scene = Scene::new();
+    let robot = scene.drive(false);
+    drop(robot);
+    scene.wait_until_it_stands();
+    let mut robot = scene.robot();
+    assert_eq!(robot.hears().as_deref(), Some("lager 1 r1"));
+    robot.waits_for(&["styrcomm"]);
+    assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
+}
+
+#[test]
+fn a_station_that_falls_silent_makes_the_robot_stand() {
+    let mut scene = Scene::new();
+    let mut robot = scene.drive(true);
+    // From here on nothing is said, and the connection stays as it is.
+    scene.wait_until_it_stands();
+    while robot.hears().is_some() {}
+    let mut robot = scene.robot();
+    robot.waits_for(&["styrcomm"]);
+}
+
+#[test]
+fn a_comm_that_is_killed_makes_the_robot_stand_and_its_successor_asks_again() {
+    let mut scene = Scene::new();
+    let _robot = scene.drive(false);
+    let comm = scene.up.service("comm").expect("it runs");
+    kill_process(pid(comm), Signal::KILL).expect("it runs");
+    scene.wait_until_it_stands();
+    let mut robot = scene.robot();
+    robot.waits_for(&["styrcomm"]);
+    assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
+}
+
+#[test]
+fn a_stop_is_confirmed_and_stays() {
+    let mut scene = Scene::new();
+    // A machine that is held up loses the link, which makes the robot stand as well; then once more.
+    let (mut robot, stopped) = loop {
+        let mut robot = scene.drive(true);
+        robot.says("stop 7");
+        if let Some(stopped) = robot.hears_answering("stopped") {
+            break (robot, stopped);
+        }
+        scene.domain.done(&["resume"]);
+    };
+    assert!(stopped.starts_with("stopped 7 "), "{stopped}");
+    scene.wait_until_it_stands();
+    robot.says("styrcomm 2");
+    let why = robot.hears_answering("thought forward is not possible now");
+    assert!(why.is_none_or(|why| why.contains("`lager resume`")));
+    assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
+}
+
+/// A warehouse that robot and station read from one file.
+const WAREHOUSE: &str = "size = [2, 2]
+side_length_cm = 40
+
+[[product]]
+id = 1
+square = [0, 0]
+side = \"left\"
+
+[[product]]
+id = 2
+square = [1, 0]
+side = \"down\"
+
+[[product]]
+id = 3
+square = [1, 1]
+side = \"right\"
+";
+
+#[test]
+fn a_gag_at_a_station_has_goods_fetched() {
+    let domain = Domain::new();
+    let file = domain.folder().join("warehouse.toml");
+    fs::write(&file, WAREHOUSE).expect("a file");
+    let gag = domain.folder().join("gag");
+    let [file, socket] = [&file, &gag].map(|path| path.to_str().expect("UTF-8"));
+    let station = domain.start(&[
+        "station",
+        "--listen",
+        "127.0.0.1:0",
+        "--warehouse",
+        file,
+        "--gag",
+        socket,
+    ]);
+    let address = wait_for("the station", || {
+        let said = station.output();
+        let address = said.strip_prefix("robots connect to ")?.split(',').next()?;
+        said.contains('\n').then(|| address.to_owned())
+    });
+    let up = domain.start(&[
+        "up",
+        "--headless",
+        "--station",
+        &address,
+        "--speed",
+        "2",
+        "--warehouse",
+        file,
+        "--mission",
+        "1",
+    ]);
+    let bus = domain.observe("r1", 2.0);
+    let mut events = bus.subscriber::<MissionEvent>().expect("a topic");
+    let mut delivered = move |product| {
+        wait_for("a delivery", || {
+            let event = events.receive().expect("readable")?;
+            let is_it = event.kind == EventKind::ItemDelivered;
+            (is_it && event.product == product).then_some(())
+        });
+    };
+    delivered(1);
+
+    let stream = UnixStream::connect(&gag).expect("it listens");
+    stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
+    let mut gag = Peer(BufReader::new(stream));
+    // The station had answered by itself what was asked before the GaG came.
+    let mut fetches = |product| loop {
+        let questions = ["sidelength", "karta", "prodlis", "armcomm", "fetchprod"];
+        let answer = match gag.waits_for(&questions).as_str() {
+            "sidelength" => "sidelength 40",
+            "karta" => "karta 2 2 0 0",
+            "prodlis" => "prodlis 3 1 0 0 left 2 1 0 down 3 1 1 right",
+            // A simulated robot picks by itself.
+            "armcomm" => continue,
+            _ => {
+                gag.says(&format!("fetchprod {product}"));
+                break;
+            }
+        };
+        gag.says(answer);
+    };
+    fetches(2);
+    delivered(2);
+    fetches(3);
+    wait_for("the order to reach logic", || {
+        let listed = domain.run(&["queue"]);
+        let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+        listed.contains("product 3").then_some(())
+    });
+    // Over the death of comm the order stays, and the next question comes after its delivery.
+    let comm = up.service("comm").expect("it runs");
+    kill_process(pid(comm), Signal::KILL).expect("it runs");
+    delivered(3);
+    fetches(1);
+}
+
+/// A station of its own for robots that are told where it is.
+fn station(domain: &Domain, fetch: &[&str]) -> (Running, String) {
+    let file = domain.folder().join("warehouse.toml");
+    fs::write(&file, WAREHOUSE).expect("a file");
+    let file = file.to_str().expect("UTF-8");
+    let mut args = vec!["station", "--listen", "127.0.0.1:0", "--warehouse", file];
+    for order in fetch {
+        args.extend(["--fetch", order]);
+    }
+    let station = domain.start(&args);
+    let address = wait_for("the station", || {
+        let said = station.output();
+        let address = said.strip_prefix("robots connect to ")?.split(',').next()?;
+        said.contains('\n').then(|| address.to_owned())
+    });
+    (station, address)
+}
+
+#[test]
+fn two_robots_of_one_station_deliver_though_one_of_them_is_killed() {
+    let domain = Domain::new();
+    // The script has each of them fetch product 1 as well.
+    let (_station, address) = station(&domain, &["r1=2", "r2=3"]);
+    let file = domain.folder().join("warehouse.toml");
+    let file = file.to_str().expect("UTF-8");
+    let robot = |name| {
+        domain.start(&[
+            "--name",
+            name,
+            "up",
+            "--headless",
+            "--speed",
+            "2",
+            "--warehouse",
+            file,
+            "--station",
+            &address,
+        ])
+    };
+    let robots = ["r1", "r2"].map(|name| (name, robot(name)));
+    let [(_, first), (_, second)] = &robots;
+    let said = |robot: &Running, words: &str| robot.output().contains(words);
+    wait_for("both to be under way", || {
+        (said(first, "drives from") && said(second, "drives from")).then_some(())
+    });
+    // All of one robot that talks, and what moves it.
+    for service in ["comm", "bridge", "logic"] {
+        let process = first.service(service).expect("it runs");
+        kill_process(pid(process), Signal::KILL).expect("it runs");
+    }
+    wait_for("what the station told the first", || {
+        said(first, "DELIVERED product 2").then_some(())
+    });
+    wait_for("what it told the second", || {
+        said(second, "DELIVERED product 3").then_some(())
+    });
+    assert!(!said(first, "product 3") && !said(second, "product 2"));
+    drop(robots);
+}
+
+#[test]
+fn a_second_robot_joins_the_station_of_the_first_or_says_why_not() {
+    let domain = Domain::new();
+    let up = |name, warehouse| {
+        let args = ["--name", name, "up", "--headless", "--warehouse", warehouse];
+        let up = domain.start(&args);
+        let told = wait_for("it to tell of its station", || {
+            let told = up.output() + &up.log();
+            let line = told
+                .lines()
+                .find(|line| line.contains("external computer"))?;
+            Some(line.to_owned())
+        });
+        wait_for("it to have its warehouse", || {
+            up.output().contains("drives from").then_some(())
+        });
+        (up, told)
+    };
+    let (first, told) = up("r1", "small");
+    assert!(told.contains("listens at 127.0.0.1:"), "{told}");
+    let has_usual = told.contains("listens at 127.0.0.1:7420");
+    let (second, told) = up("r2", "small");
+    // Where somebody else has the usual port, each has a station of its own.
+    assert_eq!(told.contains("that of robot `r1`"), has_usual, "{told}");
+    assert_eq!(second.service("station").is_none(), has_usual);
+    let (third, told) = up("r3", "curved");
+    let has_own = told.contains("since 127.0.0.1:7420 cannot be had");
+    assert!(has_own || !has_usual, "{told}");
+
+    // A station that is killed has a successor at the same place.
+    let station = first.service("station").expect("it runs");
+    kill_process(pid(station), Signal::KILL).expect("it runs");
+    wait_for("its successor", || {
+        first.service("station").filter(|next| *next != station)
+    });
+    drop((third, second, first));
+    domain.assert_clean();
+}

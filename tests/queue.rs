@@ -1,0 +1,99 @@
+//! The orders that wait, as people see and change them, and over the death of who keeps them.
+
+use std::process::Output;
+
+use lager_tests::{Domain, Running, pid, wait_for};
+use rustix::process::{Signal, kill_process};
+
+fn said(output: &Output) -> String {
+    let [out, err] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    format!("{out}{err}").trim_end().into()
+}
+
+/// What `lager queue` shows.
+fn listed(domain: &Domain) -> String {
+    said(&domain.run(&["queue"]))
+}
+
+/// The numbers of the orders that wait for these products, in the queue's order.
+fn waiting(domain: &Domain) -> Vec<(String, String)> {
+    let listed = listed(domain);
+    let waits = listed.lines().filter(|line| line.ends_with(", waits"));
+    let parts = waits.filter_map(|line| {
+        let (id, rest) = line.strip_prefix("order ")?.split_once(": product ")?;
+        Some((id.into(), rest.strip_suffix(", waits")?.into()))
+    });
+    parts.collect()
+}
+
+fn products(domain: &Domain) -> Vec<String> {
+    waiting(domain)
+        .into_iter()
+        .map(|(_, product)| product)
+        .collect()
+}
+
+/// A robot that carries an order out and has been stopped meanwhile.
+fn robot(domain: &Domain) -> Running {
+    let up = domain.start(&["up", "--headless", "--speed", "4", "--mission", "1"]);
+    wait_for("an order under way", || {
+        listed(domain)
+            .ends_with("product 1, under way")
+            .then_some(())
+    });
+    domain.done(&["stop"]);
+    up
+}
+
+#[test]
+fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
+    let domain = Domain::new();
+    let mut up = robot(&domain);
+    for (product, answer) in [
+        ("3", "logic fetches product 3 next"),
+        ("2", "logic fetches product 2; waiting before it: 1"),
+        ("1", "logic fetches product 1; waiting before it: 2"),
+    ] {
+        assert_eq!(said(&domain.run(&["queue", "add", product])), answer);
+    }
+    assert_eq!(products(&domain), ["3", "2", "1"]);
+
+    let refused = domain.run(&["queue", "add", "99"]);
+    assert!(!refused.status.success());
+    assert!(said(&refused).contains("product 99"), "{}", said(&refused));
+    let unknown = domain.run(&["queue", "cancel", "7"]);
+    assert!(
+        said(&unknown).contains("no order 7 waits"),
+        "{}",
+        said(&unknown)
+    );
+
+    let numbers = waiting(&domain);
+    domain.done(&["queue", "up", &numbers[1].0]);
+    assert_eq!(products(&domain), ["2", "3", "1"]);
+    domain.done(&["queue", "cancel", &numbers[2].0]);
+
+    let logic = up.service("logic").expect("a navigator");
+    kill_process(pid(logic), Signal::KILL).expect("a living navigator");
+    wait_for("its successor", || {
+        up.service("logic").filter(|successor| *successor != logic)
+    });
+    wait_for("the queue of before", || {
+        let under_way = listed(&domain).contains("product 1, under way");
+        (under_way && products(&domain) == ["2", "3"]).then_some(())
+    });
+
+    domain.done(&["queue", "clear"]);
+    assert_eq!(products(&domain), [""; 0]);
+    let again = said(&domain.run(&["queue", "add", "2"]));
+    assert_eq!(again, "logic fetches product 2 next");
+    domain.done(&["resume"]);
+    wait_for("both to be delivered", || {
+        (listed(&domain) == "no order is under way or waits").then_some(())
+    });
+    let delivered = up.output().matches("DELIVERED product").count();
+    assert_eq!(delivered, 2, "{}", up.output());
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0));
+    domain.assert_clean();
+}

@@ -1,0 +1,271 @@
+//! What `lager up` survives of what happens to the bus: it is damaged, emptied, cut off or silent
+//! while the robot runs. The robot comes up again by itself, or ends with a sentence, and Ctrl-C
+//! always ends it.
+
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use lager_ports::Subscriber;
+use lager_tests::{Domain, Running, has_ended, is_stopped, pid, wait_for};
+use lager_topics::{LinkHealth, NavStatus, Phase};
+use rustix::process::{Signal, kill_process};
+use serde_json::{Value, json};
+
+const MISSION: [&str; 8] = [
+    "up",
+    "--mission",
+    "1",
+    "--exit-when-done",
+    "--json",
+    "--headless",
+    "--speed",
+    "3",
+];
+
+/// The process of a service, once there is one that is not `before`.
+fn service(up: &mut Running, name: &str, before: Option<u32>) -> u32 {
+    wait_for(name, || {
+        assert!(up.is_running(), "{}{}", up.log(), up.output());
+        up.service(name).filter(|process| Some(*process) != before)
+    })
+}
+
+/// Waits until a newcomer to the bus hears the bridge that runs, with both boards.
+fn wait_until_up(domain: &Domain, up: &mut Running) {
+    wait_for("the robot to be up", || {
+        assert!(up.is_running(), "{}{}", up.log(), up.output());
+        let echo = ["topic", "echo", "link/health", "--count", "1", "--json"];
+        let mut echo = domain.start(&echo);
+        // It may hang where the bus is damaged, or wait on one that is no more.
+        let give_up = Instant::now() + Duration::from_secs(2);
+        while echo.is_running() && Instant::now() < give_up {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        if echo.is_running() {
+            echo.signal(Signal::KILL);
+            return None;
+        }
+        let health: Value = serde_json::from_str(echo.output().lines().next()?).ok()?;
+        let whole =
+            health["payload"]["sensor"]["up"] == 1 && health["payload"]["steering"]["up"] == 1;
+        let bridge = up.service("bridge")?;
+        (whole && health["writer"] == bridge).then_some(())
+    });
+}
+
+/// Starts a robot on which every service is at work.
+fn start(domain: &Domain, args: &[&str]) -> Running {
+    let mut up = domain.start(args);
+    wait_until_up(domain, &mut up);
+    service(&mut up, "logic", None);
+    up
+}
+
+/// Ends a robot by Ctrl-C. One that was started again in the middle of its mission has not
+/// delivered it.
+fn interrupt(up: &mut Running, code: i32) {
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(code), "{}{}", up.log(), up.output());
+}
+
+fn kill(process: u32, signal: Signal) {
+    kill_process(pid(process), signal).expect("a living process");
+}
+
+/// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it is.
+fn assert_only_a_stop_is_left(domain: &Domain) {
+    let mut left = domain.leftovers();
+    left.retain(|file| !file.ends_with("/r1/stop"));
+    assert!(left.is_empty(), "left behind: {left:#?}");
+}
+
+fn segments(domain: &Domain) -> Vec<PathBuf> {
+    domain.bus("r1", 1.0).place().expect("a folder").segments()
+}
+
+/// Cuts the shared memory of a bus off; a process that looks at its own gets SIGBUS.
+fn cut_off(domain: &Domain) {
+    for segment in segments(domain) {
+        // One may be removed in the middle of it.
+        if let Ok(file) = File::options().write(true).open(segment) {
+            let _ = file.set_len(0);
+        }
+    }
+}
+
+#[test]
+fn a_bridge_comes_back_on_a_bus_with_a_segment_that_was_never_finished() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless"]);
+    let lager = domain.lager(&["topic", "echo", "sensor/line", "--count", "1"]);
+    let ended = Command::new("strace")
+        .args(["-f", "-qq", "-e", "trace=ftruncate"])
+        .args(["-e", "inject=ftruncate:signal=SIGKILL:when=1"])
+        .arg(lager.get_program())
+        .args(lager.get_args())
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .expect("strace, which tests/run installs");
+    assert!(!ended.success(), "it was to be killed");
+    let bridge = service(&mut up, "bridge", None);
+    kill(bridge, Signal::KILL);
+    service(&mut up, "bridge", Some(bridge));
+    wait_until_up(&domain, &mut up);
+    up.signal(Signal::INT);
+    // Whoever has swept the segment first has saved the mission.
+    let code = up.wait();
+    assert!(
+        matches!(code, Some(0 | 3)),
+        "{code:?}: {}{}",
+        up.log(),
+        up.output()
+    );
+}
+
+#[test]
+fn a_robot_comes_up_again_on_an_emptied_bus() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless"]);
+    // A bus that was cleared has names of its own.
+    for (emptied, next) in [("iceoryx2", "iceoryx2-1"), ("r1", "r1")] {
+        let folder = domain.bus_folder().join(emptied);
+        let attendant = service(&mut up, "attend", None);
+        // The robot makes files in it meanwhile.
+        wait_for("the folder to be emptied", || {
+            fs::remove_dir_all(&folder).ok()
+        });
+        service(&mut up, "attend", Some(attendant));
+        wait_until_up(&domain, &mut up);
+        assert!(domain.bus_folder().join(next).is_dir());
+    }
+    interrupt(&mut up, 3);
+    assert_only_a_stop_is_left(&domain);
+}
+
+#[test]
+fn a_robot_comes_up_again_when_its_memory_is_cut_off() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless"]);
+    let attendant = service(&mut up, "attend", None);
+    cut_off(&domain);
+    service(&mut up, "attend", Some(attendant));
+    wait_until_up(&domain, &mut up);
+    let told = up.output();
+    assert!(told.contains("the bus is damaged"), "{told}");
+    interrupt(&mut up, 3);
+    assert_only_a_stop_is_left(&domain);
+}
+
+#[test]
+fn a_bus_that_never_holds_ends_the_robot_with_a_sentence() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless"]);
+    wait_for("the end", || {
+        cut_off(&domain);
+        (!up.is_running()).then_some(())
+    });
+    assert_eq!(up.wait(), Some(1), "{}{}", up.log(), up.output());
+    let said = up.log();
+    assert!(said.contains("3 new starts were in vain"), "{said}");
+    assert_only_a_stop_is_left(&domain);
+}
+
+#[test]
+fn a_mission_is_delivered_though_its_attendant_is_killed_again_and_again() {
+    let domain = Domain::new();
+    let mut up = domain.start(&MISSION);
+    let mut killed = 0;
+    let mut attendant = None;
+    while up.is_running() {
+        // Each meets the mission in another place: the arm's work is a third of it.
+        std::thread::sleep(Duration::from_millis(600 + killed * 70));
+        let Some(next) = up.service("attend").filter(|next| Some(*next) != attendant) else {
+            continue;
+        };
+        if !has_ended(next) && kill_process(pid(next), Signal::KILL).is_ok() {
+            killed += 1;
+        }
+        attendant = Some(next);
+    }
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.json();
+    assert!(killed > 3, "{killed} kills");
+    assert_eq!(told["delivered"], json!([1]), "{told}");
+    let restarts = told["restarts"].as_u64().expect("restarts");
+    // The last one may have met the end.
+    assert!(
+        restarts == killed || restarts + 1 == killed,
+        "{told}\n{}",
+        up.log()
+    );
+    assert_eq!(told["failure"], Value::Null, "{told}");
+    assert!(told["frames"].as_u64().expect("frames") > 1_000, "{told}");
+    domain.assert_clean();
+}
+
+#[test]
+fn a_stopped_attendant_is_replaced_and_the_mission_goes_on() {
+    let domain = Domain::new();
+    let mut up = domain.start(&MISSION);
+    let observer = domain.observe("r1", 3.0);
+    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
+    wait_for("the robot to drive", || {
+        let status = status.latest().expect("readable")?;
+        (status.phase.get() == Some(Phase::Driving)).then_some(())
+    });
+    let attendant = service(&mut up, "attend", None);
+    kill(attendant, Signal::STOP);
+    wait_for("it to stop", || is_stopped(attendant).then_some(()));
+    service(&mut up, "attend", Some(attendant));
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], json!([1]), "{told}");
+    assert_eq!(told["restarts"], 1, "{told}\n{}", up.log());
+    drop((status, observer));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_stopped_service_is_replaced_by_itself() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless"]);
+    let others =
+        |up: &mut Running| ["attend", "simulator", "logic"].map(|name| service(up, name, None));
+    let before = others(&mut up);
+    let bridge = service(&mut up, "bridge", None);
+    kill(bridge, Signal::STOP);
+    service(&mut up, "bridge", Some(bridge));
+    wait_until_up(&domain, &mut up);
+    assert_eq!(others(&mut up), before, "{}", up.output());
+    interrupt(&mut up, 0);
+    domain.assert_clean();
+}
+
+#[test]
+fn a_second_ctrl_c_ends_what_does_not_stop() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless"]);
+    let observer = domain.observe("r1", 1.0);
+    let mut health: Subscriber<LinkHealth> = observer.subscriber().expect("a topic");
+    wait_for("the bridge", || {
+        health.latest().expect("readable").map(|_| ())
+    });
+    let frozen: Vec<u32> = ["bridge", "logic", "simulator", "attend"]
+        .into_iter()
+        .map(|name| service(&mut up, name, None))
+        .collect();
+    for process in &frozen {
+        kill(*process, Signal::STOP);
+    }
+    up.signal(Signal::INT);
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}{}", up.log(), up.output());
+    for process in frozen {
+        assert!(has_ended(process));
+    }
+    drop((health, observer));
+}

@@ -1,0 +1,413 @@
+//! The tools as people meet them: what they say, how they end, and that none of them hangs.
+
+use std::fs;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, is_stopped, pid, wait_for};
+use lager_topics::{LinkHealth, NavStatus, Phase};
+use rustix::process::{Signal, kill_process};
+
+/// Every tool that needs the bus of a robot that is up.
+const NEEDY: [&[&str]; 15] = [
+    &["topic", "echo", "sensor/line"],
+    &["topic", "echo", "link/health", "--json"],
+    &["topic", "hz", "sensor/line"],
+    &["fetch", "2"],
+    &["picked"],
+    &["reset"],
+    &["mode", "manual"],
+    &["resume"],
+    &["gains", "2", "2"],
+    &["calibrate"],
+    &["drive", "forward"],
+    &["drive", "left-diag"],
+    &["arm", "up"],
+    &["topic", "info", "sensor/line"],
+    &["topic", "list"],
+];
+
+/// A tool is to end within 3 s. A machine that is busy with other things is given more.
+const LONG: Duration = Duration::from_secs(20);
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn said(output: &Output) -> String {
+    text(&output.stdout) + &text(&output.stderr)
+}
+
+/// A robot that waits for orders.
+fn up(domain: &Domain) -> Running {
+    let up = domain.start(&["up", "--mission", "1", "--speed", "2"]);
+    let observer = domain.observe("r1", 2.0);
+    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
+    wait_for("the robot to drive", || {
+        let status = status.latest().expect("readable")?;
+        (status.phase.get() == Some(Phase::Driving)).then_some(())
+    });
+    up
+}
+
+/// A robot whose processes are all frozen and whose topics nobody can open any more: what stands
+/// in shared memory of them has no size, as if its maker had been stopped before he gave it one.
+struct Frozen {
+    processes: Vec<u32>,
+    _up: Running,
+}
+
+impl Frozen {
+    fn new(domain: &Domain) -> Self {
+        let up = up(domain);
+        let mut processes = vec![up.pid()];
+        let mut seen = 0;
+        while seen < processes.len() {
+            processes.extend(children(processes[seen]));
+            seen += 1;
+        }
+        for process in &processes {
+            kill_process(pid(*process), Signal::STOP).expect("a living process");
+        }
+        for process in &processes {
+            wait_for("all to be frozen", || is_stopped(*process).then_some(()));
+        }
+        let place = domain.bus("r1", 2.0).place().expect("the bus's folder");
+        let mut cut = 0;
+        for segment in place.segments() {
+            if segment.to_string_lossy().ends_with(".dynamic") {
+                let file = fs::File::options().write(true).open(segment);
+                file.and_then(|file| file.set_len(0)).expect("our own file");
+                cut += 1;
+            }
+        }
+        assert!(cut > 10, "{cut} topics and requests were cut");
+        let _up = up;
+        Self { processes, _up }
+    }
+}
+
+impl Drop for Frozen {
+    /// They would find their memory gone, and could not be ended in order.
+    fn drop(&mut self) {
+        for process in &self.processes {
+            let _ = kill_process(pid(*process), Signal::KILL);
+        }
+        for process in &self.processes {
+            wait_for("the end", || has_ended(*process).then_some(()));
+        }
+    }
+}
+
+fn spawn(domain: &Domain, words: &[&str]) -> Child {
+    domain
+        .lager(words)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("lager starts")
+}
+
+/// Waits for the end of a tool that is not to take long.
+fn end(words: &[&str], mut tool: Child, began: Instant) -> Output {
+    while tool.try_wait().expect("a child").is_none() {
+        if began.elapsed() >= LONG {
+            let _ = tool.kill();
+            panic!("`lager {}` hangs", words.join(" "));
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    tool.wait_with_output().expect("a child")
+}
+
+#[test]
+fn no_tool_hangs_on_a_bus_that_does_not_answer() {
+    let domain = Domain::new();
+    let frozen = Frozen::new(&domain);
+    // A few at a time: the machine has few cores, and what hangs in the transport takes one.
+    for some in NEEDY.chunks(3) {
+        let tools: Vec<_> = some
+            .iter()
+            .map(|words| (*words, spawn(&domain, words), Instant::now()))
+            .collect();
+        for (words, tool, began) in tools {
+            let output = end(words, tool, began);
+            let told = said(&output);
+            // Those two tell what they find, and need nobody's answer.
+            if !matches!(words, ["topic", "list" | "info", ..]) {
+                assert_eq!(output.status.code(), Some(1), "{words:?}: {told}");
+                assert!(told.contains("is frozen"), "{words:?}: {told}");
+            }
+        }
+    }
+    drop(frozen);
+}
+
+#[test]
+fn one_ctrl_c_ends_every_tool_also_while_the_bus_does_not_answer() {
+    let domain = Domain::new();
+    let frozen = Frozen::new(&domain);
+    for words in NEEDY {
+        let mut tool = spawn(&domain, words);
+        // It listens to signals once it has its watch; before that any signal ends it.
+        std::thread::sleep(Duration::from_millis(200));
+        let began = Instant::now();
+        if tool.try_wait().expect("a child").is_none() {
+            kill_process(pid(tool.id()), Signal::INT).expect("a child of ours");
+        }
+        end(words, tool, began);
+    }
+    drop(frozen);
+}
+
+#[test]
+fn ctrl_c_ends_what_needs_no_bus() {
+    let domain = Domain::new();
+    let long = ["simulate", "--seeds", "1..1000", "--warehouse", "large"];
+    let tool = spawn(&domain, &long);
+    std::thread::sleep(Duration::from_millis(500));
+    let began = Instant::now();
+    kill_process(pid(tool.id()), Signal::INT).expect("a child of ours");
+    assert_eq!(end(&long, tool, began).status.code(), Some(130));
+}
+
+#[test]
+fn ctrl_c_ends_a_measurement_and_leaves_nothing() {
+    let domain = Domain::new();
+    let stop = ["bench", "stop"];
+    let tool = spawn(&domain, &stop);
+    let folder = format!("/dev/shm/lager-bench-{}-0", tool.id());
+    wait_for("the robot to be measured", || {
+        std::fs::exists(format!("{folder}/r1"))
+            .is_ok_and(|there| there)
+            .then_some(())
+    });
+    let began = Instant::now();
+    kill_process(pid(tool.id()), Signal::INT).expect("a child of ours");
+    let output = end(&stop, tool, began);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said(&output).contains("nothing was left behind"));
+    assert!(!std::fs::exists(folder).expect("a name"));
+}
+
+#[test]
+fn a_robot_that_is_not_up_is_told_at_once() {
+    let domain = Domain::new();
+    let _up = up(&domain);
+    let away = |words: &[&str]| domain.run(&[&["--name", "r9"], words].concat());
+    for words in NEEDY {
+        if matches!(words, ["topic", "list" | "info", ..]) {
+            continue;
+        }
+        let output = away(words);
+        let told = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{words:?}: {told}");
+        assert!(told.contains("no robot `r9` is up"), "{words:?}: {told}");
+        assert!(told.contains("up are: r1"), "{words:?}: {told}");
+    }
+    let listed = away(&["topic", "list"]);
+    assert!(said(&listed).contains("`r9`"), "{}", said(&listed));
+    let all = domain.run(&["topic", "list"]);
+    assert!(
+        said(&all).contains("lager/r1/sensor/line"),
+        "{}",
+        said(&all)
+    );
+    assert!(said(&all).contains(" 1 publisher "), "{}", said(&all));
+    assert!(!said(&all).contains(" 1 publishers"), "{}", said(&all));
+    assert!(!said(&all).contains(" 1 subscribers"), "{}", said(&all));
+}
+
+#[test]
+fn a_tool_can_wait_for_the_robot() {
+    let domain = Domain::new();
+    let words = ["topic", "echo", "sensor/line", "--count", "1", "--wait"];
+    let mut tool = spawn(&domain, &words);
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(tool.try_wait().expect("a child").is_none(), "it waits");
+    let _up = up(&domain);
+    let output = wait_for("the sample", || tool.try_wait().expect("a child"));
+    assert!(output.success());
+}
+
+#[test]
+fn a_frozen_service_is_told_by_its_name() {
+    let domain = Domain::new();
+    let up = up(&domain);
+    for service in ["bridge", "logic"] {
+        let process = up.service(service).expect("a service");
+        // The supervisor as well: it would replace one that is silent for two seconds.
+        let frozen = [up.pid(), process];
+        for process in frozen {
+            kill_process(pid(process), Signal::STOP).expect("a living process");
+            wait_for("it to be frozen", || is_stopped(process).then_some(()));
+        }
+        let output = domain.run(match service {
+            "bridge" => &["mode", "autonomous"][..],
+            _ => &["reset"],
+        });
+        for process in frozen.into_iter().rev() {
+            kill_process(pid(process), Signal::CONT).expect("a living process");
+        }
+        let told = said(&output);
+        let frozen = format!("the {service} of the robot `r1` (process {process}) is frozen");
+        assert!(told.contains(&frozen), "{told}");
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        let observer = domain.observe("r1", 2.0);
+        let mut health = observer.subscriber::<LinkHealth>().expect("a topic");
+        wait_for("the robot to go on", || {
+            health.latest().expect("readable").map(|_| ())
+        });
+    }
+}
+
+#[test]
+fn an_order_that_cannot_be_carried_out_now_is_refused_with_its_reason() {
+    let domain = Domain::new();
+    let _up = up(&domain);
+    let driven = said(&domain.run(&["drive", "forward"]));
+    assert!(driven.contains("`lager mode manual`"), "{driven}");
+    let manual = domain.run(&["mode", "manual"]);
+    assert!(manual.status.success(), "{}", said(&manual));
+    let fetched = domain.run(&["fetch", "2"]);
+    assert_eq!(fetched.status.code(), Some(1));
+    let told = said(&fetched);
+    assert!(told.contains("`lager mode autonomous`"), "{told}");
+}
+
+#[test]
+fn a_calibration_tells_how_it_went() {
+    let domain = Domain::new();
+    let _up = up(&domain);
+    let manual = domain.run(&["mode", "manual"]);
+    assert!(manual.status.success(), "{}", said(&manual));
+    // A robot that stands shows its sensors tape or floor, not both.
+    let standing = domain.run(&["calibrate"]);
+    let told = said(&standing);
+    assert_eq!(standing.status.code(), Some(1), "{told}");
+    assert!(told.contains("of the 11 line sensors have seen"), "{told}");
+    // One that turns on the spot moves most of them across the line in that time, or all.
+    let moving = domain.start(&["drive", "left", "--seconds", "20"]);
+    let turning = domain.run(&["calibrate"]);
+    let told = said(&turning);
+    if turning.status.success() {
+        assert!(told.contains("are calibrated"), "{told}");
+    } else {
+        let sensors = told
+            .split("only ")
+            .nth(1)
+            .and_then(|told| told.split(' ').next());
+        let sensors: u8 = sensors.and_then(|number| number.parse().ok()).expect(&told);
+        assert!(sensors > 2, "{told}\n{}", moving.log());
+    }
+}
+
+#[test]
+fn what_is_short_is_named() {
+    let domain = Domain::new();
+    let _up = up(&domain);
+    let tool = domain.lager(&["topic", "echo", "sensor/line", "--count", "1"]);
+    // Too few for the bus, and for the topic. With 12, one more may have been closed in time.
+    for files in [5, 7, 9] {
+        let mut poor = Command::new("sh");
+        poor.args(["-c", &format!("ulimit -n {files}; exec \"$0\" \"$@\"")])
+            .arg(tool.get_program())
+            .args(tool.get_args())
+            .current_dir(domain.folder());
+        let output = poor.output().expect("a shell");
+        let told = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        let short = format!("may open {files} files");
+        assert!(told.contains(&short), "{told}");
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_two_and_a_sentence() {
+    let domain = Domain::new();
+    for (words, sentence) in [
+        (&["up", "--mission", "99"][..], "no product 99"),
+        (&["simulate", "--seeds", "3..1"], "first seed comes first"),
+        (&["simulate", "--mission", "99"], "no product 99"),
+        (&["drive", "bogus"], "follow-forward"),
+        (&["topic", "echo", "sensor/lime"], "sensor/line"),
+        (&["fetch", "-1"], "numbered from 0"),
+        (&["bench", "chip", "--quick"], "nothing else"),
+    ] {
+        let output = domain.run(words);
+        let told = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {told}");
+        assert!(told.contains(sentence), "{words:?}: {told}");
+    }
+    // What `up` refuses is no configuration to go by.
+    fs::write(
+        domain.folder().join("lager.toml"),
+        "warehouse = \"nowhere\"\n",
+    )
+    .expect("a file");
+    for words in [&["config"][..], &["up"]] {
+        let output = domain.run(words);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(
+            said(&output).contains("no warehouse `nowhere`"),
+            "{}",
+            said(&output)
+        );
+    }
+}
+
+#[test]
+fn echo_is_a_table_or_a_block_for_people() {
+    let domain = Domain::new();
+    let _up = up(&domain);
+    let frames = domain.run(&["topic", "echo", "sensor/line", "--count", "3"]);
+    let told = said(&frames);
+    let lines: Vec<&str> = told.lines().collect();
+    assert_eq!(lines.len(), 4, "a head and three rows: {told}");
+    assert!(
+        lines[0].contains("age ms") && lines[0].contains("state"),
+        "{told}"
+    );
+    assert!(lines[1].contains("bridge ("), "{told}");
+    let health = said(&domain.run(&["topic", "echo", "link/health", "--count", "1"]));
+    assert!(!health.contains('{'), "no JSON: {health}");
+    assert!(health.contains("by bridge ("), "{health}");
+    let mode = health.lines().find(|line| line.starts_with("  mode"));
+    assert!(
+        mode.is_some_and(|line| line.ends_with("  autonomous")),
+        "{health}"
+    );
+}
+
+#[test]
+fn up_speaks_with_one_voice_and_traces_only_where_it_is_asked_to() {
+    let domain = Domain::new();
+    let log = domain.folder().join("traces.log");
+    let mut up = domain.start(&[
+        "up",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--speed",
+        "5",
+        "--log",
+        log.to_str().expect("a path in UTF-8"),
+    ]);
+    assert!(WATCHDOG > LONG);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.output() + &up.log();
+    assert!(!told.is_empty());
+    for line in told.lines() {
+        let mut words = line.split_whitespace();
+        let time: Option<f64> = words.next().and_then(|time| time.parse().ok());
+        let who = (words.next() == Some("s")).then(|| words.next()).flatten();
+        assert!(time.is_some(), "`{line}` begins with no time:\n{told}");
+        let known = ["up", "bridge", "logic", "simulator", "robot"];
+        assert!(
+            who.is_some_and(|who| known.contains(&who)),
+            "`{line}` does not say who speaks:\n{told}"
+        );
+    }
+    let traces = fs::read_to_string(log).expect("the traces' file");
+    assert!(traces.contains("INFO"), "{traces}");
+}
