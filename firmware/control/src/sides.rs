@@ -31,6 +31,8 @@ const MOST: i16 = 12;
 /// For so many words the line may look like one after tape to both sides, as the bar does that is left
 /// at an angle: 150 ms.
 const ASKEW: u8 = 30;
+/// Stands in `end` where the line has ended and no mark has come since.
+const ENDED: u8 = u8::MAX;
 
 /// The mean and the bias.
 #[derive(Debug, Clone, Default)]
@@ -42,10 +44,9 @@ pub struct Sides {
     bias: i16,
     /// The bias before the last mark.
     before: i16,
-    /// So many words may still come before the line ends behind tape to both sides.
-    wide: u8,
-    /// The line has ended, and no mark has come since.
-    ended: bool,
+    /// So many words may still come before the line ends behind tape to both sides, or [`ENDED`].
+    // One byte for both: with two, the step was so long that a byte of the Pi's waited.
+    end: u8,
 }
 
 impl Sides {
@@ -57,8 +58,7 @@ impl Sides {
             due_us: 0,
             bias: 0,
             before: 0,
-            wide: 0,
-            ended: false,
+            end: 0,
         }
     }
 
@@ -66,13 +66,18 @@ impl Sides {
     // In the step itself it would take registers from what cannot wait.
     #[inline(never)]
     pub fn observe(&mut self, correction: i16, state: LineState, now_us: u32) {
-        self.wide = self.wide.saturating_sub(1);
+        let before = self.end;
+        if before != 0 && before != ENDED {
+            self.end = before - 1;
+        }
         match state {
             LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
                 if state == LineState::FourWay {
-                    self.wide = ASKEW;
+                    self.end = ASKEW;
+                } else if before == ENDED {
+                    self.end = 0;
                 }
-                if core::mem::take(&mut self.ended) {
+                if before == ENDED {
                     self.pause();
                 } else if self.seen >= LEAST {
                     self.before = self.bias;
@@ -81,12 +86,12 @@ impl Sides {
                 }
             }
             LineState::NotOnLine | LineState::DropStation
-                if self.wide > 0 || state == LineState::DropStation =>
+                if before != 0 || state == LineState::DropStation =>
             {
-                if !self.ended {
+                if before != ENDED {
                     self.bias = self.before;
                 }
-                self.ended = true;
+                self.end = ENDED;
             }
             _ if self.seen > 0 && !reached(now_us, self.due_us) => {}
             _ => {
