@@ -5,13 +5,16 @@ use std::time::Duration;
 
 use lager_ports::{Clock, Subscriber};
 use lager_tests::{Cable, Domain, Running, is_stopped, pid, wait_for};
-use lager_topics::{Health, LinkHealth, Mode, NavStatus, Phase, Refusal, TruthPose};
+use lager_topics::{
+    Health, LinkHealth, Mode, NavStatus, Origin, Phase, Refusal, SteeringState, TruthPose,
+};
 use rustix::process::{Signal, kill_process};
 
 /// What an observer sees of the robot.
 struct Watch {
     truth: Subscriber<TruthPose>,
     health: Subscriber<LinkHealth>,
+    steering: Subscriber<SteeringState>,
 }
 
 impl Watch {
@@ -20,6 +23,7 @@ impl Watch {
         Self {
             truth: bus.subscriber().expect("a topic"),
             health: bus.subscriber().expect("a topic"),
+            steering: bus.subscriber().expect("a topic"),
         }
     }
 
@@ -38,6 +42,15 @@ impl Watch {
     fn moves(&mut self) -> Option<bool> {
         let truth = self.truth.latest().expect("readable")?;
         Some(truth.left_duty != 0 || truth.right_duty != 0)
+    }
+
+    /// Whether an order of a person that was first given after `began` is in force, if the board has
+    /// news. An order's id is the milliseconds of the moment when it was first given.
+    fn obeys(&mut self, began: u64) -> Option<bool> {
+        let report = self.steering.latest().expect("readable")?;
+        let by_person = report.current_origin == Origin::Operator;
+        let began = (began / 1_000_000) as u32;
+        Some(by_person && report.current_id.wrapping_sub(began) < u32::MAX / 2)
     }
 
     /// The robot stands in everything the world shows from now on, for half a second of it.
@@ -79,16 +92,20 @@ fn driven_by_hand(domain: &Domain) -> (Running, Watch, Running) {
 }
 
 /// Somebody who drives the robot, which moves. One who was held up for longer than his order lasts
-/// has ended with a sentence, and somebody else drives: once the robot stands, so that it is his
-/// order that it is seen to move by.
+/// has ended with a sentence, and somebody else drives; it is this one's order that the robot is
+/// seen to move by.
 fn driving(domain: &Domain, watch: &mut Watch, drive: &[&str]) -> Running {
+    let mut began = Clock::monotonic_ns();
     let mut driver = domain.start(drive);
+    let mut obeyed = false;
     wait_for("the robot to drive", || {
         if !driver.is_running() {
-            watch.wait_to_stand();
+            began = Clock::monotonic_ns();
             driver = domain.start(drive);
+            obeyed = false;
         }
-        watch.moves().filter(|moves| *moves).map(|_| ())
+        obeyed |= watch.obeys(began) == Some(true);
+        (watch.moves() == Some(true) && obeyed).then_some(())
     });
     driver
 }

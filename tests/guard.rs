@@ -1,14 +1,16 @@
 //! The guard notices: with a deliberate slow-down in what it measures it fails and names the right
-//! figure, and without one the same build passes.
+//! figure.
 //!
-//! Each test runs `benches/guard` as people do. A slow-down adds to what is measured at all times,
-//! so a test that wants the guard to fail cannot be disturbed by whatever else the machine does;
-//! that unchanged code keeps its ratios is for `.ci/run` to show, which runs the guard itself.
+//! What is measured here is measured by `benches/guard` as people run it. A slow-down adds to what is
+//! measured at all times, so a test that wants the guard to fail cannot be disturbed by whatever else
+//! the machine does; that unchanged code keeps its limits is for `.ci/run` to show, which runs the
+//! guard itself with the same build.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
+use lager_tests::released;
 use serde_json::Value;
 
 /// What the guard said.
@@ -20,12 +22,15 @@ struct Said {
 
 fn guard(arguments: &[&str]) -> Said {
     let _alone = lager_tests::alone();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let output = Command::new(root.join("benches/guard"))
-        .args(arguments)
-        .arg("--json")
-        .output()
-        .unwrap();
+    said(Command::new(root().join("benches/guard")).args(arguments))
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+fn said(command: &mut Command) -> Said {
+    let output = command.arg("--json").output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let everything = format!("{text}{}", String::from_utf8_lossy(&output.stderr));
     let findings: Value = serde_json::from_str(&text).unwrap_or_default();
@@ -43,9 +48,9 @@ fn guard(arguments: &[&str]) -> Said {
     }
 }
 
-/// The guard with a slow-down, which fails and names all of `figures`.
-fn trips(slow: &str, only: &str, attempts: &str, figures: &[&str]) {
-    let said = guard(&[
+/// What the guard says with a slow-down.
+fn slowed(slow: &str, only: &str, attempts: &str) -> Said {
+    guard(&[
         "--slow",
         slow,
         "--only",
@@ -54,7 +59,11 @@ fn trips(slow: &str, only: &str, attempts: &str, figures: &[&str]) {
         "1",
         "--attempts",
         attempts,
-    ]);
+    ])
+}
+
+/// It failed and named all of `figures`.
+fn assert_broken(said: &Said, figures: &[&str]) {
     assert_eq!(said.code, Some(1), "{}", said.everything);
     for figure in figures {
         assert!(
@@ -69,33 +78,22 @@ fn trips(slow: &str, only: &str, attempts: &str, figures: &[&str]) {
 
 #[test]
 fn an_allocation_beside_each_sample_is_noticed() {
-    let unchanged = guard(&["--only", "instructions"]);
-    assert_eq!(unchanged.code, Some(0), "{}", unchanged.everything);
-    assert!(unchanged.failing.is_empty(), "{}", unchanged.everything);
-    if unchanged
-        .everything
-        .contains("limits were measured with rustc")
-    {
+    let said = slowed("allocation", "instructions", "1");
+    if said.everything.contains("limits were measured with rustc") {
         // The checked-in counts are another compiler's and leave room for more than an
         // allocation, so they say nothing here. `.ci/run` has the compiler they are for.
-        eprintln!("not judged: {}", unchanged.everything);
+        eprintln!("not judged: {}", said.everything);
         return;
     }
-    trips(
-        "allocation",
-        "instructions",
-        "1",
-        &["publish/to-1", "receive/sample"],
-    );
+    assert_broken(&said, &["publish/to-1", "receive/sample"]);
 }
 
 #[test]
 fn a_spin_of_five_microseconds_in_the_hop_is_noticed() {
-    trips(
-        "spin",
-        "hop",
-        // It does not slip through because the lower of two ratios counts.
-        "2",
+    // It does not slip through because the lower of two ratios counts.
+    let said = slowed("spin", "hop", "2");
+    assert_broken(
+        &said,
         &[
             "hop spin plain: lager / iceoryx2/header p50",
             "hop block same-core: lager / iceoryx2/event p50",
@@ -105,10 +103,8 @@ fn a_spin_of_five_microseconds_in_the_hop_is_noticed() {
 
 #[test]
 fn a_system_call_for_each_observer_is_noticed() {
-    trips(
-        "system-call",
-        "hop,fanout",
-        "1",
+    assert_broken(
+        &slowed("system-call", "hop,fanout", "1"),
         &[
             "ring-64 block same-core: lager/ring / iceoryx2/notify p50",
             "publish-64 spin plain: lager / iceoryx2/header p50",
@@ -120,7 +116,12 @@ fn a_system_call_for_each_observer_is_noticed() {
 fn judged(counts: &Value) -> Said {
     let file = std::env::temp_dir().join(format!("lager-guard-{}.json", std::process::id()));
     std::fs::write(&file, counts.to_string()).unwrap();
-    let said = guard(&["--only", "cycles", "--counts", file.to_str().unwrap()]);
+    let said = said(
+        Command::new(released("lager-guard"))
+            .current_dir(root())
+            .args(["--only", "cycles", "--counts"])
+            .arg(&file),
+    );
     std::fs::remove_file(file).unwrap();
     said
 }
@@ -133,24 +134,23 @@ fn limits(said: &Said) -> Vec<Value> {
     findings["limits"].as_array().unwrap().clone()
 }
 
-/// The images are measured once; then each of their figures gets worse, alone, by 6 % of what its
-/// limit was made of.
+/// Each figure of the images gets worse, alone, by 6 % of what its limit was made of.
 #[test]
 fn six_percent_more_cycles_are_noticed() {
-    let measured = guard(&["--only", "cycles"]);
-    assert_eq!(measured.code, Some(0), "{}", measured.everything);
+    let built = guard(&["--help"]);
+    assert_eq!(built.code, Some(0), "{}", built.everything);
     let counts = |figures: &BTreeMap<String, f64>| {
         // The compiler of the limits, whatever built the images here.
         let built = serde_json::json!({"rustc": "1.96.0", "target": "avr-none"});
         serde_json::json!({"source": "cycles", "built": built, "figures": figures})
     };
     let name = |limit: &Value| limit["figure"].as_str().unwrap().to_owned();
-    let seen = limits(&measured)
-        .iter()
-        .map(|limit| (name(limit), limit["measured"].as_f64().unwrap()))
-        .collect();
-    let limits = limits(&judged(&counts(&seen)));
+    // Of a figure that has no limit, so that the guard names all that have one.
+    let nothing = judged(&counts(&BTreeMap::from([("none".to_owned(), 1.0)])));
+    assert_eq!(nothing.code, Some(1), "{}", nothing.everything);
+    let limits = limits(&nothing);
     assert!(limits.len() >= 11, "{limits:?}");
+    assert_eq!(nothing.failing.len(), limits.len(), "all are missing");
     // The least that can be wrong: everything as it was when its limit was written.
     let base = |limit: &Value| match limit["at_least"] == true {
         true => limit["limit"].as_f64().unwrap(),

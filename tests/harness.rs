@@ -21,12 +21,21 @@ pub use cable::Cable;
 /// nothing.
 pub const WATCHDOG: Duration = Duration::from_secs(240);
 
-/// The release binary of this workspace.
+/// The program that people run, as this workspace builds it.
 ///
 /// # Panics
 /// When it has not been built: `tests/run` builds it first.
 #[must_use]
 pub fn lager() -> PathBuf {
+    released("lager")
+}
+
+/// A program of this workspace's release profile.
+///
+/// # Panics
+/// When it has not been built.
+#[must_use]
+pub fn released(name: &str) -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
         || {
             Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -35,7 +44,7 @@ pub fn lager() -> PathBuf {
         },
         PathBuf::from,
     );
-    let binary = target.join("release").join("lager");
+    let binary = target.join("release").join(name);
     assert!(
         binary.is_file(),
         "{} is missing; run tests/run, or `cargo build --release` first",
