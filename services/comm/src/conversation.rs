@@ -31,24 +31,35 @@
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
 //!   commands among these are dropped.
 //! - What cannot be done is told in a `thought`, and asked again a little later.
+//!
+//! A station that has answered the extension's first line is told states, events and lists besides
+//! (`telling.rs`), and its numbered actions are carried out and answered (`conversation/orders.rs`):
+//! what is waited for stands in `tasks.rs`, what moves the robot in `driving.rs`. No other peer hears
+//! anything of that.
 
 use core::time::Duration;
 
-use lager_lines::conversation::{Held, RobotLine, StationLine};
-use lager_lines::extension::{self, Hello, Report};
+use lager_lines::conversation::{Held, RobotLine, StationLine, StationLineError};
+use lager_lines::extension::{self, Hello};
 use lager_lines::gag::{Answer, Query, Request};
 use lager_lines::splitter::LineError;
-use lager_lines::{Coord, Name, ProductId, Text};
-use lager_topics::{
-    Event, EventKind, Health, Input, InputKind, Mode, NavigatorStatus, Order, OrderQueue, Phase,
-    Refusal, Route, SteeringOrder, SteeringReport, Thought, WarehouseMap,
-};
+use lager_lines::{Name, ProductId};
+use lager_topics::{Mode, Order, Phase, WarehouseMap};
 use lager_wire::OperatorCommand;
 
-use crate::driving::Driving;
-use crate::map::{Described, direction};
+use crate::action::Action;
+use crate::driving::{Driving, For};
+use crate::ids::Ids;
+use crate::known::Known;
+use crate::map::Described;
 use crate::moment::Moment;
-use crate::speech::{self, Told};
+use crate::speech::Told;
+use crate::tasks::{Asker, Tasks};
+use crate::telling::Telling;
+
+mod orders;
+mod samples;
+mod saying;
 
 /// In ns of real time: how often the extension's first line is repeated in manual mode, and else.
 const SIGN_BY_HAND: u64 = 50_000_000;
@@ -58,34 +69,13 @@ const SILENT_BY_HAND: u64 = 150_000_000;
 const SILENT: u64 = 5_000_000_000;
 /// When something is asked again that was answered with what cannot be.
 const AGAIN: u64 = 200_000_000;
-/// When an order or a press is repeated that logic does not show.
-const REPEAT: u64 = 250_000_000;
 /// How long after the connection is there a robot in manual mode asks for the warehouse rather than
 /// for commands.
 const DESCRIBED: u64 = 1_000_000_000;
-/// How long logic may take over a press.
-const PRESS: u64 = 2_500_000_000;
+/// What is said to actions that a stop has ended.
+const STOPPED: &str = "the robot has been stopped";
 /// Stops whose confirmation is owed, at most.
 const MOST_STOPS: usize = 16;
-
-/// What is to be done, in the order in which it was decided.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Action {
-    /// Say a line to the peer.
-    Say(RobotLine),
-    /// Give the connection up; another one is made.
-    HangUp(&'static str),
-    /// Publish the warehouse.
-    Map(Box<WarehouseMap>),
-    /// Order a product.
-    Order(Order),
-    /// Press a button.
-    Press(Input),
-    /// Give or renew a steering order.
-    Steer(SteeringOrder),
-    /// Stop the robot by its stop word.
-    Stop,
-}
 
 /// The conversation.
 #[derive(Clone, Debug)]
@@ -94,7 +84,7 @@ pub struct Conversation {
     actions: Vec<Action>,
     /// The last moment at which it was looked after.
     turned_ns: u64,
-    last_id: u32,
+    ids: Ids,
 
     is_up: bool,
     /// The peer has answered the extension's first line.
@@ -110,17 +100,15 @@ pub struct Conversation {
     told: Told,
 
     warehouse: Described,
-    published: Option<Box<WarehouseMap>>,
-    health: Option<Health>,
-    status: Option<NavigatorStatus>,
-    queue: Option<OrderQueue>,
-    /// Given, and not yet shown by logic.
-    order: Option<(Order, u64)>,
-    /// Pressed at, and repeated at.
-    pickup: Option<(Input, u64, u64)>,
+    known: Known,
+    /// What is told besides where the extension is spoken.
+    telling: Telling,
+    tasks: Tasks,
     driving: Driving,
     /// Stops that are to be confirmed, and when they came.
     stops: Vec<(u32, u64)>,
+    /// A stop has come while its release was asked for: it is set again after that.
+    stops_again: bool,
 }
 
 /// What happens to the connection.
@@ -135,7 +123,7 @@ impl Conversation {
             name,
             actions: Vec::new(),
             turned_ns: 0,
-            last_id: 0,
+            ids: Ids::default(),
             is_up: false,
             is_extended: false,
             is_fresh: false,
@@ -146,14 +134,15 @@ impl Conversation {
             ask_from_ns: 0,
             told: Told::default(),
             warehouse: warehouse.unwrap_or_default(),
-            published: kept.map(Box::new),
-            health: None,
-            status: None,
-            queue: None,
-            order: None,
-            pickup: None,
+            known: Known {
+                map: kept.map(Box::new),
+                ..Known::default()
+            },
+            telling: Telling::default(),
+            tasks: Tasks::default(),
             driving: Driving::default(),
             stops: Vec::new(),
+            stops_again: false,
         }
     }
 
@@ -187,26 +176,34 @@ impl Conversation {
         self.is_up = false;
         self.held.clear();
         self.stops.clear();
-        self.stand(now);
+        self.tasks.forget_actions();
+        self.driving.forget_actions();
+        self.stand(now, "the link is lost");
     }
 
     /// Time has passed. To be called before what has come since, at least every 20 ms.
     pub fn turn(&mut self, now: Moment) {
         let pause = Duration::from_nanos(now.ns.saturating_sub(self.turned_ns));
         self.turned_ns = now.ns;
-        if pause > Self::LONGEST_PAUSE && self.is_up && self.mode() == Some(Mode::Manual) {
+        if pause > Self::LONGEST_PAUSE && self.is_up && self.known.mode() == Some(Mode::Manual) {
             self.hang_up(
                 now,
                 "the robot was held up, so what it has not read may be old",
             );
         }
-        match self.driving.renew(now.robot) {
-            Ok(order) => self.actions.extend(order.map(Action::Steer)),
-            Err(why) => self.think(&why),
+        if self.driving.is_over(now) {
+            self.stand(now, "it was not renewed in time");
         }
-        self.repeat(now);
+        let renewed = self.driving.renew(now.robot);
+        self.actions.extend(renewed.map(Action::Steer));
+        self.tasks.turn(now);
+        self.settle();
         self.keep_up(now);
         self.ask(now);
+        if self.is_up && self.is_extended {
+            let reports = self.telling.reports(now, &mut self.known);
+            self.actions.extend(reports.into_iter().map(Action::Show));
+        }
     }
 
     /// Lines have come, all that had arrived.
@@ -216,7 +213,7 @@ impl Conversation {
         }
         self.heard_ns = now.ns;
         let read = |line: &Result<String, LineError>| match line {
-            Ok(line) => Ok(StationLine::read(line).map_err(|error| error.to_string())),
+            Ok(line) => Ok(StationLine::read(line)),
             Err(error) => Err(error.to_string()),
         };
         let lines: Vec<_> = lines.iter().map(read).collect();
@@ -231,26 +228,47 @@ impl Conversation {
             match line {
                 Ok(Ok(line)) => self.take(now, line, is_stopped),
                 Ok(Err(_)) if self.is_fresh => {}
-                Ok(Err(why)) => self.correct(now, &why),
+                Ok(Err(error)) => self.misread(now, &error),
                 Err(_) => return self.hang_up(now, "its lines cannot be read"),
             }
             self.is_fresh = false;
         }
+        self.settle();
         self.ask(now);
     }
 
     fn take(&mut self, now: Moment, line: StationLine, is_stopped: bool) {
         match line {
-            StationLine::Hello(_) => self.is_extended = true,
+            StationLine::Hello(_) => {
+                if !self.is_extended {
+                    self.is_extended = true;
+                    self.telling.begin();
+                }
+            }
             StationLine::Order(extension::Order::Stop { .. }) => {}
-            StationLine::Order(extension::Order::Do { number, .. }) => {
-                let reason = Text::new("this robot takes stops and the document's commands");
-                self.say(RobotLine::Report(Report::Refused {
-                    number,
-                    reason: reason.unwrap_or_default(),
-                }));
+            StationLine::Order(extension::Order::Do { number, action }) => {
+                if self.is_extended {
+                    self.carry_out(now, number, action, is_stopped);
+                } else {
+                    self.correct(
+                        now,
+                        "say `lager 1 <name>` before any other line of the extension",
+                    );
+                }
             }
             StationLine::Answer(answer) => self.answered(now, answer, is_stopped),
+        }
+    }
+
+    /// Says what of a line cannot be read.
+    fn misread(&mut self, now: Moment, error: &StationLineError) {
+        let number = match error {
+            StationLineError::Order(error) => error.number().filter(|_| self.is_extended),
+            StationLineError::Hello(_) | StationLineError::Answer(_) => None,
+        };
+        match number {
+            Some(number) => self.reply(number, Err(error.to_string())),
+            None => self.correct(now, &error.to_string()),
         }
     }
 
@@ -258,7 +276,7 @@ impl Conversation {
         let is_stop = answer == Answer::Command(OperatorCommand::Stop);
         if self.held.answer(&answer).is_err() {
             if is_stop {
-                self.stand(now);
+                self.stand(now, STOPPED);
             }
             return;
         }
@@ -272,7 +290,11 @@ impl Conversation {
             Answer::Fetch(product) => self.fetch(now, product),
             Answer::PickupDone => self.press_picked(now),
             Answer::Command(_) if is_stopped => {}
-            Answer::Command(command) => self.command(now, command),
+            Answer::Command(command) => {
+                if let Err(why) = self.command(now, command, For::Question) {
+                    self.correct(now, &why);
+                }
+            }
         }
     }
 
@@ -280,8 +302,8 @@ impl Conversation {
         match self.warehouse.to_bus() {
             Some(Ok(map)) => {
                 let map = Box::new(map);
-                if self.published.as_ref() != Some(&map) {
-                    self.published = Some(map.clone());
+                if self.known.map.as_ref() != Some(&map) {
+                    self.known.map = Some(map.clone());
                     self.actions.push(Action::Map(map));
                 }
             }
@@ -301,183 +323,39 @@ impl Conversation {
             return self.correct(now, &format!("there is no product {product}"));
         }
         let order = Order {
-            id: self.fresh_id(now),
+            id: self.ids.fresh(now),
             product: product.get(),
         };
-        self.order = Some((order, now.ns));
-        self.actions.push(Action::Order(order));
+        self.tasks.order(now, Asker::Question, order);
     }
 
     fn press_picked(&mut self, now: Moment) {
-        let input = Input {
-            kind: InputKind::PickupDone.into(),
-            order_id: self.status.map_or(0, |status| status.order_id),
-            id: self.fresh_id(now),
-            ..Input::default()
-        };
-        self.pickup = Some((input, now.ns, now.ns));
-        self.actions.push(Action::Press(input));
-    }
-
-    fn command(&mut self, now: Moment, command: OperatorCommand) {
-        if command == OperatorCommand::Stop {
-            return self.stand(now);
-        }
-        let is_arm = matches!(command, OperatorCommand::Arm(_));
-        if self.mode() != Some(Mode::Manual) && !is_arm {
-            let why = "the robot is autonomous and stands at goods: only its arm is moved";
-            return self.correct(now, why);
-        }
-        let blocked = self.health.and_then(|health| health.blocked.get());
-        if let Some(why) = blocked.filter(|why| *why != Refusal::None) {
-            let why = format!("{} is not possible now: {why}", command.name());
-            return self.correct(now, &why);
-        }
-        let id = self.fresh_id(now);
-        let order = self.driving.begin(now, id, command);
-        self.actions.push(Action::Steer(order));
-    }
-
-    fn stop(&mut self, now: Moment, number: Option<u32>) {
-        self.driving.let_go();
-        self.actions.push(Action::Stop);
-        if let Some(number) = number
-            && self.stops.len() < MOST_STOPS
-        {
-            self.stops.push((number, now.ns));
-        }
-    }
-}
-
-/// What the robot does.
-impl Conversation {
-    /// The bridge has told who may steer.
-    pub fn health(&mut self, now: Moment, health: &Health) {
-        let mode_before = self.mode();
-        self.health = Some(*health);
-        if self.mode() != mode_before {
-            // What was begun in one mode has no meaning in the other.
-            self.driving.let_go();
-            self.held.clear();
-        }
-        if let Some(why) = self.driving.refused(health) {
-            self.think(&why);
-        }
-        if health.stopped != 0 && self.driving.let_go() {
-            self.think("the robot has been stopped");
-        }
-        self.ask(now);
-    }
-
-    /// Logic has told where it is and what it does.
-    pub fn status(&mut self, now: Moment, status: &NavigatorStatus) {
-        self.status = Some(*status);
-        if status.phase != Phase::Picking {
-            self.pickup = None;
-        }
-        self.see_order(status.order_id);
-        if let Some(heading) = status.heading.get() {
-            let line = self.told.looks(direction(heading));
-            self.say_if_up(line);
-        }
-        self.ask(now);
-    }
-
-    /// Logic has told what it will fetch.
-    pub fn queue(&mut self, now: Moment, queue: &OrderQueue) {
-        self.queue = Some(*queue);
-        if queue.under_way != 0 {
-            self.see_order(queue.order_id);
-        }
-        for order in queue.orders() {
-            self.see_order(order.id);
-        }
-        self.ask(now);
-    }
-
-    /// Something has happened on a mission.
-    pub fn event(&mut self, now: Moment, event: &Event) {
-        match event.kind.get() {
-            // Logic says why in a thought.
-            Some(EventKind::Refused) if self.is_ordered(event.order_id) => {
-                self.order = None;
-                self.ask_from_ns = now.ns + AGAIN;
-            }
-            Some(EventKind::PickupRefused) => self.pickup = None,
-            _ => {}
-        }
-        self.ask(now);
-    }
-
-    /// The steering board has reported.
-    pub fn report(&mut self, now: Moment, report: &SteeringReport) {
-        if let Some(why) = self.driving.reported(report) {
-            self.think(&why);
-        }
-        let stopped = self.health.is_some_and(|health| health.stopped != 0);
-        if stopped && (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0) {
-            for (number, since) in core::mem::take(&mut self.stops) {
-                let after_ms = now.ns.saturating_sub(since) / 1_000_000;
-                self.say(RobotLine::Report(Report::Stopped {
-                    number,
-                    after_ms: u32::try_from(after_ms).unwrap_or(u32::MAX),
-                }));
-            }
-        }
-        self.ask(now);
-    }
-
-    /// Logic has planned another way.
-    pub fn route(&mut self, route: &Route) {
-        if let Some(node) = route.nodes().first() {
-            let line = self.told.node(Coord {
-                x: node.x,
-                y: node.y,
-            });
-            self.say_if_up(line);
-        }
-    }
-
-    /// A service has thought something.
-    pub fn thought(&mut self, thought: &Thought) {
-        self.think(&thought.to_string());
-    }
-
-    /// Whether this order has been given and logic does not show it yet.
-    fn is_ordered(&self, id: u32) -> bool {
-        self.order.is_some_and(|(order, _)| order.id == id)
-    }
-
-    /// Logic shows this order: it is not to be repeated.
-    fn see_order(&mut self, id: u32) {
-        self.order.take_if(|(order, _)| order.id == id);
+        let order = self.known.status.map_or(0, |status| status.order_id);
+        let id = self.ids.fresh(now);
+        self.tasks.picked(now, Asker::Question, id, order, false);
     }
 }
 
 /// What follows from all of it.
 impl Conversation {
-    fn mode(&self) -> Option<Mode> {
-        self.health.and_then(|health| health.mode.get())
-    }
-
     /// What the robot wants to know.
     fn wanted(&self, now: Moment) -> Option<Query> {
         let unknown = self.warehouse.unknown();
-        if self.mode()? == Mode::Manual {
+        if self.known.mode()? == Mode::Manual {
             let is_new = now.ns.saturating_sub(self.up_ns) < DESCRIBED;
-            let is_blind = self.published.is_none() && self.is_extended && is_new;
+            let is_blind = self.known.map.is_none() && self.is_extended && is_new;
             let wheels = (!self.driving.is_awaited()).then_some(Query::Wheels);
             return unknown.filter(|_| is_blind).or(wheels);
         }
         if unknown.is_some() {
             return unknown;
         }
-        if self.status?.phase == Phase::Picking {
-            let waits = self.driving.is_running() || self.pickup.is_some();
+        if self.known.status?.phase == Phase::Picking {
+            let waits = self.driving.is_running() || self.tasks.has_picked();
             return (!waits).then_some(Query::Arm);
         }
-        let queue = self.queue?;
-        let is_idle = self.order.is_none() && queue.under_way == 0 && queue.count == 0;
+        let queue = self.known.queue?;
+        let is_idle = !self.tasks.has_order() && queue.under_way == 0 && queue.count == 0;
         is_idle.then_some(Query::Fetch)
     }
 
@@ -499,25 +377,6 @@ impl Conversation {
         }
     }
 
-    /// Repeats what logic does not show yet.
-    fn repeat(&mut self, now: Moment) {
-        if let Some((order, sent)) = &mut self.order
-            && now.ns.saturating_sub(*sent) >= REPEAT
-        {
-            *sent = now.ns;
-            self.actions.push(Action::Order(*order));
-        }
-        if let Some((input, pressed, sent)) = &mut self.pickup {
-            if now.ns.saturating_sub(*pressed) >= PRESS {
-                self.pickup = None;
-                self.think("logic does not react to pickup_done");
-            } else if now.ns.saturating_sub(*sent) >= REPEAT {
-                *sent = now.ns;
-                self.actions.push(Action::Press(*input));
-            }
-        }
-    }
-
     /// Finds out whether the link is still there.
     fn keep_up(&mut self, now: Moment) {
         if !self.is_up || !self.is_extended {
@@ -527,7 +386,7 @@ impl Conversation {
         if silent >= SILENT || (self.driving.is_running() && silent >= SILENT_BY_HAND) {
             return self.hang_up(now, "the external computer has fallen silent");
         }
-        let period = match self.mode() {
+        let period = match self.known.mode() {
             Some(Mode::Manual) => SIGN_BY_HAND,
             _ => SIGN,
         };
@@ -550,45 +409,14 @@ impl Conversation {
         self.actions.push(Action::HangUp(why));
     }
 
-    /// Makes the robot stand where it is driven from here, without a latched stop.
-    fn stand(&mut self, now: Moment) {
-        if self.driving.let_go() {
-            let id = self.fresh_id(now);
-            let order = self.driving.begin(now, id, OperatorCommand::Stop);
+    /// Makes the robot stand where it is driven from here, without a latched stop. `why` is said to
+    /// the actions that this ends.
+    fn stand(&mut self, now: Moment, why: &str) {
+        if self.driving.let_go(why) {
+            let id = self.ids.fresh(now);
+            let stop = OperatorCommand::Stop;
+            let order = self.driving.begin(now, id, stop, For::Question);
             self.actions.push(Action::Steer(order));
         }
-    }
-
-    /// Tells what cannot be done; whatever is wanted then is asked a little later.
-    fn correct(&mut self, now: Moment, why: &str) {
-        self.think(why);
-        self.held.clear();
-        self.ask_from_ns = now.ns + AGAIN;
-    }
-
-    fn think(&mut self, sentence: &str) {
-        self.say_if_up(Some(speech::thought(sentence)));
-    }
-
-    fn say_if_up(&mut self, line: Option<RobotLine>) {
-        if let Some(line) = line.filter(|_| self.is_up) {
-            self.say(line);
-        }
-    }
-
-    fn say(&mut self, line: RobotLine) {
-        self.actions.push(Action::Say(line));
-    }
-
-    /// An id that nothing of this or an earlier process has had for the last hour: the
-    /// milliseconds of the machine's clock.
-    fn fresh_id(&mut self, now: Moment) -> u32 {
-        let milliseconds = (now.ns / 1_000_000) as u32;
-        // Two in one millisecond follow each other; the clock has caught up long before a restart.
-        self.last_id = match milliseconds.wrapping_sub(self.last_id) {
-            0 | 0x8000_0000.. => self.last_id.wrapping_add(1),
-            _ => milliseconds,
-        };
-        self.last_id
     }
 }

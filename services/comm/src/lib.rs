@@ -1,8 +1,8 @@
 //! The communication unit (C1-C9): the robot's side of the conversation with the external computer,
 //! and the only service of the robot with a socket to the network.
 //!
-//! - [`Conversation`]: what is asked, what is made of the answers, and what is told; a pure state
-//!   machine over lines and samples.
+//! - [`Conversation`]: what is asked, what is made of the answers and of a station's actions, and
+//!   what is told; a pure state machine over lines and samples.
 //! - [`run`]: its shell between a socket and the bus.
 //!
 //! It has no right that a person at the robot would not have: it orders, presses and steers as an
@@ -11,14 +11,23 @@
 
 #![forbid(unsafe_code)]
 
+mod action;
+mod asking;
 mod conversation;
 mod driving;
+mod ids;
+mod known;
 mod link;
 mod map;
 mod moment;
+mod pose;
 mod shell;
 mod speech;
+mod tasks;
+mod telling;
 
-pub use conversation::{Action, Conversation};
+pub use action::Action;
+pub use conversation::Conversation;
+pub use known::Senses;
 pub use moment::Moment;
 pub use shell::{CommConfig, run};

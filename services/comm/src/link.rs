@@ -7,6 +7,7 @@
 //!
 //! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing is
 //! the other thread's, which never waits: what the peer does not take stays with [`Link`], bounded.
+//! Of what only shows how things are the newest alone is kept, and goes after all that is said.
 
 use std::io;
 use std::net::{Shutdown as Direction, TcpStream, ToSocketAddrs};
@@ -20,6 +21,8 @@ use lager_lines::splitter::{LineError, LineSplitter};
 use lager_ports::{Clock, Ringer};
 use rustix::net::{SendFlags, send, sockopt};
 
+use crate::telling::KINDS;
+
 /// How long one address may take to answer.
 const CONNECT: Duration = Duration::from_secs(2);
 /// The first pause between two tries, doubled up to the longest.
@@ -31,7 +34,7 @@ const PATIENCE: Duration = Duration::from_millis(500);
 const GOOD: Duration = Duration::from_secs(5);
 /// How often a pause looks whether it is to end.
 const GLANCE: Duration = Duration::from_millis(20);
-/// What the peer may leave unread, in bytes, before it is given up; thoughts are left out before.
+/// What the peer may leave unread, in bytes, before it is given up.
 const MOST_UNREAD: usize = 64 * 1024;
 /// What is read that nobody has taken yet, in pieces of at most 4 KiB.
 const PIECES: usize = 16;
@@ -58,6 +61,8 @@ pub(crate) struct Link {
     news: Receiver<News>,
     stream: Option<TcpStream>,
     unread: Vec<u8>,
+    /// The newest of each kind, until all that is said has been taken.
+    shown: [Option<String>; KINDS],
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -77,6 +82,7 @@ impl Link {
             news,
             stream: None,
             unread: Vec::new(),
+            shown: Default::default(),
             ends,
             thread: Some(std::thread::spawn(move || thread.run())),
         }
@@ -89,6 +95,7 @@ impl Link {
             News::Up(stream) => {
                 self.stream = stream.try_clone().ok();
                 self.unread.clear();
+                self.shown = Default::default();
             }
             News::Down(_) => self.stream = None,
             News::Lines(_) => {}
@@ -107,12 +114,30 @@ impl Link {
     pub(crate) fn say(&mut self, line: &str) {
         if self.stream.is_some() {
             self.unread.extend_from_slice(line.as_bytes());
-            self.write();
+            self.write_said();
+        }
+    }
+
+    /// Shows how things are: in place of the line of this kind that the peer has not taken.
+    pub(crate) fn show(&mut self, kind: usize, line: String) {
+        if self.stream.is_some() {
+            self.shown[kind] = Some(line);
         }
     }
 
     /// Writes what waits, as far as the peer takes it.
     pub(crate) fn write(&mut self) {
+        self.write_said();
+        while self.stream.is_some() && self.unread.is_empty() {
+            let Some(line) = self.shown.iter_mut().find_map(Option::take) else {
+                return;
+            };
+            self.unread.extend_from_slice(line.as_bytes());
+            self.write_said();
+        }
+    }
+
+    fn write_said(&mut self) {
         let Some(stream) = &self.stream else { return };
         let flags = SendFlags::DONTWAIT | SendFlags::NOSIGNAL;
         while !self.unread.is_empty() {

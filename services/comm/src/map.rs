@@ -98,3 +98,13 @@ pub(crate) const fn direction(heading: Heading) -> Direction {
         Heading::Down => Direction::Down,
     }
 }
+
+/// A way in the words of the bus.
+pub(crate) const fn heading(way: Direction) -> Heading {
+    match way {
+        Direction::Left => Heading::Left,
+        Direction::Up => Heading::Up,
+        Direction::Right => Heading::Right,
+        Direction::Down => Heading::Down,
+    }
+}

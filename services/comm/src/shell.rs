@@ -14,13 +14,18 @@ use lager_ports::{
     StopPage, StopWord, Subscriber, Waiter,
 };
 use lager_topics::{
-    LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, NavMap, NavRoute, NavStatus,
-    OperatorInput, Role, SteeringCommand, SteeringState, StopCause, Topic, WarehouseMap,
+    BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
+    NavBlocks, NavMap, NavRoute, NavStatus, OperatorInput, Role, SensorDistance, SensorLine,
+    SteeringCommand, SteeringState, StopCause, Topic, TruthPose, WarehouseMap, WorldRequest,
 };
 
-use crate::conversation::{Action, Conversation};
+use crate::action::Action;
+use crate::asking::Asking;
+use crate::conversation::Conversation;
+use crate::known::Senses;
 use crate::link::{Link, News};
 use crate::moment::Moment;
+use crate::telling;
 
 /// Longest wait for anything, in real time: most samples ring nobody here, so that the path has
 /// nobody more to wake.
@@ -29,8 +34,14 @@ const LONGEST_WAIT: Duration = Duration::from_millis(10);
 /// How often the map is offered to late joiners, in real time.
 const MAP_PERIOD_NS: u64 = 20_000_000;
 
+/// How often what only the extension tells is looked at, in real time: as often as it is told.
+const SENSES_PERIOD_NS: u64 = 50_000_000;
+
 /// How long a predecessor's map is waited for, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
+
+/// Why a request is not put.
+const BUSY: &str = "too much is asked for at a time; try again";
 
 /// What comm is told when it starts.
 #[derive(Clone, Debug)]
@@ -70,12 +81,20 @@ struct Shell {
     reports: Subscriber<SteeringState>,
     route: Subscriber<NavRoute>,
     thoughts: Subscriber<LogThought>,
+    line: Subscriber<SensorLine>,
+    distance: Subscriber<SensorDistance>,
+    blocks: Subscriber<NavBlocks>,
+    latency: Subscriber<LatencyPath>,
+    truth: Subscriber<TruthPose>,
 
     map: Publisher<NavMap>,
     orders: Publisher<MissionOrder>,
     inputs: Publisher<OperatorInput>,
     commands: Publisher<SteeringCommand>,
+    bridge: Asking<BridgeRequest>,
+    world: Asking<WorldRequest>,
     map_ticked_ns: u64,
+    sensed_ns: u64,
     complaints: u32,
 }
 
@@ -92,6 +111,8 @@ impl Shell {
         let shell = Self {
             clock: bus.clock(),
             link: Link::new(config.station.clone(), waiter.ringer()?),
+            bridge: Asking::new(bus, waiter.ringer()?)?,
+            world: Asking::new(bus, waiter.ringer()?)?,
             waiter,
             conversation: Conversation::new(config.name.clone(), kept),
             stop_word: bus.place().folder_of(bus.robot()).join(StopPage::FILE),
@@ -102,11 +123,17 @@ impl Shell {
             reports: bus.subscriber()?,
             route: bus.subscriber()?,
             thoughts: bus.subscriber()?,
+            line: bus.subscriber()?,
+            distance: bus.subscriber()?,
+            blocks: bus.subscriber()?,
+            latency: bus.subscriber()?,
+            truth: bus.subscriber()?,
             map: bus.publisher()?,
             orders: bus.publisher()?,
             inputs: bus.publisher()?,
             commands: bus.publisher()?,
             map_ticked_ns: 0,
+            sensed_ns: 0,
             complaints: 0,
         };
         if let Some(map) = kept {
@@ -125,6 +152,7 @@ impl Shell {
         self.act();
         // First what the robot does, so that lines find the conversation as it is now.
         self.take_samples(now);
+        self.take_answers();
         self.take_lines(now);
         self.act();
         self.link.write();
@@ -149,7 +177,12 @@ impl Shell {
             self.conversation.queue(now, &queue);
         }
         if let Some(status) = self.next(|shell| shell.status.latest()) {
-            self.conversation.status(now, &status);
+            let published_ns = status.stamp().publish_time_ns;
+            self.conversation.status(now, &status, published_ns);
+        }
+        // Before the events, some of which name the next node.
+        if let Some(route) = self.next(|shell| shell.route.latest()) {
+            self.conversation.route(&route);
         }
         while let Some(event) = self.next(|shell| shell.events.receive()) {
             self.conversation.event(now, &event);
@@ -157,11 +190,37 @@ impl Shell {
         if let Some(report) = self.next(|shell| shell.reports.latest()) {
             self.conversation.report(now, &report);
         }
-        if let Some(route) = self.next(|shell| shell.route.latest()) {
-            self.conversation.route(&route);
-        }
         while let Some(thought) = self.next(|shell| shell.thoughts.receive()) {
             self.conversation.thought(&thought);
+        }
+        let is_due = now.ns.saturating_sub(self.sensed_ns) >= SENSES_PERIOD_NS;
+        if self.conversation.is_extended() && is_due {
+            self.sensed_ns = now.ns;
+            self.take_senses();
+        }
+    }
+
+    /// Takes what only a station hears that speaks the extension; the last sample of each is enough.
+    fn take_senses(&mut self) {
+        let senses = Senses {
+            line: self.next(|shell| shell.line.latest()).map(|line| *line),
+            distance: self
+                .next(|shell| shell.distance.latest())
+                .map(|distance| *distance),
+            blocks: (self.next(|shell| shell.blocks.latest())).map(|blocks| Box::new(*blocks)),
+            latency: (self.next(|shell| shell.latency.latest())).map(|latency| *latency),
+            truth: (self.next(|shell| shell.truth.latest())).map(|truth| Box::new(*truth)),
+        };
+        self.conversation.senses(senses);
+    }
+
+    /// Takes what has been answered to requests.
+    fn take_answers(&mut self) {
+        while let Some((id, answer)) = self.bridge.answer() {
+            self.conversation.answered_by_bridge(id, answer);
+        }
+        while let Some((id, answer)) = self.world.answer() {
+            self.conversation.answered_by_world(id, &answer);
         }
     }
 
@@ -197,6 +256,21 @@ impl Shell {
                     Ok(line) => self.link.say(&line),
                     Err(error) => tracing::error!("more than {MAX_LINE} bytes: {error}"),
                 },
+                Action::Show(report) => match (telling::kind(&report), to_line(&report)) {
+                    (Some(kind), Ok(line)) => self.link.show(kind, line),
+                    (None, Ok(line)) => self.link.say(&line),
+                    (_, Err(error)) => tracing::error!("more than {MAX_LINE} bytes: {error}"),
+                },
+                Action::Ask { id, ask } => {
+                    if !self.bridge.ask(id, ask) {
+                        self.conversation.answered_by_bridge(id, Err(BUSY.into()));
+                    }
+                }
+                Action::AskWorld { id, ask } => {
+                    if !self.world.ask(id, ask) {
+                        self.conversation.answered_by_world(id, &Err(BUSY.into()));
+                    }
+                }
                 Action::HangUp(why) => {
                     tracing::info!("the connection is given up: {why}");
                     self.link.hang_up();

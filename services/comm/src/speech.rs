@@ -27,13 +27,23 @@ impl Told {
 
 /// A sentence, cut to what a line can carry.
 pub(crate) fn thought(sentence: &str) -> RobotLine {
+    telemetry(Telemetry::Thought(cut(sentence, "thought ".len())))
+}
+
+/// Why an action is refused, likewise.
+pub(crate) fn reason(sentence: &str) -> Text {
+    cut(sentence, "refused 4294967295 ".len())
+}
+
+/// One line of a sentence that fits behind `before` bytes.
+fn cut(sentence: &str, before: usize) -> Text {
     let mut one_line = sentence.replace(['\r', '\n'], " ");
-    let most = MAX_LINE - "thought ".len();
+    let most = MAX_LINE - before;
     if one_line.len() > most {
         let end = (0..=most).rev().find(|end| one_line.is_char_boundary(*end));
         one_line.truncate(end.unwrap_or(0));
     }
-    telemetry(Telemetry::Thought(Text::new(one_line).unwrap_or_default()))
+    Text::new(one_line).unwrap_or_default()
 }
 
 fn telemetry(telemetry: Telemetry) -> RobotLine {

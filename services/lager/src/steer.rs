@@ -11,9 +11,9 @@ use anyhow::{Result, anyhow, bail};
 use lager_bridge::arbiter::LEASE;
 use lager_ports::{Bus, BusConfig, Clock, Subscriber};
 use lager_topics::{
-    Answer, Ask, AskKind, Calibration, EventKind, Finish, Health, Input, InputKind, LinkHealth,
-    MissionEvent, Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Refusal, Role,
-    SteeringOrder, SteeringState, StopCause, Topic,
+    Answer, Ask, AskKind, EventKind, Finish, Health, Input, InputKind, LinkHealth, MissionEvent,
+    Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Refusal, Role, SteeringOrder,
+    SteeringState, StopCause, Topic,
 };
 use lager_wire::OperatorCommand;
 
@@ -242,15 +242,8 @@ impl Operator {
         let answer = self.hands.ask(ask)?;
         match answer.outcome.get() {
             Some(Outcome::Done) => Ok(answer),
-            Some(Outcome::Late) => Err(anyhow!(
-                "the bridge was held up and found the request when its time was over; nothing was changed, try again"
-            )),
-            Some(Outcome::NoBoard) => Err(anyhow!(
-                "the board that would have to do it is not connected; `lager topic echo link/health` shows the links"
-            )),
-            _ => Err(anyhow!(
-                "it is refused: the value is out of range, or the board is an original one without settings"
-            )),
+            Some(outcome) => Err(anyhow!("{outcome}")),
+            None => Err(anyhow!("the bridge answers what nobody here understands")),
         }
     }
 
@@ -332,21 +325,8 @@ impl Operator {
                 }
                 match ended {
                     Some(Finish::Done) => return Ok(format!("`{name}` is done")),
-                    Some(Finish::Refused) => bail!(
-                        "the steering board refuses `{name}`: the arm moves only while the robot stands, and no joint beyond its limits in [arm]"
-                    ),
-                    Some(Finish::Aborted) => bail!(
-                        "`{name}` was cut short: a board was reset, another order took its place, or it was not renewed in time"
-                    ),
-                    Some(Finish::NoWord) => bail!(
-                        "the steering board gave up `{name}`: the sensor board's words do not reach it; look at the cable between the two boards"
-                    ),
-                    Some(Finish::NoTape) => {
-                        bail!(
-                            "the steering board gave up `{name}`: it has seen no tape for too long"
-                        )
-                    }
                     Some(Finish::None) | None => (),
+                    Some(finish) => bail!("`{name}` {finish}"),
                 }
             }
             if heard.elapsed() >= PATIENCE {
@@ -368,17 +348,11 @@ fn by(health: &Health) -> String {
 
 /// How a calibration has ended.
 fn calibrated(health: &Health) -> Result<String> {
-    let sensors = health.calibrated_sensors;
-    match health.calibration.get() {
-        Some(Calibration::Done) => {
+    match health.calibration_failure() {
+        None => {
             Ok("the line sensors are calibrated: each of them has seen both floor and tape".into())
         }
-        Some(Calibration::Partly) => bail!(
-            "only {sensors} of the 11 line sensors have seen both floor and tape, and the others keep their thresholds; calibrate again and move the robot to and fro across the tape meanwhile"
-        ),
-        _ => bail!(
-            "the sensor board fell silent or restarted before the calibration had ended; `lager doctor` looks for the cause"
-        ),
+        Some(why) => bail!(why),
     }
 }
 

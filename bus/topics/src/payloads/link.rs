@@ -186,4 +186,22 @@ payload! {
 impl Health {
     /// `gain_p` and `gain_d` before a request has set them. 0 is a gain.
     pub const NEVER_SET: i16 = -1;
+
+    /// Why the last calibration has not ended well, as a sentence; `None` if it has.
+    pub fn calibration_failure(&self) -> Option<String> {
+        match self.calibration.get() {
+            Some(Calibration::Done) => None,
+            Some(Calibration::Partly) => Some(format!(
+                "only {} of the 11 line sensors have seen both floor and tape, and the others keep \
+                 their thresholds; calibrate again and move the robot to and fro across the tape \
+                 meanwhile",
+                self.calibrated_sensors
+            )),
+            _ => Some(
+                "the sensor board fell silent or restarted before the calibration had ended; \
+                 `lager doctor` looks for the cause"
+                    .to_owned(),
+            ),
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! What the robot is to fetch and how it goes: `mission/order`, `mission/queue`, `mission/event`,
 //! `operator/input`.
 
+use core::fmt;
+
 use super::failure::Failure;
 use super::nav::Heading;
 use crate::schema::payload;
@@ -57,7 +59,47 @@ impl OrderQueue {
     pub fn orders(&self) -> &[WaitingOrder] {
         &self.orders[..usize::from(self.count).min(self.orders.len())]
     }
+
+    /// Whether the order `id` is under way.
+    pub fn is_under_way(&self, id: u32) -> bool {
+        self.under_way != 0 && self.order_id == id
+    }
+
+    /// How many orders are carried out before the order `id`, which waits.
+    ///
+    /// # Errors
+    /// It does not wait.
+    pub fn before(&self, id: u32) -> Result<usize, NotWaiting> {
+        let place = self.orders().iter().position(|order| order.id == id);
+        place.ok_or(match self.is_under_way(id) {
+            true => NotWaiting::UnderWay(id),
+            false => NotWaiting::Unknown(id),
+        })
+    }
 }
+
+/// Why an order does not wait for its turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotWaiting {
+    /// It is being carried out.
+    UnderWay(u32),
+    /// There is none with this number.
+    Unknown(u32),
+}
+
+impl fmt::Display for NotWaiting {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnderWay(id) => write!(formatter, "order {id} is under way and waits no more"),
+            Self::Unknown(id) => write!(
+                formatter,
+                "no order {id} waits; `lager queue` shows those that do"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for NotWaiting {}
 
 coded! {
     /// What happened on a mission (C8).

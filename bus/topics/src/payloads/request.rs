@@ -1,5 +1,7 @@
 //! What the bridge can be asked for: `bridge/request`.
 
+use core::fmt;
+
 use super::link::Mode;
 use super::nav::Heading;
 use crate::schema::payload;
@@ -32,6 +34,27 @@ coded! {
         NoBoard = 2,
         /// It came when its time was over; nothing was done.
         Late = 3,
+    }
+}
+
+impl fmt::Display for Outcome {
+    /// As a sentence.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Done => "it is done",
+            Self::Refused => {
+                "it is refused: the value is out of range, or the board is an original one without \
+                 settings"
+            }
+            Self::NoBoard => {
+                "the board that would have to do it is not connected; `lager topic echo \
+                 link/health` shows the links"
+            }
+            Self::Late => {
+                "it was found when its time was over, since somebody was held up; nothing was \
+                 changed, try again"
+            }
+        })
     }
 }
 
@@ -94,6 +117,21 @@ coded! {
         NothingThere = 3,
         /// As many things stand as there is room for.
         Full = 4,
+    }
+}
+
+impl fmt::Display for WorldRefusal {
+    /// As a sentence.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::None => "nothing is refused",
+            Self::NoPlace => "the warehouse has no such crossing or way",
+            Self::RobotThere => {
+                "the robot is there; wait until it has gone on, or `lager stop` it elsewhere"
+            }
+            Self::NothingThere => "nothing stands there; `lager obstacle` lists what stands",
+            Self::Full => "no more things fit into the warehouse; `lager obstacle take` one first",
+        })
     }
 }
 

@@ -34,6 +34,29 @@ coded! {
     }
 }
 
+impl fmt::Display for Finish {
+    /// What became of the order, as the end of a sentence that begins with it.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::None => "has not ended",
+            Self::Done => "is done",
+            Self::Aborted => {
+                "was cut short: a board was reset, another order took its place, or it was not \
+                 renewed in time"
+            }
+            Self::Refused => {
+                "is refused by the steering board: the arm moves only while the robot stands, and \
+                 no joint beyond its limits in [arm]"
+            }
+            Self::NoWord => {
+                "was given up: the sensor board's words do not reach the steering board; look at \
+                 the cable between the two boards"
+            }
+            Self::NoTape => "was given up: the steering board has seen no tape for too long",
+        })
+    }
+}
+
 coded! {
     /// Why the bridge does not carry an order out.
     pub enum Refusal {

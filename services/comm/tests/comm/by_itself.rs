@@ -164,13 +164,6 @@ fn only_the_arm_moves_at_the_goods() {
 }
 
 #[test]
-fn an_action_of_the_extension_that_is_not_taken_is_refused_by_its_number() {
-    let mut robot = idle();
-    let said = robot.hears(&["lager 1 station", "do 17 resume"]);
-    assert!(said[0].starts_with("refused 17 "), "{said:?}");
-}
-
-#[test]
 fn what_the_station_says_after_a_person_has_ordered_is_fetched_as_well() {
     let mut robot = idle();
     let persons = Order { id: 3, product: 7 };

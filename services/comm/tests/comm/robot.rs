@@ -6,7 +6,8 @@ use lager_comm::{Action, Conversation, Moment};
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
 use lager_topics::{
-    Health, Mode, NavigatorStatus, Order, OrderQueue, Origin, Phase, SteeringReport, WarehouseMap,
+    Ask, Health, Input, InputKind, Mode, NavigatorStatus, Order, OrderQueue, Origin, Phase,
+    SteeringReport, WarehouseMap, WorldAsk,
 };
 
 /// The conversation and what it has done, as a reader sees it.
@@ -18,6 +19,13 @@ pub(crate) struct Robot {
     pub(crate) ordered: Option<Order>,
     /// The last steering order that was given or renewed: its id and code.
     pub(crate) steered: Option<(u32, u8)>,
+    /// What was pressed last.
+    pub(crate) pressed: Option<Input>,
+    /// What was asked last, with the number of the answer.
+    pub(crate) asked: Option<(u32, Ask)>,
+    pub(crate) asked_world: Option<(u32, WorldAsk)>,
+    /// The reports that show how things are, since the last look.
+    pub(crate) shown: Vec<String>,
 }
 
 impl Robot {
@@ -39,6 +47,10 @@ impl Robot {
             map: None,
             ordered: None,
             steered: None,
+            pressed: None,
+            asked: None,
+            asked_world: None,
+            shown: Vec::new(),
         };
         robot.conversation.turn(robot.now);
         robot.mode(mode);
@@ -79,7 +91,26 @@ impl Robot {
                     self.ordered = Some(order);
                     format!("[orders {}]", order.product)
                 }
-                Action::Press(_) => "[picked]".into(),
+                Action::Press(input) => {
+                    self.pressed = Some(input);
+                    match input.kind.get() {
+                        Some(InputKind::PickupDone) => "[picked]".into(),
+                        _ => format!("[presses {}]", input.kind),
+                    }
+                }
+                Action::Show(report) => {
+                    let line = to_line(&report).expect("it fits");
+                    self.shown.push(line.trim_end().to_owned());
+                    continue;
+                }
+                Action::Ask { id, ask } => {
+                    self.asked = Some((id, ask));
+                    format!("[asks {}]", ask.kind)
+                }
+                Action::AskWorld { id, ask } => {
+                    self.asked_world = Some((id, ask));
+                    format!("[asks the world {}]", ask.kind)
+                }
                 Action::Steer(order) => {
                     assert_eq!(order.origin.get(), Some(Origin::Operator));
                     let renewed = self.steered == Some((order.id, order.code));
@@ -157,10 +188,21 @@ impl Robot {
             ..NavigatorStatus::default()
         };
         self.conversation.queue(self.now, &queue);
-        self.conversation.status(self.now, &status);
+        self.status(&status);
         let mut done = self.done();
         done.retain(|line| !line.starts_with("set_heading"));
         done
+    }
+
+    /// Logic tells its status, published at this moment.
+    pub(crate) fn status(&mut self, status: &NavigatorStatus) {
+        self.conversation.status(self.now, status, self.now.ns);
+    }
+
+    /// Logic tells its queue.
+    pub(crate) fn queue(&mut self, queue: &OrderQueue) -> Vec<String> {
+        self.conversation.queue(self.now, queue);
+        self.done()
     }
 
     pub(crate) fn event(&mut self, event: &lager_topics::Event) -> Vec<String> {

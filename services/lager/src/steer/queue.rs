@@ -37,8 +37,8 @@ impl Operator {
     /// `lager queue cancel`.
     pub fn cancel(&self, id: u32) -> Result<String> {
         let (mut queue, now) = self.queue()?;
-        waits(&now, id)?;
-        let gone = |queue: &OrderQueue| place(queue, id).is_none();
+        now.before(id)?;
+        let gone = |queue: &OrderQueue| queue.before(id).is_err();
         self.say_until(InputKind::OrderCancelled, id, &mut queue, gone)?;
         Ok(format!("order {id} is taken back"))
     }
@@ -46,11 +46,11 @@ impl Operator {
     /// `lager queue up`.
     pub fn move_up(&self, id: u32) -> Result<String> {
         let (mut queue, now) = self.queue()?;
-        let before = waits(&now, id)?;
+        let before = now.before(id)?;
         if before == 0 {
             return Ok(format!("order {id} is the next one already"));
         }
-        let is_earlier = |queue: &OrderQueue| place(queue, id).is_none_or(|now| now < before);
+        let is_earlier = |queue: &OrderQueue| queue.before(id).ok().is_none_or(|now| now < before);
         self.say_until(InputKind::OrderMovedUp, id, &mut queue, is_earlier)?;
         Ok(format!("order {id} is carried out earlier"))
     }
@@ -92,17 +92,17 @@ impl Operator {
                 }
             }
             if let Some(queue) = queue.latest()? {
-                if queue.under_way != 0 && queue.order_id == order.id {
+                if queue.is_under_way(order.id) {
                     return Ok(format!("logic fetches product {product}"));
                 }
-                match place(&queue, order.id) {
-                    Some(0) => return Ok(format!("logic fetches product {product} next")),
-                    Some(before) => {
+                match queue.before(order.id) {
+                    Ok(0) => return Ok(format!("logic fetches product {product} next")),
+                    Ok(before) => {
                         return Ok(format!(
                             "logic fetches product {product}; waiting before it: {before}"
                         ));
                     }
-                    None => {}
+                    Err(_) => {}
                 }
             }
             if Instant::now() >= give_up {
@@ -138,22 +138,6 @@ impl Operator {
                 bail!("logic does not react; `lager queue` shows what it goes by");
             }
         }
-    }
-}
-
-/// How many orders are before this one.
-fn place(queue: &OrderQueue, id: u32) -> Option<usize> {
-    queue.orders().iter().position(|order| order.id == id)
-}
-
-/// How many orders are before this one, which must wait.
-fn waits(queue: &OrderQueue, id: u32) -> Result<usize> {
-    match place(queue, id) {
-        Some(before) => Ok(before),
-        None if queue.under_way != 0 && queue.order_id == id => {
-            bail!("order {id} is under way and waits no more")
-        }
-        None => bail!("no order {id} waits; `lager queue` shows those that do"),
     }
 }
 

@@ -109,15 +109,7 @@ impl Operator {
         match (answer.outcome.get(), answer.refusal.get()) {
             (Some(Outcome::Done), _) => Ok(()),
             (_, Some(WorldRefusal::NoPlace)) => bail!(nowhere()),
-            (_, Some(WorldRefusal::RobotThere)) => {
-                bail!("the robot is there; wait until it has gone on, or `lager stop` it elsewhere")
-            }
-            (_, Some(WorldRefusal::NothingThere)) => {
-                bail!("nothing stands there; `lager obstacle` lists what stands")
-            }
-            (_, Some(WorldRefusal::Full)) => {
-                bail!("no more things fit into the warehouse; `lager obstacle take` one first")
-            }
+            (_, Some(refusal)) if refusal != WorldRefusal::None => bail!("{refusal}"),
             _ => bail!("the simulated world does not answer in time; is it very slow?"),
         }
     }

@@ -1,0 +1,140 @@
+//! What the robot does, as its other services tell it.
+
+use lager_lines::Coord;
+use lager_lines::conversation::RobotLine;
+use lager_lines::extension::Report;
+use lager_topics::{
+    Answer, Event, Health, NavigatorStatus, OrderQueue, Route, SteeringReport, Thought, WorldAnswer,
+};
+
+use super::{AGAIN, Conversation, STOPPED};
+use crate::action::Action;
+use crate::known::Senses;
+use crate::map::direction;
+use crate::moment::Moment;
+use crate::telling;
+
+impl Conversation {
+    /// The bridge has told who may steer.
+    pub fn health(&mut self, now: Moment, health: &Health) {
+        let mode_before = self.known.mode();
+        self.known.health = Some(*health);
+        if self.known.mode() != mode_before {
+            // What was begun in one mode has no meaning in the other.
+            self.driving.let_go("the mode has been changed");
+            self.held.clear();
+        }
+        self.driving.refused(health);
+        if health.stopped != 0 && self.driving.let_go(STOPPED) {
+            self.think(STOPPED);
+        }
+        self.tasks.health(health);
+        self.settle();
+        self.ask(now);
+    }
+
+    /// Logic has told where it is and what it does, in a sample that was published at this moment.
+    pub fn status(&mut self, now: Moment, status: &NavigatorStatus, published_ns: u64) {
+        self.known.status = Some(*status);
+        self.tasks.status(status, published_ns);
+        self.settle();
+        if let Some(heading) = status.heading.get() {
+            let line = self.told.looks(direction(heading));
+            self.say_if_up(line);
+        }
+        self.ask(now);
+    }
+
+    /// Logic has told what it will fetch.
+    pub fn queue(&mut self, now: Moment, queue: &OrderQueue) {
+        self.known.queue = Some(*queue);
+        self.tasks.queue(now, queue, &mut self.ids);
+        self.settle();
+        self.ask(now);
+    }
+
+    /// Something has happened on a mission.
+    pub fn event(&mut self, now: Moment, event: &Event) {
+        let waited = self.tasks.has_order();
+        self.tasks.event(event);
+        if waited && !self.tasks.has_order() {
+            self.ask_from_ns = now.ns + AGAIN;
+        }
+        if self.is_extended {
+            let report = telling::event(event, &self.known);
+            self.say_if_up(report.map(RobotLine::Report));
+        }
+        self.settle();
+        self.ask(now);
+    }
+
+    /// The steering board has reported.
+    pub fn report(&mut self, now: Moment, report: &SteeringReport) {
+        self.known.report = Some(*report);
+        self.driving.reported(report);
+        let stands = (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0);
+        if self.known.is_stopped() && stands {
+            for (number, since) in core::mem::take(&mut self.stops) {
+                let after_ms = now.ns.saturating_sub(since) / 1_000_000;
+                self.say(RobotLine::Report(Report::Stopped {
+                    number,
+                    after_ms: u32::try_from(after_ms).unwrap_or(u32::MAX),
+                }));
+            }
+        }
+        self.settle();
+        self.ask(now);
+    }
+
+    /// Logic has planned another way.
+    pub fn route(&mut self, route: &Route) {
+        if let Some(node) = route.nodes().first() {
+            let line = self.told.node(Coord {
+                x: node.x,
+                y: node.y,
+            });
+            self.say_if_up(line);
+        }
+        self.known.route = Some(Box::new(*route));
+    }
+
+    /// What is new of that which only the extension tells.
+    pub fn senses(&mut self, new: Senses) {
+        let known = &mut self.known.senses;
+        known.line = new.line.or(known.line);
+        known.distance = new.distance.or(known.distance);
+        known.blocks = new.blocks.or_else(|| known.blocks.take());
+        known.latency = new.latency.or(known.latency);
+        known.truth = new.truth.or_else(|| known.truth.take());
+    }
+
+    /// Whether a station listens that is told more than the document has.
+    pub const fn is_extended(&self) -> bool {
+        self.is_up && self.is_extended
+    }
+
+    /// A service has thought something.
+    pub fn thought(&mut self, thought: &Thought) {
+        self.think(&thought.to_string());
+    }
+
+    /// What became of an [`Action::Ask`]; `Err` is why nobody knows.
+    pub fn answered_by_bridge(&mut self, id: u32, answer: Result<Answer, String>) {
+        let resumed = self.tasks.resumes();
+        let calibrated = self
+            .known
+            .health
+            .map_or(0, |health| health.calibrations_ended);
+        self.tasks.answered(id, answer, calibrated);
+        if resumed && !self.tasks.resumes() && core::mem::take(&mut self.stops_again) {
+            self.actions.push(Action::Stop);
+        }
+        self.settle();
+    }
+
+    /// What became of an [`Action::AskWorld`]; `Err` is why nobody knows.
+    pub fn answered_by_world(&mut self, id: u32, answer: &Result<WorldAnswer, String>) {
+        self.tasks.world_answered(id, answer);
+        self.settle();
+    }
+}

@@ -1,0 +1,52 @@
+//! What the robot's other services have said last.
+
+use lager_topics::{
+    BlockedWays, DistanceFrame, Health, LineFrame, Mode, NavigatorStatus, OrderQueue, PathLatency,
+    Refusal, Route, SteeringReport, Truth, WarehouseMap,
+};
+
+/// The last sample of each topic that is told of. `None` has not been heard.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Known {
+    pub(crate) health: Option<Health>,
+    pub(crate) status: Option<NavigatorStatus>,
+    pub(crate) queue: Option<OrderQueue>,
+    pub(crate) report: Option<SteeringReport>,
+    pub(crate) route: Option<Box<Route>>,
+    pub(crate) senses: Senses,
+    /// The warehouse as this process or one before it has published it.
+    pub(crate) map: Option<Box<WarehouseMap>>,
+}
+
+/// What only a station that speaks the extension is told, each as far as it is new.
+#[derive(Clone, Debug, Default)]
+pub struct Senses {
+    /// The line under the robot.
+    pub line: Option<LineFrame>,
+    /// What is in front of it.
+    pub distance: Option<DistanceFrame>,
+    /// The ways on which something stands.
+    pub blocks: Option<Box<BlockedWays>>,
+    /// How long it takes to react.
+    pub latency: Option<PathLatency>,
+    /// Where a simulated robot really is.
+    pub truth: Option<Box<Truth>>,
+}
+
+impl Known {
+    /// Who may drive.
+    pub(crate) fn mode(&self) -> Option<Mode> {
+        self.health.and_then(|health| health.mode.get())
+    }
+
+    /// Whether a stop is in force.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.health.is_some_and(|health| health.stopped != 0)
+    }
+
+    /// Why nobody may move the robot now, if that is so.
+    pub(crate) fn blocked(&self) -> Option<Refusal> {
+        let why = self.health.and_then(|health| health.blocked.get());
+        why.filter(|why| *why != Refusal::None)
+    }
+}

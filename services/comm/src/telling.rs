@@ -1,0 +1,307 @@
+//! What a station that speaks the extension is told of the robot: its state twenty times a second,
+//! lists when they have changed, measurements when there are new ones.
+//!
+//! Each kind of report replaces one before it that the station has not taken, so nothing heaps up
+//! behind a slow one.
+
+use lager_lines::extension::{
+    Degrees, Edge, Event, EventKind, Latency, Listed, Mode, Queued, Report, Servos, State, Truth,
+};
+use lager_lines::{Coord, Name, ProductId, Text};
+use lager_topics::{
+    BlockedWays, BoardHealth, Hold, LineFrame, Mode as BusMode, OrderQueue, PathLatency, Phase,
+    Route, Tag, Truth as BusTruth,
+};
+use lager_wire::{Binary, LineBits};
+
+use crate::known::{Known, Senses};
+use crate::map::direction;
+use crate::moment::Moment;
+use crate::pose;
+
+/// How often the state is told, in ns of real time.
+const PERIOD: u64 = 50_000_000;
+
+/// How old the steering board's words may be, in ms of robot time, before they are left out.
+const LATEST_REPORT_MS: u16 = 500;
+
+/// When what was told, and what is to be told.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Telling {
+    next_ns: u64,
+    route: Option<Report>,
+    blocked: Option<Report>,
+    queue: Option<Report>,
+}
+
+impl Telling {
+    /// A station has announced itself: it has been told nothing yet.
+    pub(crate) fn begin(&mut self) {
+        *self = Self::default();
+    }
+
+    /// What is to be told at this moment. What was measured is taken out of `known`.
+    pub(crate) fn reports(&mut self, now: Moment, known: &mut Known) -> Vec<Report> {
+        if now.ns < self.next_ns {
+            return Vec::new();
+        }
+        // A turn that comes late does not make those after it late.
+        self.next_ns += PERIOD;
+        if self.next_ns <= now.ns {
+            self.next_ns = now.ns + PERIOD;
+        }
+        let mut reports = vec![Report::State(Box::new(state(now, known)))];
+        let Senses {
+            truth,
+            latency,
+            blocks,
+            ..
+        } = &mut known.senses;
+        reports.extend(truth.take().map(|truth| self::truth(&truth)));
+        reports.extend(latency.take().map(|latency| self::latency(&latency)));
+        let lists = [
+            (&mut self.route, known.route.as_deref().map(route)),
+            (&mut self.blocked, blocks.as_deref().map(blocked)),
+            (&mut self.queue, known.queue.as_ref().map(queue)),
+        ];
+        for (told, list) in lists {
+            if list.is_some() && *told != list {
+                told.clone_from(&list);
+                reports.extend(list);
+            }
+        }
+        reports
+    }
+}
+
+/// Kinds of reports of which a newer one replaces an older one.
+pub(crate) const KINDS: usize = 6;
+
+/// Which of the kinds a report is, the first to be told first; `None` where each counts.
+pub(crate) const fn kind(report: &Report) -> Option<usize> {
+    match report {
+        Report::State(_) => Some(0),
+        Report::Truth(_) => Some(1),
+        Report::Route(_) => Some(2),
+        Report::Blocked(_) => Some(3),
+        Report::Queue(_) => Some(4),
+        Report::Latency(_) => Some(5),
+        Report::Stopped { .. }
+        | Report::Done { .. }
+        | Report::Refused { .. }
+        | Report::Event(_) => None,
+    }
+}
+
+/// What has happened, if the language has a word for it.
+pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report> {
+    use lager_topics::EventKind as Bus;
+    let kind = match event.kind.get()? {
+        Bus::InPosition => EventKind::InPosition,
+        Bus::GettingItem => EventKind::GettingItem,
+        Bus::ItemDelivered => EventKind::ItemDelivered,
+        Bus::NextNode => EventKind::NextNode,
+        Bus::Refused => EventKind::Refused,
+        Bus::PickupRefused => EventKind::PickupRefused,
+        Bus::Failed => EventKind::Failed,
+        // The list of ways that are not taken tells it.
+        Bus::WayBlocked => return None,
+    };
+    let passed = Coord {
+        x: event.x,
+        y: event.y,
+    };
+    let node = match kind {
+        EventKind::NextNode => known.route.as_deref().and_then(next).unwrap_or(passed),
+        _ => passed,
+    };
+    let has_order = event.order_id != 0;
+    let text = match event.failure.is_none() {
+        true => Text::default(),
+        false => Text::new(event.failure.to_string()).unwrap_or_default(),
+    };
+    Some(Report::Event(Event {
+        kind,
+        node,
+        order: has_order.then_some(event.order_id),
+        product: ProductId::new(event.product).filter(|_| has_order),
+        text,
+    }))
+}
+
+fn state(now: Moment, known: &Known) -> State {
+    let mut state = State {
+        time_ms: u64::try_from(now.robot.as_millis()).ok(),
+        next: known.route.as_deref().and_then(next),
+        mode: known.mode().map(mode),
+        ..State::default()
+    };
+    put_health(&mut state, known);
+    put_place(&mut state, known);
+    put_mission(&mut state, known);
+    put_boards(&mut state, known);
+    state
+}
+
+fn put_health(state: &mut State, known: &Known) {
+    let Some(health) = &known.health else { return };
+    state.stopped = Some(health.stopped != 0);
+    state.sensor_up = Some(is_up(&health.sensor));
+    state.steering_up = Some(is_up(&health.steering));
+    state.sensor_lost = Some(health.sensor.lost_total);
+    state.steering_lost = Some(health.steering.lost_total);
+    let missed = known.status.map_or(0, |status| status.frames_lost);
+    state.bus_lost = Some(health.bus_lost.saturating_add(missed));
+}
+
+fn put_place(state: &mut State, known: &Known) {
+    let Some(status) = &known.status else { return };
+    state.phase = status.phase.get().and_then(phase_name);
+    state.hold = status.hold.get().and_then(hold_name);
+    let by_hand = known.health.map_or(0, |health| health.driven_by_hand);
+    if !pose::is_known(status, by_hand) {
+        return;
+    }
+    if let (Ok(x), Ok(y)) = (u8::try_from(status.x), u8::try_from(status.y)) {
+        state.node = Some(Coord { x, y });
+    }
+    state.looks = status.heading.get().map(direction);
+    let map = known.map.as_deref().filter(|map| map.side_length_cm > 0);
+    if let Some(pose) = map.and_then(|map| pose::pose(status, map)) {
+        state.x_mm = Some(pose.x_mm);
+        state.y_mm = Some(pose.y_mm);
+        state.heading_deg = Some(pose.heading);
+    }
+}
+
+fn put_mission(state: &mut State, known: &Known) {
+    state.delivered = known.status.map(|status| status.delivered);
+    if let Some(queue) = known.queue.filter(|queue| queue.under_way != 0) {
+        state.order = Some(queue.order_id);
+        state.product = ProductId::new(queue.product);
+    }
+}
+
+/// What the boards see and do, as far as they are heard.
+fn put_boards(state: &mut State, known: &Known) {
+    let is_heard = |up: Option<bool>| up == Some(true);
+    if is_heard(state.sensor_up) {
+        let bits = known.senses.line.map(|line| line.bits);
+        let bits = bits.filter(|bits| *bits != LineFrame::NO_BITS);
+        state.line_bits = bits.map(LineBits);
+        let distance = known.senses.distance.map(|frame| frame.distance_cm);
+        state.distance_cm = distance.filter(|distance_cm| *distance_cm != u8::MAX);
+    }
+    let report = known.report.filter(|report| {
+        let is_new = report.age_ms <= LATEST_REPORT_MS;
+        is_heard(state.steering_up) && is_new
+    });
+    if let Some(report) = report {
+        state.line_error = Some(report.line_error);
+        state.left_duty = Some(report.left_duty);
+        state.right_duty = Some(report.right_duty);
+        state.code = Some(Binary(report.code));
+        state.servos = Some(Servos::new(report.servo_position.map(Some)));
+        let battery = Some(report.battery_decivolts);
+        state.battery_dv = battery.filter(|decivolts| *decivolts != 0);
+    }
+}
+
+fn is_up(board: &BoardHealth) -> bool {
+    board.up != 0
+}
+
+const fn mode(mode: BusMode) -> Mode {
+    match mode {
+        BusMode::Manual => Mode::Manual,
+        BusMode::Autonomous => Mode::Autonomous,
+    }
+}
+
+fn phase_name(phase: Phase) -> Option<Name> {
+    name(Tag::from(phase).to_string())
+}
+
+fn hold_name(hold: Hold) -> Option<Name> {
+    name(Tag::from(hold).to_string())
+}
+
+/// `WaitingForOrder` as `waiting_for_order`.
+fn name(variant: String) -> Option<Name> {
+    let mut name = String::new();
+    for letter in variant.chars() {
+        if letter.is_ascii_uppercase() && !name.is_empty() {
+            name.push('_');
+        }
+        name.push(letter.to_ascii_lowercase());
+    }
+    Name::new(name).ok()
+}
+
+/// The node it goes to.
+fn next(route: &Route) -> Option<Coord> {
+    let node = route.nodes().first()?;
+    Some(Coord {
+        x: node.x,
+        y: node.y,
+    })
+}
+
+fn route(route: &Route) -> Report {
+    let nodes = route.nodes().iter();
+    let nodes: Vec<Coord> = nodes
+        .map(|node| Coord {
+            x: node.x,
+            y: node.y,
+        })
+        .collect();
+    Report::Route(Listed::<Coord>::new(&nodes))
+}
+
+fn blocked(blocks: &BlockedWays) -> Report {
+    let edge = |way: &lager_topics::BlockedWay| {
+        Some(Edge {
+            node: Coord { x: way.x, y: way.y },
+            way: way.heading.get().map(direction)?,
+        })
+    };
+    let ways: Vec<Edge> = blocks.ways().iter().filter_map(edge).collect();
+    Report::Blocked(Listed::<Edge>::new(&ways))
+}
+
+fn queue(queue: &OrderQueue) -> Report {
+    let orders: Vec<Queued> = queue
+        .orders()
+        .iter()
+        .filter_map(|order| {
+            Some(Queued {
+                order: order.id,
+                product: ProductId::new(order.product)?,
+            })
+        })
+        .collect();
+    Report::Queue(Listed::<Queued>::new(&orders))
+}
+
+fn latency(latency: &PathLatency) -> Report {
+    let us = |ns: u64| u32::try_from(ns.div_ceil(1_000)).unwrap_or(u32::MAX);
+    let total = &latency.total;
+    Report::Latency(Latency {
+        count: u32::try_from(total.count).unwrap_or(u32::MAX),
+        p50_us: us(total.p50_ns),
+        p90_us: us(total.p90_ns),
+        p99_us: us(total.p99_ns),
+        p999_us: us(total.p999_ns),
+        max_us: us(total.max_ns),
+    })
+}
+
+fn truth(truth: &BusTruth) -> Report {
+    Report::Truth(Truth {
+        x_mm: truth.x_mm.round() as i32,
+        y_mm: truth.y_mm.round() as i32,
+        // The world counts counter-clockwise from the right.
+        heading: Degrees::new(90 - truth.heading_rad.to_degrees().round() as i32),
+        carrying: ProductId::new(truth.carrying),
+    })
+}
