@@ -63,6 +63,8 @@ pub(crate) struct Connection {
     stream: Stream,
     splitter: LineSplitter,
     unread: Vec<u8>,
+    /// Whether the peer has read a part of the first line of that.
+    is_begun: bool,
     /// Since when there is something the peer has not read.
     unread_since: Instant,
     /// Since when a line is begun and not ended.
@@ -79,6 +81,7 @@ impl Connection {
             stream,
             splitter: LineSplitter::new(),
             unread: Vec::new(),
+            is_begun: false,
             unread_since: now,
             begun_since: None,
             opened: now,
@@ -129,10 +132,25 @@ impl Connection {
     ///
     /// The connection has ended, or the peer has left too much unread.
     pub(crate) fn say(&mut self, now: Instant, line: &str) -> io::Result<()> {
+        self.put(now, self.unread.len(), line)
+    }
+
+    /// Says a line before all that wait, but for one that the peer has begun to read.
+    ///
+    /// # Errors
+    ///
+    /// As with [`Connection::say`].
+    pub(crate) fn say_first(&mut self, now: Instant, line: &str) -> io::Result<()> {
+        let end = self.unread.iter().position(|byte| *byte == b'\n');
+        let begun = end.map_or(self.unread.len(), |end| end + 1);
+        self.put(now, if self.is_begun { begun } else { 0 }, line)
+    }
+
+    fn put(&mut self, now: Instant, place: usize, line: &str) -> io::Result<()> {
         if self.unread.is_empty() {
             self.unread_since = now;
         }
-        self.unread.extend_from_slice(line.as_bytes());
+        self.unread.splice(place..place, line.bytes());
         self.write(now)?;
         if self.unread.len() > MOST_UNREAD {
             return Err(io::Error::other("it does not read what it is told"));
@@ -150,6 +168,7 @@ impl Connection {
             match self.stream.write(&self.unread) {
                 Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
                 Ok(count) => {
+                    self.is_begun = self.unread[count - 1] != b'\n';
                     self.unread.drain(..count);
                     self.unread_since = now;
                 }
@@ -184,4 +203,44 @@ fn is_nothing(error: &io::Error) -> bool {
         error.kind(),
         io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_said_first_overtakes_whole_lines_that_wait() {
+        let (ours, mut theirs) = UnixStream::pair().expect("sockets");
+        ours.set_nonblocking(true).expect("a socket");
+        let now = Instant::now();
+        let mut connection = Connection::new(Stream::Unix(ours), now, false);
+        // One line that the machine takes in part only.
+        let long = "x".repeat(4 << 20) + "\n";
+        connection.unread.extend_from_slice(long.as_bytes());
+        connection.write(now).expect("it is there");
+        assert!(connection.is_begun && connection.wants_to_write());
+        // What waits behind it, as `say` would refuse for so long a line.
+        connection.unread.extend_from_slice(b"do 1 clear\n");
+        let end = connection.unread.len();
+        let said = connection.say_first(now, "stop 2\n");
+        assert!(said.is_err(), "so much is too much, but it stands there");
+        assert_eq!(connection.unread.len(), end + "stop 2\n".len());
+
+        let reader = std::thread::spawn(move || {
+            let mut all = String::new();
+            theirs.read_to_string(&mut all).expect("it ends");
+            all
+        });
+        while connection.wants_to_write() {
+            connection.write(now).expect("it is there");
+            std::thread::yield_now();
+        }
+        connection.say(now, "do 3 clear\n").expect("it is there");
+        connection.say_first(now, "stop 4\n").expect("it is there");
+        drop(connection);
+        let all = reader.join().expect("it reads");
+        let lines: Vec<_> = all.lines().skip(1).collect();
+        assert_eq!(lines, ["stop 2", "do 1 clear", "do 3 clear", "stop 4"]);
+    }
 }

@@ -20,18 +20,25 @@
 
 #![forbid(unsafe_code)]
 
+mod asked;
+mod awaited;
 mod connection;
 mod handle;
 mod queues;
 mod robot;
 mod saver;
 mod server;
+mod shown;
 mod station;
 mod warehouse;
+mod wheel;
 
-pub use handle::Handle;
+pub use awaited::{Awaited, Subscription};
+pub use handle::{Driver, Handle, View};
 pub use queues::Queues;
-pub use robot::{CommandRefused, Doing, FetchRefused, Robot};
+pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};
 pub use server::{Listen, Server, ServerConfig, ServerError};
-pub use station::{Output, Peer, Station, Wish, WishRefused};
+pub use shown::{Reply, Seen, Shown, Told};
+pub use station::{News, Output, Peer, Station, Wish, WishRefused};
 pub use warehouse::{LoadError, SaveError, StoredProduct, Warehouse, WarehouseError, load, save};
+pub use wheel::Key;

@@ -21,19 +21,27 @@
 //! - While a GaG speaks for the robot only commands are answered from here, those that were given
 //!   besides the GaG's: a stop above all.
 //!
-//! Time is no part of it: how long a robot has not been heard is the matter of who carries the
-//! lines.
+//! - A robot that speaks the extension is given numbered actions besides, and answers each. What it
+//!   shows of itself is kept with the time when it came ([`Shown`]). Who drives it by actions holds
+//!   its seat (`wheel.rs`); anybody may stop it.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
-use lager_lines::extension::{Hello, Order, Report, State};
+use lager_lines::extension::{Hello, Order};
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{Coord, Direction, Map, Name, ProductId, Products, SideLength, Text};
+use lager_lines::{Coord, Direction, Map, ProductId, Products, SideLength, Text};
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
+use crate::asked::Asked;
+use crate::shown::{Shown, Told};
 use crate::warehouse::{Warehouse, WarehouseError};
+use crate::wheel::Wheel;
+
+mod actions;
+mod known;
 
 /// What a robot is doing, as far as its questions tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -79,6 +87,29 @@ pub enum CommandRefused {
     NotPicking,
 }
 
+/// Why an action is not given to a robot.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ActRefused {
+    /// It does not understand any.
+    #[error("the robot speaks only the document's language, or is away; it takes no actions")]
+    Plain,
+    /// It does not answer.
+    #[error(
+        "{} actions are unanswered already; wait for the robot, or stop it",
+        Asked::MOST
+    )]
+    Full,
+    /// Somebody else drives.
+    #[error("{by} drives the robot; wait until he has left, or stop it")]
+    Driven {
+        /// Who.
+        by: String,
+    },
+    /// Only who drives it may.
+    #[error("the robot is moved by its driver alone; take the wheel first")]
+    NotDriver,
+}
+
 /// Why a product is not put in a robot's queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum FetchRefused {
@@ -101,6 +132,7 @@ pub enum FetchRefused {
 pub struct Robot {
     doing: Doing,
     held: Held,
+    /// As it has announced itself, if it speaks the extension.
     hello: Option<Hello>,
     warehouse: Option<(SideLength, Map, Products)>,
     queue: VecDeque<ProductId>,
@@ -111,11 +143,15 @@ pub struct Robot {
     commands: VecDeque<OperatorCommand>,
     is_picked: bool,
     has_gag: bool,
-    stops: u32,
     node: Option<Coord>,
     looks: Option<Direction>,
     thought: Option<Text>,
-    state: Option<State>,
+    now: Duration,
+    shown: Shown,
+    asked: Asked,
+    wheel: Wheel,
+    /// What it has said and nobody has taken yet.
+    told_news: Vec<Told>,
 }
 
 /// What a person wants of it. What is returned is said to the robot, in this order.
@@ -160,19 +196,21 @@ impl Robot {
         Ok(self.answer())
     }
 
-    /// Stops the robot: in the extension's lane of its own if it speaks that, else by a command.
+    /// Stops the robot: in the extension's lane of its own if it speaks that, else by a command. The
+    /// number is that of the confirmation, which only the extension has.
     ///
     /// # Errors
     ///
     /// When it speaks only the document's language and does not ask for commands.
-    pub fn stop(&mut self) -> Result<Option<StationLine>, CommandRefused> {
+    pub fn stop(&mut self) -> Result<(Option<u32>, Option<StationLine>), CommandRefused> {
         if self.hello.is_none() {
-            return self.command(OperatorCommand::Stop);
+            return Ok((None, self.command(OperatorCommand::Stop)?));
         }
         self.commands.clear();
-        self.stops = self.stops.wrapping_add(1);
-        let number = Some(self.stops);
-        Ok(Some(StationLine::Order(Order::Stop { number })))
+        let (number, dropped) = self.asked.open_always(self.now);
+        self.lose(dropped);
+        let number = Some(number);
+        Ok((number, Some(StationLine::Order(Order::Stop { number }))))
     }
 
     /// The goods are in the gripper (Q5). Commands that wait are given first.
@@ -260,6 +298,8 @@ impl Robot {
         self.hello = None;
         self.is_unanswered = false;
         self.drop_commands();
+        let lost = self.asked.lost(self.now, true);
+        self.lose(lost);
     }
 
     /// It has said something. What is returned is said to it.
@@ -271,13 +311,22 @@ impl Robot {
         match line {
             RobotLine::Request(Request::Query(query)) => return self.asked(query),
             RobotLine::Request(Request::Telemetry(telemetry)) => match telemetry {
-                Telemetry::Thought(thought) => self.thought = Some(thought),
+                Telemetry::Thought(thought) => {
+                    self.thought = Some(thought.clone());
+                    self.told_news.push(Told::Thought(thought));
+                }
                 Telemetry::Robot(node) => self.node = Some(node),
                 Telemetry::Heading(looks) => self.looks = Some(looks),
             },
             RobotLine::Hello(hello) => self.hello = Some(hello),
-            RobotLine::Report(Report::State(state)) => self.state = Some(*state),
-            RobotLine::Report(_) => {}
+            RobotLine::Report(report) => {
+                let told = self.shown.take(report, self.now);
+                self.told_news.extend(told.filter(|told| match told {
+                    // What nobody waits for is no news.
+                    Told::Replied { number, .. } => self.asked.close(*number),
+                    Told::Event(_) | Told::Thought(_) => true,
+                }));
+            }
         }
         None
     }
@@ -339,64 +388,5 @@ impl Robot {
         };
         self.held.clear();
         Some(StationLine::Answer(answer))
-    }
-}
-
-/// What is known of it.
-impl Robot {
-    /// What it is doing.
-    pub const fn doing(&self) -> Doing {
-        self.doing
-    }
-
-    /// Its name, once it has announced the extension.
-    pub fn name(&self) -> Option<&Name> {
-        self.hello.as_ref().map(|hello| &hello.name)
-    }
-
-    /// The question that is held.
-    pub const fn held(&self) -> Option<Query> {
-        self.held.get()
-    }
-
-    /// The product that it was told last.
-    pub const fn told(&self) -> Option<ProductId> {
-        self.told
-    }
-
-    /// The products that wait, the next one first.
-    pub fn queue(&self) -> impl Iterator<Item = ProductId> {
-        self.queue.iter().copied()
-    }
-
-    /// The same, with the product before them that it was told and may not have heard.
-    pub fn unfetched(&self) -> impl Iterator<Item = ProductId> {
-        let told = self.told.filter(|_| self.is_unanswered);
-        told.into_iter().chain(self.queue())
-    }
-
-    /// The commands that wait, the next one first.
-    pub fn commands(&self) -> impl Iterator<Item = OperatorCommand> {
-        self.commands.iter().copied()
-    }
-
-    /// The node it told last, to which it goes.
-    pub const fn node(&self) -> Option<Coord> {
-        self.node
-    }
-
-    /// Where it said last that it looks.
-    pub const fn looks(&self) -> Option<Direction> {
-        self.looks
-    }
-
-    /// What it said last.
-    pub const fn thought(&self) -> Option<&Text> {
-        self.thought.as_ref()
-    }
-
-    /// Its last state, if it speaks the extension.
-    pub const fn state(&self) -> Option<&State> {
-        self.state.as_ref()
     }
 }

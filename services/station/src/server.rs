@@ -198,6 +198,7 @@ impl Server {
         while !shutdown.load(Ordering::SeqCst) {
             let ready = self.wait()?;
             let now = Instant::now();
+            self.handle.turn();
             for peer in ready.write {
                 let written = self.connections.get_mut(&peer).map(|one| one.write(now));
                 if let Some(Err(error)) = written {
@@ -324,13 +325,22 @@ impl Server {
                 match output {
                     Output::Say { to, line } => {
                         let said = self.connections.get_mut(&to).map(|one| one.say(now, &line));
-                        if let Some(Err(error)) = said {
-                            self.end(to, &error.to_string());
-                        }
+                        self.check(to, said);
+                    }
+                    Output::SayFirst { to, line } => {
+                        let connection = self.connections.get_mut(&to);
+                        let said = connection.map(|one| one.say_first(now, &line));
+                        self.check(to, said);
                     }
                     Output::Close { peer, why } => self.end(peer, &why),
                 }
             }
+        }
+    }
+
+    fn check(&mut self, peer: Peer, said: Option<io::Result<()>>) {
+        if let Some(Err(error)) = said {
+            self.end(peer, &error.to_string());
         }
     }
 

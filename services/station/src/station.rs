@@ -14,21 +14,30 @@
 //! - What a GaG answers is checked as a file is. What cannot be is told it in a `thought`, and it is
 //!   asked again. What it says of the warehouse becomes the station's warehouse.
 //!
-//! It is pure: lines and wishes in, [`Output`]s out, in the order in which they came about.
+//! - A person drives a robot that speaks the extension by actions (`station/actions.rs`); meanwhile
+//!   neither a GaG nor anybody else here moves it, but anybody stops it.
+//!
+//! It is pure: time, lines and wishes in, [`Output`]s out, in the order in which they came about.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use lager_lines::conversation::{Held, RobotLine, StationLine};
-use lager_lines::extension::Hello;
-use lager_lines::gag::{Answer, Query, Request, Telemetry};
+use lager_lines::extension::{Hello, Order};
+use lager_lines::gag::Request;
 use lager_lines::splitter::LineError;
-use lager_lines::{Map, Name, ProductId, Products, SideLength, Text, to_line};
+use lager_lines::{Map, Name, ProductId, Products, SideLength, to_line};
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
 use crate::queues::Queues;
-use crate::robot::{CommandRefused, FetchRefused, Robot};
-use crate::warehouse::{StoredProduct, Warehouse, WarehouseError};
+use crate::robot::{ActRefused, CommandRefused, FetchRefused, Robot};
+use crate::warehouse::{Warehouse, WarehouseError};
+
+mod actions;
+mod gag;
+
+pub use actions::News;
 
 /// Who is at the other end of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -44,6 +53,13 @@ pub enum Peer {
 pub enum Output {
     /// A line with its end is said.
     Say {
+        /// To whom.
+        to: Peer,
+        /// What.
+        line: String,
+    },
+    /// The same, before all lines that wait to be said: a stop.
+    SayFirst {
         /// To whom.
         to: Peer,
         /// What.
@@ -67,8 +83,6 @@ pub enum Wish {
     Cancel(ProductId),
     /// Give a command.
     Command(OperatorCommand),
-    /// Stop it.
-    Stop,
     /// Tell it that the goods are in the gripper.
     PickedUp,
 }
@@ -82,6 +96,9 @@ pub enum WishRefused {
     /// The command is not given.
     #[error(transparent)]
     Command(#[from] CommandRefused),
+    /// The action is not given.
+    #[error(transparent)]
+    Act(#[from] ActRefused),
     /// The product is not fetched.
     #[error(transparent)]
     Fetch(#[from] FetchRefused),
@@ -101,6 +118,7 @@ pub struct Station {
     gag: Option<Gag>,
     outputs: Vec<Output>,
     is_unsaved: bool,
+    now: Duration,
 }
 
 /// The GaG that is connected.
@@ -137,6 +155,7 @@ impl Station {
             gag: None,
             outputs: Vec::new(),
             is_unsaved: false,
+            now: Duration::ZERO,
         })
     }
 
@@ -190,13 +209,6 @@ impl Station {
             .flatten()
     }
 
-    /// It could not be saved; who described it is told.
-    pub fn not_saved(&mut self, why: &str) {
-        if self.gag.is_some() {
-            self.put(Peer::Gag, &thought(why));
-        }
-    }
-
     /// What waits to be fetched, to be saved.
     pub fn queues(&self) -> Queues {
         let waits = |robot: &Robot| robot.unfetched().map(ProductId::get).collect::<Vec<_>>();
@@ -237,8 +249,13 @@ impl Station {
             Wish::Fetch(product) => robot.fetch(product)?,
             Wish::Cancel(product) if robot.cancel(product) => None,
             Wish::Cancel(product) => return Err(WishRefused::NotQueued(product)),
-            Wish::Command(command) => robot.command(command)?,
-            Wish::Stop => robot.stop()?,
+            Wish::Command(command) => {
+                if let Some(by) = robot.driver().filter(|_| command != OperatorCommand::Stop) {
+                    let by = by.to_owned();
+                    return Err(ActRefused::Driven { by }.into());
+                }
+                robot.command(command)?
+            }
             Wish::PickedUp => robot.picked_up()?,
         };
         self.say(name, line);
@@ -351,6 +368,7 @@ impl Station {
             }
         }
         let robot = self.robots.entry(name.clone()).or_default();
+        robot.turn(self.now);
         robot.connected();
         if let Some(warehouse) = &self.warehouse {
             // It has been checked, and nothing is asked yet.
@@ -378,118 +396,6 @@ impl Station {
             });
         }
     }
-
-    fn gag_said(&mut self, line: &str) {
-        if self.gag.is_none() {
-            return;
-        }
-        let answer = match Answer::read(line) {
-            Ok(answer) => answer,
-            Err(error) => return self.correct_gag(&error.to_string()),
-        };
-        let Some(gag) = &mut self.gag else { return };
-        if let Err(error) = gag.held.answer(&answer) {
-            return self.correct_gag(&error.to_string());
-        }
-        let name = gag.robot.clone();
-        if let Err(error) = self.learn(&answer) {
-            return self.correct_gag(&error.to_string());
-        }
-        if let Some(name) = name
-            && let Some(robot) = self.robots.get_mut(&name)
-        {
-            // What the robot asks no more is passed over.
-            let line = robot.given(answer).ok();
-            self.say(&name, line);
-            self.ask_gag(&name);
-        }
-    }
-
-    /// Tells the GaG what is wrong, and asks again what is still asked.
-    fn correct_gag(&mut self, why: &str) {
-        self.put(Peer::Gag, &thought(why));
-        if let Some(gag) = &mut self.gag {
-            gag.held.clear();
-            if let Some(name) = gag.robot.clone() {
-                self.ask_gag(&name);
-            }
-        }
-    }
-
-    /// Takes up what the GaG says of the warehouse, once all of it is known.
-    fn learn(&mut self, answer: &Answer) -> Result<(), WarehouseError> {
-        let Some(gag) = &mut self.gag else {
-            return Ok(());
-        };
-        match answer {
-            Answer::SideLength(side) => gag.side = Some(*side),
-            Answer::Map(map) => gag.map = Some(*map),
-            Answer::Products(_, products) => gag.products = Some(products.clone()),
-            _ => return Ok(()),
-        }
-        let (Some(side), Some(map), Some(products)) = (gag.side, gag.map, &gag.products) else {
-            return Ok(());
-        };
-        let told = described(self.warehouse.as_ref(), side, map, products);
-        let checked = told.check();
-        if checked.is_err() {
-            gag.products = None;
-        }
-        checked?;
-        if self.warehouse.as_ref() != Some(&told) {
-            self.set_warehouse(told)?;
-        }
-        Ok(())
-    }
-}
-
-/// Who the GaG speaks for.
-impl Station {
-    /// Lets the GaG speak for the robot that has been connected for longest.
-    fn seat_gag(&mut self) {
-        let first = self.links.values().flatten().next().cloned();
-        let Some(gag) = &mut self.gag else { return };
-        if gag.robot == first {
-            return;
-        }
-        let before = core::mem::replace(&mut gag.robot, first.clone());
-        before.into_iter().for_each(|name| self.unseat(&name));
-        let Some(name) = first else { return };
-        let Some(robot) = self.robots.get_mut(&name) else {
-            return;
-        };
-        let line = robot.set_gag(true);
-        let node = robot.node().map(Telemetry::Robot);
-        let looks = robot.looks().map(Telemetry::Heading);
-        for telemetry in node.into_iter().chain(looks) {
-            self.put(Peer::Gag, &Request::Telemetry(telemetry));
-        }
-        self.say(&name, line);
-        self.ask_gag(&name);
-    }
-
-    /// The GaG speaks for this robot no more.
-    fn unseat(&mut self, name: &Name) {
-        if let Some(robot) = self.robots.get_mut(name) {
-            let line = robot.set_gag(false);
-            self.say(name, line);
-        }
-    }
-
-    /// Asks the GaG what its robot asks, if it has not been asked that already.
-    fn ask_gag(&mut self, name: &Name) {
-        let Some(gag) = &mut self.gag else { return };
-        if gag.robot.as_ref() != Some(name) {
-            return;
-        }
-        let asked: Option<Query> = self.robots.get(name).and_then(Robot::held);
-        if let Some(query) = asked
-            && gag.held.get() != Some(query)
-        {
-            gag.held.ask(query);
-            self.put(Peer::Gag, &Request::Query(query));
-        }
-    }
 }
 
 /// What is said.
@@ -498,8 +404,16 @@ impl Station {
     fn say(&mut self, name: &Name, line: Option<StationLine>) {
         let mut links = self.links.iter();
         let link = links.find(|(_, named)| named.as_ref() == Some(name));
-        if let (Some(line), Some((&link, _))) = (line, link) {
-            self.put(Peer::Robot(link), &line);
+        let (Some(line), Some((&link, _))) = (line, link) else {
+            return;
+        };
+        let to = Peer::Robot(link);
+        match line {
+            StationLine::Order(Order::Stop { .. }) => {
+                let line = format!("{line}\n");
+                self.outputs.insert(0, Output::SayFirst { to, line });
+            }
+            line => self.put(to, &line),
         }
     }
 
@@ -514,37 +428,5 @@ impl Station {
     fn close(&mut self, peer: Peer, why: String) {
         self.outputs.push(Output::Close { peer, why });
         self.disconnected(peer);
-    }
-}
-
-/// A sentence for a GaG.
-fn thought(why: &str) -> Request {
-    let text = Text::new(why.replace(['\r', '\n'], " "));
-    Request::Telemetry(Telemetry::Thought(text.unwrap_or_default()))
-}
-
-/// The warehouse before with what a GaG says of it. Products keep the names they had.
-fn described(
-    before: Option<&Warehouse>,
-    side: SideLength,
-    map: Map,
-    products: &Products,
-) -> Warehouse {
-    let known = |id: i32| {
-        let mut known = before.iter().flat_map(|before| &before.products);
-        known.find(|product| product.id == id)
-    };
-    let product = |product: &lager_lines::Product| StoredProduct {
-        id: product.id.get(),
-        name: known(product.id.get()).and_then(|known| known.name.clone()),
-        square: [product.square.x, product.square.y],
-        side: product.side.to_string(),
-    };
-    Warehouse {
-        size: [map.size().x, map.size().y],
-        side_length_cm: side.cm(),
-        delivery: [map.delivery().x, map.delivery().y],
-        products: products.as_slice().iter().map(product).collect(),
-        rest: before.map_or_else(toml::Table::new, |before| before.rest.clone()),
     }
 }

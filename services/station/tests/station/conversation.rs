@@ -114,11 +114,14 @@ fn a_stop_is_the_next_thing_that_the_robot_is_told_and_the_last_one() {
     for _ in 0..Robot::MOST_COMMANDS {
         assert_eq!(give(&mut robot, 6), Ok(String::new()));
     }
-    assert_eq!(robot.stop().map(written), Ok(String::new()));
+    assert_eq!(
+        robot.stop().map(|(_, line)| written(line)),
+        Ok(String::new())
+    );
     assert_eq!(say(&mut robot, "styrcomm"), "styrcomm 00000001");
     assert_eq!(say(&mut robot, "styrcomm"), "");
     assert_eq!(
-        robot.stop().map(written),
+        robot.stop().map(|(_, line)| written(line)),
         Ok("styrcomm 00000001".into()),
         "it is asked for"
     );
@@ -134,13 +137,16 @@ fn a_stop_has_a_lane_of_its_own_where_the_extension_is_spoken() {
     );
     assert_eq!(say(&mut robot, "lager 1 r1"), "");
     assert_eq!(robot.name().map(|name| name.as_str()), Some("r1"));
-    assert_eq!(robot.stop().map(written), Ok("stop 1".into()));
+    assert_eq!(
+        robot.stop().map(|(_, line)| written(line)),
+        Ok("stop 1".into())
+    );
 
     assert_eq!(say(&mut robot, "styrcomm"), "");
     assert_eq!(give(&mut robot, 2), Ok("styrcomm 00000010".into()));
     assert_eq!(give(&mut robot, 6), Ok(String::new()));
     assert_eq!(
-        robot.stop().map(written),
+        robot.stop().map(|(_, line)| written(line)),
         Ok("stop 2".into()),
         "without being asked"
     );
@@ -208,7 +214,8 @@ fn telemetry_comes_while_a_question_is_held_and_answers_nothing() {
         Some("jag väntar")
     );
     assert_eq!(robot.looks().map(|looks| looks.as_str()), Some("up"));
-    assert_eq!(robot.state().and_then(|state| state.x_mm), Some(5));
+    let state = robot.shown().state.as_ref().expect("a state");
+    assert_eq!(state.value.x_mm, Some(5));
     assert_eq!(
         robot.fetch(product(12)).map(written),
         Ok("fetchprod 12".into())

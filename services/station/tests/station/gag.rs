@@ -24,7 +24,9 @@ fn said(station: &mut Station) -> Vec<String> {
         Peer::Gag => "gag".into(),
     };
     let written = |output| match output {
-        Output::Say { to, line } => format!("{}: {}", who(to), line.trim_end()),
+        Output::Say { to, line } | Output::SayFirst { to, line } => {
+            format!("{}: {}", who(to), line.trim_end())
+        }
         Output::Close { peer, .. } => format!("{} ends", who(peer)),
     };
     station.outputs().into_iter().map(written).collect()
@@ -157,9 +159,8 @@ fn a_stop_of_the_station_goes_to_a_robot_that_a_gag_drives() {
     station.connected(Peer::Gag);
     station.connected(R1);
     play(&mut station, &[(R1, "styrcomm", &["gag: styrcomm"])]);
-    station
-        .wish(&name("robot-1"), Wish::Stop)
-        .expect("it is driven");
+    let stopped = station.stop(&name("robot-1"));
+    assert_eq!(stopped, Ok(None), "nothing is confirmed");
     assert_eq!(said(&mut station), ["r1: styrcomm 00000001"]);
     // The GaG's answer comes for a question that is answered already.
     play(
@@ -199,7 +200,7 @@ fn a_gag_speaks_for_the_robot_that_has_been_there_for_longest() {
     station.disconnected(R1);
     play(&mut station, &[(R2, "fetchprod", &["gag: fetchprod"])]);
     let away = WishRefused::NoRobot(name("east"));
-    assert_eq!(station.wish(&name("east"), Wish::Stop), Err(away));
+    assert_eq!(station.stop(&name("east")), Err(away));
 }
 
 #[test]

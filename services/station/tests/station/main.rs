@@ -2,7 +2,9 @@
 //! for it; a warehouse saved and read; and all of it through its sockets.
 
 mod conversation;
+mod extended;
 mod file;
 mod gag;
+mod handle;
 mod sockets;
 mod transcript;

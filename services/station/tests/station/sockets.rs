@@ -17,19 +17,19 @@ use lager_station::{Handle, Listen, Queues, Server, ServerConfig, ServerError, W
 use crate::transcript::{WAREHOUSE, product};
 
 /// How long a peer waits for a line before the test has failed.
-const WATCHDOG: Duration = Duration::from_secs(20);
+pub(crate) const WATCHDOG: Duration = Duration::from_secs(20);
 
 /// A station that serves until it is dropped, in a folder of its own.
-struct Running {
+pub(crate) struct Running {
     folder: PathBuf,
     address: SocketAddr,
-    handle: Handle,
+    pub(crate) handle: Handle,
     shutdown: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Running {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::SeqCst);
         let name = format!("lager-sockets-{}-{count}", std::process::id());
@@ -50,7 +50,7 @@ impl Running {
         }
     }
 
-    fn robot(&self) -> Peer<TcpStream> {
+    pub(crate) fn robot(&self) -> Peer<TcpStream> {
         let stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
         Peer(BufReader::new(stream))
@@ -85,11 +85,11 @@ fn config(folder: &std::path::Path) -> ServerConfig {
 }
 
 /// The other end of a socket.
-struct Peer<S: Read>(BufReader<S>);
+pub(crate) struct Peer<S: Read>(BufReader<S>);
 
 impl<S: Read> Peer<S> {
     /// The next line without its end, `None` where the connection has ended.
-    fn hears(&mut self) -> Option<String> {
+    pub(crate) fn hears(&mut self) -> Option<String> {
         let mut line = String::new();
         match self.0.read_line(&mut line) {
             Ok(0) => None,
@@ -102,11 +102,11 @@ impl<S: Read> Peer<S> {
 
 impl<S: Read + Write> Peer<S> {
     /// Sends bytes; a station that has closed the connection already is no failure.
-    fn says(&mut self, bytes: &[u8]) {
+    pub(crate) fn says(&mut self, bytes: &[u8]) {
         let _ = self.0.get_mut().write_all(bytes);
     }
 
-    fn asks(&mut self, line: &str) -> String {
+    pub(crate) fn asks(&mut self, line: &str) -> String {
         self.says(format!("{line}\r\n").as_bytes());
         self.hears().expect("an answer")
     }

@@ -1,0 +1,92 @@
+//! What other threads wait for: answers of robots, and what robots say unasked.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
+
+use lager_lines::Name;
+
+use crate::shown::{Reply, Told};
+use crate::station::News;
+
+/// The answer to an action or to a stop, which comes later.
+#[derive(Debug)]
+pub struct Awaited {
+    reply: Receiver<Reply>,
+}
+
+impl Awaited {
+    /// The answer, once; `None` if it does not come in this time, or has been taken.
+    pub fn wait(&self, timeout: Duration) -> Option<Reply> {
+        self.reply.recv_timeout(timeout).ok()
+    }
+}
+
+/// What robots say from now on: events and thoughts, in their order.
+#[derive(Debug)]
+pub struct Subscription {
+    news: Receiver<News>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Subscription {
+    /// What may wait to be taken; what comes then is lost, and counted.
+    pub const MOST: usize = 1024;
+
+    /// The next one; `None` if there is none in this time, or the station has ended.
+    pub fn next(&self, timeout: Duration) -> Option<News> {
+        self.news.recv_timeout(timeout).ok()
+    }
+
+    /// How many were lost since nobody took them.
+    pub fn lost(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed)
+    }
+}
+
+/// The other ends of all of these.
+#[derive(Debug, Default)]
+pub(crate) struct Outlets {
+    replies: BTreeMap<(Name, u32), SyncSender<Reply>>,
+    subscribers: Vec<(SyncSender<News>, Arc<AtomicU64>)>,
+}
+
+impl Outlets {
+    /// Waits for a robot's answer to this number.
+    pub(crate) fn wait(&mut self, robot: &Name, number: u32) -> Awaited {
+        let (to, reply) = sync_channel(1);
+        self.replies.insert((robot.clone(), number), to);
+        Awaited { reply }
+    }
+
+    pub(crate) fn subscribe(&mut self) -> Subscription {
+        let (to, news) = sync_channel(Subscription::MOST);
+        let lost = Arc::new(AtomicU64::new(0));
+        self.subscribers.push((to, Arc::clone(&lost)));
+        Subscription { news, lost }
+    }
+
+    /// Hands on what robots have said. It waits for nobody.
+    pub(crate) fn hand_on(&mut self, news: Vec<News>) {
+        for news in news {
+            if let Told::Replied { number, reply } = news.told {
+                if let Some(to) = self.replies.remove(&(news.robot, number)) {
+                    // Whoever has asked may have given up.
+                    let _ = to.try_send(reply);
+                }
+                continue;
+            }
+            self.subscribers
+                .retain(|(to, lost)| match to.try_send(news.clone()) {
+                    Ok(()) => true,
+                    Err(TrySendError::Full(_)) => {
+                        lost.fetch_add(1, Ordering::Relaxed);
+                        true
+                    }
+                    Err(TrySendError::Disconnected(_)) => false,
+                });
+        }
+    }
+}

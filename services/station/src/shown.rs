@@ -1,0 +1,93 @@
+//! What a robot that speaks the extension shows of itself, and what it answers.
+
+use std::time::Duration;
+
+use lager_lines::extension::{Edge, Event, Latency, Listed, Queued, Report, State, Truth};
+use lager_lines::{Coord, Text};
+
+/// A value that a robot has told, and when.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen<T> {
+    /// What was told.
+    pub value: T,
+    /// When, by the station's clock.
+    pub at: Duration,
+}
+
+impl<T> Seen<T> {
+    /// How long ago it was told.
+    pub fn age(&self, now: Duration) -> Duration {
+        now.saturating_sub(self.at)
+    }
+}
+
+/// The last of each kind that a robot has shown. It stays when the robot has gone, and grows old.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shown {
+    /// What it is doing, twenty times a second.
+    pub state: Option<Seen<State>>,
+    /// Where a simulated one really is.
+    pub truth: Option<Seen<Truth>>,
+    /// The nodes of its way. Of this and what follows only changes are told.
+    pub route: Option<Seen<Listed<Coord>>>,
+    /// The ways that it does not take.
+    pub blocked: Option<Seen<Listed<Edge>>>,
+    /// What it fetches next by itself, after what it is on.
+    pub queue: Option<Seen<Listed<Queued>>>,
+    /// How long it takes to react, about once a second.
+    pub latency: Option<Seen<Latency>>,
+}
+
+/// What has become of an action or of a stop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reply {
+    /// It is done.
+    Done,
+    /// Both boards show the stop.
+    Stopped {
+        /// How long that took from its receipt, in ms.
+        after_ms: u32,
+    },
+    /// It is not done.
+    Refused(Text),
+    /// Nobody knows: the connection has ended, or the robot does not answer.
+    Lost,
+}
+
+/// What a robot has just said.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Told {
+    /// Something has happened on a mission.
+    Event(Event),
+    /// It has thought something.
+    Thought(Text),
+    /// It has answered the action or the stop with this number.
+    Replied {
+        /// The number.
+        number: u32,
+        /// What has become of it.
+        reply: Reply,
+    },
+}
+
+impl Shown {
+    /// Takes what a robot has told at this moment; what only passes by is handed back.
+    pub(crate) fn take(&mut self, report: Report, at: Duration) -> Option<Told> {
+        let replied = |number, reply| Some(Told::Replied { number, reply });
+        match report {
+            Report::State(state) => self.state = Some(Seen { value: *state, at }),
+            Report::Truth(value) => self.truth = Some(Seen { value, at }),
+            Report::Route(value) => self.route = Some(Seen { value, at }),
+            Report::Blocked(value) => self.blocked = Some(Seen { value, at }),
+            Report::Queue(value) => self.queue = Some(Seen { value, at }),
+            Report::Latency(value) => self.latency = Some(Seen { value, at }),
+            Report::Event(event) => return Some(Told::Event(event)),
+            Report::Done { number } => return replied(number, Reply::Done),
+            Report::Refused { number, reason } => return replied(number, Reply::Refused(reason)),
+            Report::Stopped { number, after_ms } => {
+                return replied(number, Reply::Stopped { after_ms });
+            }
+        }
+        None
+    }
+}

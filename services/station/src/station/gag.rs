@@ -1,0 +1,178 @@
+//! The GaG that speaks for one of the robots.
+
+use lager_lines::gag::{Answer, Query, Request, Telemetry};
+use lager_lines::{Map, Name, Products, SideLength, Text};
+use lager_wire::OperatorCommand;
+
+use super::{Peer, Station};
+use crate::robot::{ActRefused, Robot};
+use crate::warehouse::{StoredProduct, Warehouse, WarehouseError};
+
+/// What it says.
+impl Station {
+    pub(super) fn gag_said(&mut self, line: &str) {
+        if self.gag.is_none() {
+            return;
+        }
+        let answer = match Answer::read(line) {
+            Ok(answer) => answer,
+            Err(error) => return self.correct_gag(&error.to_string()),
+        };
+        if let Some(by) = self.other_driver(&answer) {
+            return self.correct_gag(&ActRefused::Driven { by }.to_string());
+        }
+        let Some(gag) = &mut self.gag else { return };
+        if let Err(error) = gag.held.answer(&answer) {
+            return self.correct_gag(&error.to_string());
+        }
+        let name = gag.robot.clone();
+        if let Err(error) = self.learn(&answer) {
+            return self.correct_gag(&error.to_string());
+        }
+        if let Some(name) = name
+            && let Some(robot) = self.robots.get_mut(&name)
+        {
+            // What the robot asks no more is passed over.
+            let line = robot.given(answer).ok();
+            self.say(&name, line);
+            self.ask_gag(&name);
+        }
+    }
+
+    /// Who drives the GaG's robot by actions, where this would move it.
+    fn other_driver(&self, answer: &Answer) -> Option<String> {
+        let Answer::Command(command) = answer else {
+            return None;
+        };
+        if *command == OperatorCommand::Stop {
+            return None;
+        }
+        let name = self.gag.as_ref()?.robot.as_ref()?;
+        self.robots.get(name)?.driver().map(str::to_owned)
+    }
+
+    /// It could not be saved; who described it is told.
+    pub fn not_saved(&mut self, why: &str) {
+        if self.gag.is_some() {
+            self.put(Peer::Gag, &thought(why));
+        }
+    }
+
+    /// Tells the GaG what is wrong, and asks again what is still asked.
+    fn correct_gag(&mut self, why: &str) {
+        self.put(Peer::Gag, &thought(why));
+        if let Some(gag) = &mut self.gag {
+            gag.held.clear();
+            if let Some(name) = gag.robot.clone() {
+                self.ask_gag(&name);
+            }
+        }
+    }
+
+    /// Takes up what the GaG says of the warehouse, once all of it is known.
+    fn learn(&mut self, answer: &Answer) -> Result<(), WarehouseError> {
+        let Some(gag) = &mut self.gag else {
+            return Ok(());
+        };
+        match answer {
+            Answer::SideLength(side) => gag.side = Some(*side),
+            Answer::Map(map) => gag.map = Some(*map),
+            Answer::Products(_, products) => gag.products = Some(products.clone()),
+            _ => return Ok(()),
+        }
+        let (Some(side), Some(map), Some(products)) = (gag.side, gag.map, &gag.products) else {
+            return Ok(());
+        };
+        let told = described(self.warehouse.as_ref(), side, map, products);
+        let checked = told.check();
+        if checked.is_err() {
+            gag.products = None;
+        }
+        checked?;
+        if self.warehouse.as_ref() != Some(&told) {
+            self.set_warehouse(told)?;
+        }
+        Ok(())
+    }
+}
+
+/// Who the GaG speaks for.
+impl Station {
+    /// Lets the GaG speak for the robot that has been connected for longest.
+    pub(super) fn seat_gag(&mut self) {
+        let first = self.links.values().flatten().next().cloned();
+        let Some(gag) = &mut self.gag else { return };
+        if gag.robot == first {
+            return;
+        }
+        let before = core::mem::replace(&mut gag.robot, first.clone());
+        before.into_iter().for_each(|name| self.unseat(&name));
+        let Some(name) = first else { return };
+        let Some(robot) = self.robots.get_mut(&name) else {
+            return;
+        };
+        let line = robot.set_gag(true);
+        let node = robot.node().map(Telemetry::Robot);
+        let looks = robot.looks().map(Telemetry::Heading);
+        for telemetry in node.into_iter().chain(looks) {
+            self.put(Peer::Gag, &Request::Telemetry(telemetry));
+        }
+        self.say(&name, line);
+        self.ask_gag(&name);
+    }
+
+    /// The GaG speaks for this robot no more.
+    pub(super) fn unseat(&mut self, name: &Name) {
+        if let Some(robot) = self.robots.get_mut(name) {
+            let line = robot.set_gag(false);
+            self.say(name, line);
+        }
+    }
+
+    /// Asks the GaG what its robot asks, if it has not been asked that already.
+    pub(super) fn ask_gag(&mut self, name: &Name) {
+        let Some(gag) = &mut self.gag else { return };
+        if gag.robot.as_ref() != Some(name) {
+            return;
+        }
+        let asked: Option<Query> = self.robots.get(name).and_then(Robot::held);
+        if let Some(query) = asked
+            && gag.held.get() != Some(query)
+        {
+            gag.held.ask(query);
+            self.put(Peer::Gag, &Request::Query(query));
+        }
+    }
+}
+
+/// A sentence for a GaG.
+fn thought(why: &str) -> Request {
+    let text = Text::new(why.replace(['\r', '\n'], " "));
+    Request::Telemetry(Telemetry::Thought(text.unwrap_or_default()))
+}
+
+/// The warehouse before with what a GaG says of it. Products keep the names they had.
+fn described(
+    before: Option<&Warehouse>,
+    side: SideLength,
+    map: Map,
+    products: &Products,
+) -> Warehouse {
+    let known = |id: i32| {
+        let mut known = before.iter().flat_map(|before| &before.products);
+        known.find(|product| product.id == id)
+    };
+    let product = |product: &lager_lines::Product| StoredProduct {
+        id: product.id.get(),
+        name: known(product.id.get()).and_then(|known| known.name.clone()),
+        square: [product.square.x, product.square.y],
+        side: product.side.to_string(),
+    };
+    Warehouse {
+        size: [map.size().x, map.size().y],
+        side_length_cm: side.cm(),
+        delivery: [map.delivery().x, map.delivery().y],
+        products: products.as_slice().iter().map(product).collect(),
+        rest: before.map_or_else(toml::Table::new, |before| before.rest.clone()),
+    }
+}

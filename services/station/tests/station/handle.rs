@@ -1,0 +1,129 @@
+//! What other threads do with the station, over real sockets.
+
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use lager_lines::Name;
+use lager_lines::command::read_wheels;
+use lager_lines::extension::{Action, Mode};
+use lager_station::{Handle, Reply, Subscription, Told};
+
+use crate::sockets::{Peer, Running, WATCHDOG};
+
+fn r1() -> Name {
+    Name::new("r1").expect("a name")
+}
+
+/// A robot that speaks the extension.
+fn extended(station: &Running) -> Peer<TcpStream> {
+    let mut robot = station.robot();
+    assert_eq!(robot.asks("lager 1 r1"), "lager 1 lager");
+    robot
+}
+
+/// Waits until the station has this of the robot.
+fn wait_for<R>(handle: &Handle, what: impl Fn(&lager_station::View) -> Option<R>) -> R {
+    let start = Instant::now();
+    let mut seen = 0;
+    loop {
+        let robots = handle.robots();
+        if let Some(found) = robots.iter().find(|one| one.name == r1()).and_then(&what) {
+            return found;
+        }
+        assert!(start.elapsed() < WATCHDOG, "{robots:?}");
+        seen = handle.wait(seen, Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn an_action_is_awaited_and_a_stop_confirmed() {
+    let station = Running::new();
+    let mut robot = extended(&station);
+    let handle = &station.handle;
+    let asked = handle
+        .act(&r1(), Action::Mode(Mode::Manual))
+        .expect("asked");
+    assert_eq!(robot.hears().as_deref(), Some("do 1 mode manual"));
+    assert_eq!(asked.wait(Duration::ZERO), None);
+    robot.says(b"done 1\n");
+    assert_eq!(asked.wait(WATCHDOG), Some(Reply::Done));
+
+    let stopped = handle.stop(&r1()).expect("told").expect("confirmed");
+    assert_eq!(robot.hears().as_deref(), Some("stop 2"));
+    robot.says(b"stopped 2 17\n");
+    assert_eq!(
+        stopped.wait(WATCHDOG),
+        Some(Reply::Stopped { after_ms: 17 })
+    );
+
+    let asked = handle.act(&r1(), Action::Calibrate).expect("asked");
+    drop(robot);
+    assert_eq!(asked.wait(WATCHDOG), Some(Reply::Lost));
+}
+
+#[test]
+fn a_driver_is_named_and_the_robot_stands_when_he_is_gone() {
+    let station = Running::new();
+    let mut robot = extended(&station);
+    let handle = &station.handle;
+    let anna = handle.take_wheel(&r1(), "anna").expect("the seat is free");
+    let refused = handle.take_wheel(&r1(), "bo").expect_err("it is taken");
+    assert!(refused.to_string().starts_with("anna drives"), "{refused}");
+    let driver = wait_for(handle, |view| view.driver.clone());
+    assert_eq!(driver, "anna");
+    let driven = anna
+        .drive(read_wheels("2").expect("a code"))
+        .expect("asked");
+    assert_eq!(robot.hears().as_deref(), Some("do 1 drive 00000010 150"));
+    robot.says(b"refused 1 forward is refused: it rains\n");
+    let why = driven.wait(WATCHDOG);
+    assert!(matches!(&why, Some(Reply::Refused(why)) if why.as_str().ends_with("it rains")));
+    drop(anna);
+    assert_eq!(robot.hears().as_deref(), Some("do 2 drive 00000001 150"));
+    handle.take_wheel(&r1(), "bo").expect("the seat is free");
+}
+
+#[test]
+fn a_driver_who_falls_silent_is_found_while_nothing_else_happens() {
+    let station = Running::new();
+    let mut robot = extended(&station);
+    let anna = station.handle.take_wheel(&r1(), "anna").expect("free");
+    anna.drive(read_wheels("3").expect("a code"))
+        .expect("asked");
+    assert_eq!(robot.hears().as_deref(), Some("do 1 drive 00000011 150"));
+    assert_eq!(robot.hears().as_deref(), Some("do 2 drive 00000001 150"));
+    assert!(anna.stay().is_err());
+}
+
+#[test]
+fn states_come_with_their_age_and_events_to_whoever_has_subscribed() {
+    let station = Running::new();
+    let handle = &station.handle;
+    let news = handle.subscribe();
+    let mut robot = extended(&station);
+    robot.says(b"state x_mm=400\nevent next_node 1 0 - -\nthought hej\nstate x_mm=410\n");
+    let view = wait_for(handle, |view| {
+        let state = view.shown.state.as_ref()?;
+        (state.value.x_mm == Some(410)).then(|| view.clone())
+    });
+    assert!(view.is_extended);
+    let age = |handle: &Handle| {
+        let view = handle.robots().pop().expect("a robot");
+        view.shown.state.expect("a state").age(view.now)
+    };
+    let before = age(handle);
+    std::thread::sleep(Duration::from_millis(20));
+    assert!(age(handle) >= before + Duration::from_millis(20));
+
+    let told = [(); 2].map(|()| news.next(WATCHDOG).expect("news"));
+    assert!(told.iter().all(|news| news.robot == r1()));
+    assert!(matches!(told[0].told, Told::Event(_)), "{told:?}");
+    assert!(matches!(&told[1].told, Told::Thought(text) if text.as_str() == "hej"));
+    assert_eq!(news.next(Duration::ZERO), None);
+
+    // One that takes nothing loses, is told how much, and keeps nobody waiting.
+    let thoughts = b"thought tick\n".repeat(Subscription::MOST + 10);
+    robot.says(&thoughts);
+    assert_eq!(robot.asks("karta"), "karta 4 3 0 0");
+    assert_eq!(news.lost(), 10);
+}
