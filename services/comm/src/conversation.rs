@@ -192,7 +192,9 @@ impl Conversation {
             );
         }
         if self.driving.is_over(now) {
-            self.stand(now, "it was not renewed in time");
+            let why = "the time of the last drive is over and nobody has renewed it";
+            self.stand(now, why);
+            self.think(why);
         }
         let renewed = self.driving.renew(now.robot);
         self.actions.extend(renewed.map(Action::Steer));

@@ -188,9 +188,14 @@ impl Tasks {
         self.list.iter().any(is_it)
     }
 
-    /// Nobody is left who wants to hear of actions. What was given stays given.
+    /// Nobody is left who wants to hear of actions. What was given stays given, and a request is known
+    /// until it is answered.
     pub(crate) fn forget_actions(&mut self) {
-        self.list.retain(|one| one.asker == Asker::Question);
+        self.list.retain_mut(|one| {
+            let is_kept = one.asker == Asker::Question || matches!(one.task, Task::Ask(_));
+            one.asker = Asker::Question;
+            is_kept
+        });
     }
 }
 

@@ -220,7 +220,9 @@ fn a_drive_holds_as_long_as_it_is_renewed() {
         assert_eq!(in_force(&mut robot), [format!("done {number}")]);
     }
     assert_eq!(pass(&mut robot, 140), [""; 0]);
-    assert_eq!(pass(&mut robot, 10), ["[steers 1]"], "its time is over");
+    let said = pass(&mut robot, 10);
+    assert_eq!(said[0], "[steers 1]", "its time is over");
+    assert!(said[1].starts_with("thought the time"), "{said:?}");
     assert_eq!(pass(&mut robot, 1_000), [""; 0]);
     // Another command takes its place, and standing is one.
     robot.hears(&["do 10 drive 2 150"]);
@@ -481,6 +483,16 @@ fn nothing_undoes_a_stop_that_comes_with_it_or_after_it() {
         .conversation
         .answered_by_bridge(id, done(Outcome::Done));
     assert_eq!(robot.done(), ["done 6"]);
+    // Nor does a new connection.
+    robot.hears(&["do 7 resume"]);
+    let (id, _) = robot.asked.expect("a request");
+    robot.disconnect();
+    robot.connect();
+    assert_eq!(robot.hears(&["lager 1 station", "stop 1"])[0], "[stops]");
+    robot
+        .conversation
+        .answered_by_bridge(id, done(Outcome::Done));
+    assert_eq!(robot.done(), ["[stops]"]);
 }
 
 #[test]

@@ -1,179 +1,18 @@
 //! The robot and the external computer as processes. Whoever plays the one or the other here shares
 //! no code with them: he speaks from the grammar alone.
 
-use std::fs;
-use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
-use std::os::unix::net::UnixStream;
-use std::time::{Duration, Instant};
+mod extended;
+mod scene;
 
-use lager_ports::Subscriber;
+use std::fs;
+use std::io::BufReader;
+use std::os::unix::net::UnixStream;
+
 use lager_tests::{Domain, Running, pid, wait_for};
-use lager_topics::{EventKind, LinkHealth, MissionEvent, TruthPose};
+use lager_topics::{EventKind, MissionEvent};
 use rustix::process::{Signal, kill_process};
 
-/// How long a line is waited for before the test has failed.
-const WATCHDOG: Duration = Duration::from_secs(120);
-
-/// One end of a conversation in lines.
-struct Peer<S>(BufReader<S>);
-
-impl<S: Read + Write> Peer<S> {
-    /// The next line without its end; `None` where the conversation is over.
-    fn hears(&mut self) -> Option<String> {
-        let mut line = String::new();
-        match self.0.read_line(&mut line) {
-            Ok(0) => None,
-            Ok(_) => Some(line.trim_end().to_owned()),
-            Err(error) if error.kind() == ErrorKind::ConnectionReset => None,
-            Err(error) => panic!("no line came: {error}"),
-        }
-    }
-
-    /// The next line that begins with one of `words`; what it passes over needs no answer.
-    fn waits_for(&mut self, words: &[&str]) -> String {
-        loop {
-            let line = self.hears().expect("the conversation goes on");
-            let first = line.split(' ').next().unwrap_or_default();
-            if words.contains(&first) {
-                return line;
-            }
-            assert!(
-                ["thought", "set_robot", "set_heading", "lager"].contains(&first),
-                "{line:?} instead of {words:?}"
-            );
-        }
-    }
-
-    /// Says a line; a peer that has gone meanwhile is no failure.
-    fn says(&mut self, line: &str) {
-        let _ = self.0.get_mut().write_all(format!("{line}\n").as_bytes());
-    }
-}
-
-impl Peer<TcpStream> {
-    /// The next line that begins with `word`, if the connection lasts so long. The sign of life is
-    /// answered.
-    fn hears_answering(&mut self, word: &str) -> Option<String> {
-        loop {
-            let line = self.hears()?;
-            if line.starts_with(word) {
-                return Some(line);
-            }
-            if line == "lager 1 r1" {
-                self.says("lager 1 tester");
-            }
-        }
-    }
-}
-
-/// An external computer that the test plays, for a robot that is up and stands in manual mode.
-struct Scene {
-    listener: TcpListener,
-    truth: Subscriber<TruthPose>,
-    up: Running,
-    _body: Running,
-    domain: Domain,
-}
-
-impl Scene {
-    fn new() -> Self {
-        let domain = Domain::new();
-        // Real boards, as far as `up` knows: it starts in manual mode and no script drives.
-        let [sensor, steering] =
-            ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
-        let config = domain.folder().join("lager.toml");
-        let text =
-            format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
-        fs::write(&config, text).expect("a configuration file");
-        let body = domain.start(&["simulator"]);
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-        let address = listener.local_addr().expect("an address").to_string();
-        let up = domain.start(&["up", "--station", &address]);
-        let bus = domain.observe("r1", 1.0);
-        let mut health = bus.subscriber::<LinkHealth>().expect("a topic");
-        wait_for("both boards to be connected, and the robot stopped", || {
-            let health = health.latest().expect("readable")?;
-            let connected = health.sensor.up != 0 && health.steering.up != 0;
-            (connected && health.stopped != 0).then_some(())
-        });
-        wait_for("the stop to be released", || {
-            domain.run(&["resume"]).status.success().then_some(())
-        });
-        Self {
-            truth: bus.subscriber().expect("a topic"),
-            listener,
-            up,
-            _body: body,
-            domain,
-        }
-    }
-
-    /// The robot's next connection.
-    fn robot(&self) -> Peer<TcpStream> {
-        let (stream, _) = self.listener.accept().expect("it connects");
-        stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
-        stream.set_nodelay(true).expect("a socket");
-        Peer(BufReader::new(stream))
-    }
-
-    /// The duties at the motors, as the world has them now.
-    fn duties(&mut self) -> Option<(u8, u8)> {
-        let truth = self.truth.latest().expect("readable")?;
-        Some((truth.left_duty, truth.right_duty))
-    }
-
-    fn wait_until_it_stands(&mut self) {
-        wait_for("the robot to stand", || {
-            self.duties().filter(|duties| *duties == (0, 0))
-        });
-    }
-
-    /// Drives the robot forward until its wheels turn. A machine that was held up for as long as a
-    /// lease ends the command, so it is given as often as it is asked for.
-    fn drive(&mut self, is_extended: bool) -> Peer<TcpStream> {
-        'connected: loop {
-            let mut robot = self.robot();
-            loop {
-                let Some(line) = robot.hears() else {
-                    continue 'connected;
-                };
-                match line.as_str() {
-                    "styrcomm" => robot.says("styrcomm 2"),
-                    "lager 1 r1" if is_extended => robot.says("lager 1 tester"),
-                    _ => {}
-                }
-                if self
-                    .duties()
-                    .is_some_and(|(left, right)| left > 0 && right > 0)
-                {
-                    return robot;
-                }
-                if !is_extended && line == "styrcomm" {
-                    // It says nothing more before the next command.
-                    while !self.moves_within(Duration::from_millis(500)) {
-                        robot.says("styrcomm 2");
-                    }
-                    return robot;
-                }
-            }
-        }
-    }
-
-    fn moves_within(&mut self, patience: Duration) -> bool {
-        let start = Instant::now();
-        while start.elapsed() < patience {
-            if self
-                .duties()
-                .is_some_and(|(left, right)| left > 0 && right > 0)
-            {
-                return true;
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        false
-    }
-}
+use crate::scene::{Peer, Scene, WATCHDOG};
 
 #[test]
 fn a_cut_link_makes_the_robot_stand_and_it_connects_again() {
@@ -231,7 +70,7 @@ fn a_stop_is_confirmed_and_stays() {
 }
 
 /// A warehouse that robot and station read from one file.
-const WAREHOUSE: &str = "size = [2, 2]
+pub(crate) const WAREHOUSE: &str = "size = [2, 2]
 side_length_cm = 40
 
 [[product]]
