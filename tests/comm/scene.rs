@@ -49,12 +49,12 @@ impl<S: Read + Write> Peer<S> {
 }
 
 impl Peer<TcpStream> {
-    /// The next line that begins with `word`, if the connection lasts so long. The sign of life is
-    /// answered.
-    pub(crate) fn hears_answering(&mut self, word: &str) -> Option<String> {
+    /// The next line that begins with one of `words`, if the connection lasts so long. The sign of
+    /// life is answered.
+    pub(crate) fn hears_answering(&mut self, words: &[&str]) -> Option<String> {
         loop {
             let line = self.hears()?;
-            if line.starts_with(word) {
+            if words.iter().any(|word| line.starts_with(word)) {
                 return Some(line);
             }
             if line == "lager 1 r1" {
