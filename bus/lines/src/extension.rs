@@ -25,7 +25,7 @@
 //!
 //! <number> ::= <int>                   0 to 4294967295, one not used before on this connection
 //! <action> ::= order <order> <prodid>  fetch a product after those that wait
-//!            | cancel <order>          fetch it no more
+//!            | cancel <order>          fetch it no more; refused once it is under way
 //!            | first <order>           fetch it before those that wait
 //!            | clear                   fetch none of those that wait
 //!            | mode <mode>             who drives
@@ -38,19 +38,22 @@
 //!            | calibrate               the line sensors, on the tape under the robot
 //!            | obstacle put <edge>     in a simulated world
 //!            | obstacle take <edge>
-//! <order>  ::= <int>                   0 to 4294967295, chosen by the station
+//! <order>  ::= <int>                   0 to 4294967295, chosen by the station; 0 is refused
 //! <mode>   ::= manual | autonomous
 //! <edge>   ::= <coord> <direction>     from a node to the next one that way
 //! ```
 //!
 //! `drive` is renewed by a further `do` before its time is over, with or without another command;
 //! code 8 and 9 are turns that run once and need no renewal. A robot counts the time by its own
-//! clock from when it has read the line.
+//! clock from when it has read the line, and stands when it is over. A setpoint is done when the
+//! steering board has it, a turn or a step of the arm when it has ended, a calibration likewise, and
+//! everything else when the robot shows the effect.
 //!
 //! **A stop has a lane of its own.** Whoever sends puts it before all lines that wait to be sent;
 //! whoever receives reads on to the end of what has arrived and carries out every stop in it before
 //! anything else. It is never queued, and commands to wheels and arm that wait are dropped (C5); the
-//! products to fetch still wait. A line whose first word is `stop` is a stop even if what follows
+//! products to fetch still wait. A `resume`, `drive` or `arm` that arrives together with a stop is
+//! refused, whichever of the two was sent first. A line whose first word is `stop` is a stop even if what follows
 //! cannot be read; then it has no number and is not confirmed. Only `resume` ends it.
 //!
 //! # Robot to station

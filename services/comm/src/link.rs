@@ -287,3 +287,61 @@ fn jittered(pause: Duration) -> Duration {
     let part = Clock::monotonic_ns() / 1_000 % 1_000;
     pause * 3 / 4 + pause / 2 * u32::try_from(part).unwrap_or(0) / 1_000
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+    use std::net::TcpListener;
+
+    use super::*;
+
+    /// A link that is up, and its peer.
+    fn connected() -> (Link, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address");
+        let ours = TcpStream::connect(address).expect("it listens");
+        let (theirs, _) = listener.accept().expect("it connects");
+        let (_, news) = sync_channel(1);
+        let link = Link {
+            news,
+            stream: Some(ours),
+            unread: Vec::new(),
+            shown: Default::default(),
+            ends: Arc::new(AtomicBool::new(false)),
+            thread: None,
+        };
+        (link, theirs)
+    }
+
+    #[test]
+    fn a_station_that_does_not_read_finds_the_newest_of_each_kind_in_the_end() {
+        let (mut link, mut station) = connected();
+        let line = |number: usize| format!("state time_ms={number} {}\n", "x".repeat(900));
+        // More than the machine keeps for a peer that reads nothing.
+        let last = 50_000;
+        for number in 0..=last {
+            link.show(0, line(number));
+            link.write();
+            assert!(link.unread.len() <= line(number).len(), "one line at most");
+        }
+        assert!(link.shown[0].is_some(), "the machine has not taken all");
+        // What is said goes before it, and is not lost.
+        link.say("done 1\n");
+        link.show(0, line(last + 1));
+        let reader = std::thread::spawn(move || {
+            let mut all = String::new();
+            station.read_to_string(&mut all).expect("it ends");
+            all
+        });
+        while !link.unread.is_empty() || link.shown[0].is_some() {
+            link.write();
+            std::thread::yield_now();
+        }
+        link.hang_up();
+        let all = reader.join().expect("it reads");
+        let lines: Vec<&str> = all.lines().collect();
+        assert!(lines.len() < last, "{} of {last} were told", lines.len());
+        assert_eq!(lines[lines.len() - 2], "done 1");
+        assert_eq!(lines[lines.len() - 1], line(last + 1).trim_end());
+    }
+}

@@ -14,7 +14,9 @@
 //! - [`Warehouse`]: squares, delivery and goods, as they lie in a file that is saved atomically.
 //! - [`Queues`]: what waits to be fetched by each robot, in a file beside it.
 //! - [`Server`]: the sockets, in one thread that waits for all of them.
-//! - [`Handle`]: what another thread sees of the station and does with it.
+//! - [`Handle`]: what another thread sees of the station and does with it: the last that each robot
+//!   has shown and when, a [`Subscription`] to events and thoughts, actions whose answer is
+//!   [`Awaited`], and one [`Driver`] for each robot.
 //!
 //! It never joins a robot's bus: whatever it knows, robots have told it.
 
