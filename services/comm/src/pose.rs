@@ -33,7 +33,9 @@ pub(crate) fn pose(status: &NavigatorStatus, map: &WarehouseMap) -> Option<Pose>
     let side_mm = i32::from(map.side_length_cm) * 10;
     let (along, way_mm) = match phase {
         // On the way back logic counts from the cross bar.
-        Phase::Returning => (opposite(looks), status.exit_mm - status.travelled_mm),
+        Phase::Returning => (outwards(map), status.exit_mm - status.travelled_mm),
+        // Half round it looks along no way.
+        Phase::TurningRound => (outwards(map), status.travelled_mm),
         // The robot has turned, or turns, off the edge that it came along.
         Phase::Positioning | Phase::Picking | Phase::Leaving => {
             let along = goods(status, map).and_then(|goods| edge_from(status, goods));
@@ -96,6 +98,14 @@ const fn opposite(heading: Heading) -> Heading {
         Heading::Up => Heading::Down,
         Heading::Right => Heading::Left,
         Heading::Down => Heading::Up,
+    }
+}
+
+/// Which way the way out leads from the delivery corner.
+fn outwards(map: &WarehouseMap) -> Heading {
+    match map.delivery_x {
+        0 => Heading::Left,
+        _ => Heading::Right,
     }
 }
 
@@ -168,6 +178,7 @@ mod tests {
     #[test]
     fn on_the_way_back_it_comes_from_the_bar() {
         assert_eq!(at(Phase::Returning, Heading::Right), (800 - 750, 0, 90));
+        assert_eq!(at(Phase::TurningRound, Heading::Up), (800 - 150, 0, 30));
     }
 
     #[test]

@@ -245,7 +245,8 @@ the station answers, and goes on without the link.")]
 It answers a robot from the warehouse file and by itself. While a GaG is connected to
 its socket, that answers instead, in the words of the document's grammar, for the robot
 that has been connected for longest; what it says of the warehouse is saved. Robots and
-GaG are not asked who they are: let only those reach --listen who may drive.")]
+GaG are not asked who they are: let only those reach --listen who may drive. A panel that
+others than this machine can reach asks for a token, which is printed once.")]
     Station(StationArgs),
     /// What `up` needs done on the bus; only `up` starts it
     #[command(hide = true)]
@@ -323,6 +324,10 @@ pub struct UpArgs {
     /// Do without an external computer; `up` tells the robot its warehouse
     #[arg(long, help_heading = "Station")]
     pub no_station: bool,
+    /// Where the operator panel answers browsers of this machine [default: 127.0.0.1:7410, or a free
+    /// port]
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["headless", "no_station", "station"], help_heading = "Station")]
+    pub panel: Option<std::net::SocketAddr>,
     /// Do without a panel
     #[arg(long, help_heading = "Mission")]
     pub headless: bool,
@@ -377,6 +382,12 @@ pub struct StationArgs {
     /// given several times
     #[arg(long, value_name = "ROBOT=ID,ID", value_parser = values::fetch, help_heading = "Station")]
     pub fetch: Vec<Fetch>,
+    /// Where the operator panel answers browsers [default: 127.0.0.1:7410, or a free port]
+    #[arg(long, value_name = "HOST:PORT", help_heading = "Station")]
+    pub panel: Option<std::net::SocketAddr>,
+    /// Do without a panel
+    #[arg(long, conflicts_with = "panel", help_heading = "Station")]
+    pub no_panel: bool,
     /// Go on where the station before this one was; with --parent alone
     #[arg(long, hide = true)]
     pub resume: bool,

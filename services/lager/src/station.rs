@@ -5,17 +5,18 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use lager_lines::Name;
+use lager_panel::{Panel, Tokens};
 use lager_ports::Shutdown;
 use lager_station::{Listen, Queues, Server, ServerConfig, Warehouse, save};
 
 use crate::cli::StationArgs;
-use crate::config::Config;
+use crate::config::{Config, StationSection};
 use crate::runtime::RuntimeFolder;
 use crate::supervisor;
 
@@ -33,19 +34,36 @@ const LONGEST_SOCKET: usize = 107;
 /// # Errors
 /// An address, a socket or the warehouse cannot be had; the sentence says what to do.
 pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<()> {
-    let server = match args.parent {
+    let (server, panel) = match args.parent {
         Some(parent) => {
             supervisor::adopt(parent, shutdown)?;
-            Server::open(supervised(config, args.resume)?)?
+            let server = Server::open(supervised(config, args.resume)?)?;
+            let panel = config.station.panel.and_then(|address| {
+                // Robots are served, whoever looks.
+                let panel = Panel::open(address, None, server.handle());
+                panel.inspect_err(|error| tracing::warn!("{error}")).ok()
+            });
+            (server, panel)
         }
         None => alone(config, args)?,
     };
+    if let Some(panel) = panel {
+        let end = shutdown.flag();
+        let run = move || {
+            if let Err(error) = panel.run(&end) {
+                tracing::warn!("{error}");
+            }
+        };
+        std::thread::Builder::new()
+            .name("panel".into())
+            .spawn(run)?;
+    }
     server.run(&shutdown.flag())?;
     Ok(())
 }
 
 /// As somebody has started it.
-fn alone(config: &Config, args: &StationArgs) -> Result<Server> {
+fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)> {
     let gag = match &args.gag {
         Some(path) => path.clone(),
         None => default_gag(config)?,
@@ -66,7 +84,44 @@ fn alone(config: &Config, args: &StationArgs) -> Result<Server> {
         gag.display(),
         warehouse(args.warehouse.as_deref()),
     ))?;
-    Ok(server)
+    let panel = match args.no_panel {
+        true => None,
+        false => Some(panel(args.panel, &server)?),
+    };
+    Ok((server, panel))
+}
+
+/// The panel of a station that runs by itself, and where it is.
+fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
+    let address = match address {
+        Some(address) => address,
+        None => usual_panel()?,
+    };
+    if address.ip().is_loopback() {
+        let panel = Panel::open(address, None, server.handle())?;
+        crate::say(&format!("the panel is at http://{}", panel.address()?))?;
+        return Ok(panel);
+    }
+    let tokens = Tokens::random()?;
+    let panel = Panel::open(address, Some(tokens.clone()), server.handle())?;
+    let at = panel.address()?;
+    crate::say(&format!(
+        "the panel is at http://{at}/?token={} for who drives, and at http://{at}/?token={} for who \
+         looks and stops",
+        tokens.driver, tokens.viewer
+    ))?;
+    Ok(panel)
+}
+
+/// Where a panel answers on this machine if nobody says: the usual address, or a port that is free.
+///
+/// # Errors
+/// There is no port.
+pub fn usual_panel() -> Result<SocketAddr> {
+    // It is opened again in a moment: a panel whose port is lost in between is told.
+    let socket = TcpListener::bind(StationSection::USUAL_PANEL)
+        .or_else(|_| TcpListener::bind("127.0.0.1:0"))?;
+    Ok(socket.local_addr()?)
 }
 
 /// As `lager up` has started it. The first one begins with the robot's warehouse, a successor with

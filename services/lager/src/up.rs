@@ -49,7 +49,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         // The ports may be those of an emulator that somebody else runs.
         Body::Serial => {}
     }
-    let external = external::choose(&mut config)?;
+    let external = external::choose(&mut config, args.headless)?;
     folder.write_config(&config)?;
 
     stop::at_start(&config)?;
@@ -182,7 +182,11 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
         config.station = StationSection {
             wanted: true,
             address: Some(address.clone()),
+            panel: None,
         };
+    }
+    if let Some(panel) = args.panel {
+        config.station.panel = Some(panel);
     }
     args.realtime.apply(&mut config.realtime);
     Ok(())

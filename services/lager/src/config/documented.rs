@@ -153,6 +153,9 @@ wanted = {station_wanted}
 # Host and port of one that runs already. Unset, `lager up` starts one at 127.0.0.1:7420, or at
 # another port where that is taken.
 {station_address}
+# Where the operator panel of such a station answers browsers of this machine. Unset, 127.0.0.1:7410,
+# or another port where that is taken.
+{station_panel}
 ",
             name = quoted(&self.name),
             speed = self.speed,
@@ -206,6 +209,10 @@ wanted = {station_wanted}
             clock = unset_path("clock", &self.chip.clock),
             station_wanted = self.station.wanted,
             station_address = unset("address", self.station.address.as_deref()),
+            station_panel = unset(
+                "panel",
+                self.station.panel.map(|panel| panel.to_string()).as_deref()
+            ),
         )
     }
 }
@@ -286,6 +293,7 @@ mod tests {
             station: StationSection {
                 wanted: false,
                 address: Some("192.168.1.5:7420".into()),
+                panel: Some("127.0.0.1:7411".parse().expect("an address")),
             },
             ..Config::default()
         };

@@ -8,15 +8,17 @@
 //!                           by anything else: one of this robot's own, at a port that is free
 //!   no port can be had, or no line can tell the warehouse: none
 //! ```
+//! A station of its own shows a panel, unless the robot is headless: at 127.0.0.1:7410, or at a port
+//! that is free. Everybody on this machine may drive from there, so it answers this machine alone.
 //!
 //! The socket is opened here and handed to the station as its standard output, so the port stays the
 //! same over the death of a station, and whoever connects meanwhile waits for its successor.
 
 use std::fs;
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::FileTypeExt as _;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 
 use crate::config::{Config, StationSection};
 use crate::runtime::RuntimeFolder;
@@ -29,22 +31,56 @@ pub struct External {
     pub listener: Option<TcpListener>,
     /// What is told of it.
     pub told: String,
+    /// What is told of the panel.
+    pub panel: Option<String>,
 }
 
 /// Chooses, and puts into `config` what comm is to know.
 ///
 /// # Errors
 /// The place of the bus cannot be had.
-pub fn choose(config: &mut Config) -> Result<External> {
+pub fn choose(config: &mut Config, headless: bool) -> Result<External> {
+    let mut external = station_for(config)?;
+    let address = config.station.panel.take().filter(|_| !headless);
+    if headless || external.listener.is_none() {
+        return Ok(external);
+    }
+    external.panel = Some(match panel(address) {
+        Ok(address) => {
+            config.station.panel = Some(address);
+            format!("the panel is at http://{address}")
+        }
+        Err(error) => format!("there is no panel: {error:#}"),
+    });
+    Ok(external)
+}
+
+/// Where the panel is to answer.
+fn panel(wanted: Option<SocketAddr>) -> Result<SocketAddr> {
+    let Some(wanted) = wanted else {
+        return station::usual_panel();
+    };
+    if !wanted.ip().is_loopback() {
+        bail!(
+            "{wanted} can be reached by others; `lager station --panel {wanted}` asks them for a token"
+        );
+    }
+    let socket = TcpListener::bind(wanted).with_context(|| format!("{wanted} cannot be had"))?;
+    Ok(socket.local_addr()?)
+}
+
+fn station_for(config: &mut Config) -> Result<External> {
     if !config.station.wanted {
         return Ok(External {
             listener: None,
+            panel: None,
             told: "there is no external computer; the warehouse is told here".into(),
         });
     }
     if let Some(address) = &config.station.address {
         return Ok(External {
             listener: None,
+            panel: None,
             told: format!("the external computer is the one at {address}"),
         });
     }
@@ -55,12 +91,13 @@ pub fn choose(config: &mut Config) -> Result<External> {
         Ok(listener) => return Ok(own(config, listener, "")),
         Err(error) => error,
     };
-    if let Some(robot) = neighbour(config)? {
+    if let Some((robot, panel)) = neighbour(config)? {
         let address = StationSection::USUAL.to_owned();
         let told = format!("the external computer is that of robot `{robot}`, at {address}");
         config.station.address = Some(address);
         return Ok(External {
             listener: None,
+            panel: panel.map(|panel| format!("the panel is at http://{panel}")),
             told,
         });
     }
@@ -76,6 +113,7 @@ fn none(config: &mut Config, why: &anyhow::Error) -> External {
     config.station.wanted = false;
     External {
         listener: None,
+        panel: None,
         told: format!("there is no external computer: {why:#}; the warehouse is told here"),
     }
 }
@@ -87,33 +125,33 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     config.station.address = Some(address);
     External {
         listener: Some(listener),
+        panel: None,
         told,
     }
 }
 
 /// A robot of this user's on this bus that is up, has a station of its own at the usual address, and
-/// drives in the same warehouse.
-fn neighbour(config: &Config) -> Result<Option<String>> {
+/// drives in the same warehouse; and where its panel is.
+fn neighbour(config: &Config) -> Result<Option<(String, Option<SocketAddr>)>> {
     let bus = config.bus()?;
     let place = bus.place()?;
     let warehouse = config.warehouse()?;
-    let is_it = |name: &str| {
+    let it = |name: &str| {
         let theirs = RuntimeFolder::running(&Config {
             name: name.to_owned(),
             ..config.clone()
         });
-        let Ok(Some(theirs)) = theirs else {
-            return false;
-        };
+        let theirs = theirs.ok().flatten()?;
         let gag = RuntimeFolder::gag(&theirs);
         let serves = gag
             .and_then(|gag| Ok(fs::symlink_metadata(gag)?.file_type().is_socket()))
             .unwrap_or(false);
-        serves
+        let is_it = serves
             && theirs.station.address.as_deref() == Some(StationSection::USUAL)
-            && theirs.warehouse().is_ok_and(|theirs| theirs == warehouse)
+            && theirs.warehouse().is_ok_and(|theirs| theirs == warehouse);
+        is_it.then(|| (name.to_owned(), theirs.station.panel))
     };
     let up = place.up();
     let mut names = up.keys().map(lager_ports::RobotName::as_str);
-    Ok(names.find(|name| is_it(name)).map(str::to_owned))
+    Ok(names.find_map(it))
 }

@@ -145,6 +145,9 @@ impl Robot {
     /// The robot does not start, or the bus does not hold.
     pub fn run(&mut self, exit_when_done: bool) -> Result<()> {
         self.note(&self.external.told);
+        if let Some(panel) = &self.external.panel {
+            self.note(panel);
+        }
         self.begin()?;
         while !self.signals.end_asked() {
             if let Some(why) = self.turn()? {

@@ -1,0 +1,142 @@
+// The first row: which robot, how fresh, who drives, what it does; and STOP, which never waits.
+
+import { say, span } from "./words.js";
+
+/** How long Resume is held, in ms. */
+const HOLD_MS = 1_000;
+/** After this time a stop that nobody has confirmed is said to be none, in ms. */
+const CONFIRM_MS = 1_000;
+
+export class Bar {
+  constructor(link, parts, robot) {
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    this.said = null;
+    parts.stop.addEventListener("pointerdown", () => this.stop());
+    parts.stop.addEventListener("click", (event) => event.detail === 0 && this.stop());
+    // Ahead of whatever has the focus, dialogs included.
+    addEventListener("keydown", (event) => this.key(event), { capture: true });
+    this.resume();
+  }
+
+  key(event) {
+    const inText = event.target instanceof HTMLElement && event.target.matches("input, textarea, select");
+    if (event.key !== "Escape" && !(event.key === " " && !inText)) return;
+    // The button of Resume is held by this key.
+    if (event.key === " " && event.target === this.parts.resume) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (!event.repeat) this.stop();
+  }
+
+  /** Stops the robot that is shown; every other one has its own page. */
+  async stop() {
+    const robot = this.robot();
+    if (!robot || !this.link.open) return this.say("stop_lost");
+    this.say("sent");
+    const unconfirmed = setTimeout(() => this.say("stop_unconfirmed"), CONFIRM_MS);
+    const answer = await this.link.ask("stop", robot.name);
+    clearTimeout(unconfirmed);
+    if (answer.stopped !== undefined) this.say("stands", answer.stopped);
+    else if (answer.done) this.say("sent");
+    else if (answer.refused === "lost") this.say("stop_unconfirmed");
+    else this.say("refused", answer.refused);
+  }
+
+  say(key, ...values) {
+    this.said = [key, values];
+    this.parts.stopSaid.textContent = say(key, ...values);
+  }
+
+  /** Resume is held, so that nobody does it in passing. */
+  resume() {
+    const { resume } = this.parts;
+    let timer = null;
+    const begin = () => {
+      if (timer) return;
+      resume.classList.add("held");
+      timer = setTimeout(async () => {
+        end();
+        const robot = this.robot();
+        if (!robot) return;
+        const answer = await this.link.act(robot, "resume");
+        if (answer.refused) this.say("refused", answer.refused);
+        else this.parts.stopSaid.textContent = "";
+      }, HOLD_MS);
+    };
+    const end = () => {
+      clearTimeout(timer);
+      timer = null;
+      resume.classList.remove("held");
+    };
+    resume.addEventListener("pointerdown", begin);
+    for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) resume.addEventListener(name, end);
+    resume.addEventListener("keydown", (event) => [" ", "Enter"].includes(event.key) && !event.repeat && begin());
+    resume.addEventListener("keyup", end);
+  }
+
+  draw(robot, now) {
+    const { parts } = this;
+    const stale = !robot || robot.isStale(now);
+    document.body.classList.toggle("stale", stale);
+    document.body.classList.toggle("stopped", robot?.state.stopped === "1");
+    put(parts.link, this.linkWords(robot, now));
+    const mode = robot?.state.mode;
+    put(parts.mode, mode ? say(`mode_${mode}`) : "");
+    put(parts.driver, this.driverWords(robot));
+    const volts = robot?.state.battery_dv;
+    put(parts.battery, volts === undefined ? "" : `${(Number(volts) / 10).toFixed(1)} V`);
+    put(parts.doing, doing(robot));
+    this.drawStop(robot);
+  }
+
+  linkWords(robot, now) {
+    if (!this.link.open) return say("lost");
+    if (!robot) return say("no_robot");
+    const heard = Number.isFinite(robot.heard) ? say("age", span(robot.age(now))) : say("unheard");
+    if (!robot.connected) return say("no_link", heard);
+    if (!robot.speaks) return say("plain");
+    if (robot.isStale(now)) return say("stale", span(now - Math.max(robot.stated, 0)));
+    return say("link", Math.round(robot.age(now)));
+  }
+
+  driverWords(robot) {
+    if (!robot) return "";
+    if (robot.driver) return say("person", robot.driver === this.link.me ? `${robot.driver} ✓` : robot.driver);
+    return robot.state.mode === "autonomous" ? say("station_drives") : say("nobody");
+  }
+
+  drawStop(robot) {
+    const { resume, stopSaid } = this.parts;
+    const stopped = robot?.state.stopped === "1";
+    resume.hidden = !stopped;
+    if (stopped) {
+      put(resume, `${say("resume")} · ${say("stopped", span(Date.now() - (robot.stoppedSince ?? Date.now())))}`);
+      const moves = Number(robot.state.left_duty) || Number(robot.state.right_duty);
+      resume.disabled = !this.link.mayDrive || Boolean(moves);
+    } else if (this.wasStopped) {
+      stopSaid.textContent = "";
+    }
+    this.wasStopped = stopped;
+  }
+}
+
+/** What a robot does, in words. */
+export function doing(robot) {
+  const phase = robot?.state.phase;
+  if (!phase) return "";
+  const node = robot.state.next ? `(${robot.state.next})` : "";
+  const words = [say(`phase_${phase}`, node)];
+  if (robot.state.product !== undefined) words.push(say("fetches", robot.state.product));
+  if (robot.state.hold && robot.state.hold !== "none") words.push(say("hold", robot.state.hold));
+  for (const board of ["sensor", "steering"]) {
+    if (robot.state[`${board}_up`] === "0") words.push(say("board_lost", board));
+  }
+  return words.join(", ");
+}
+
+/** Changes a text only where it is another one: a live region would say it again. */
+export function put(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,229 @@
+// Driving by hand: keys, buttons, a gamepad; one held command at a time, given again until it is let go.
+//
+//   key, finger or stick down --> armed, driver, fresh state? --> "drive code lease" every 50 ms
+//   up, blur, hidden, cancel, lost link, stale state ----------> "drive 1" once, then silence
+//
+// A command lives 200 ms by its lease, so a page that dies lets the robot stand. Steps of the arm and
+// the quarter turns are given once a press and are never cut short by letting go.
+
+import { say } from "./words.js";
+
+const RENEW_MS = 50;
+const LEASE_MS = 200;
+/** Code 1 of the wheels. */
+const STAND = 1;
+/** Unsent bytes beyond which nothing more is given. */
+const BACKLOG = 2_000;
+
+/** What is held: code of the wheels, word, keys. */
+const HELD = [
+  [2, "forward", ["ArrowUp"]],
+  [4, "backward", ["ArrowDown"]],
+  [6, "left", ["ArrowLeft"]],
+  [7, "right", ["ArrowRight"]],
+  [3, "follow_forward", []],
+  [5, "follow_back", []],
+];
+/** What runs once. */
+const ONCE = [
+  [8, "left_diag", ["PageUp"]],
+  [9, "right_diag", ["PageDown"]],
+  [STAND, "stand", []],
+];
+/** The buttons of the wheels, row by row. */
+const PAD = ["left_diag", "forward", "right_diag", "left", "stand", "right", "follow_back", "backward", "follow_forward"];
+/** One step of the arm. */
+const STEPS = [
+  ["F1", "clockwise", ["1"]],
+  ["F2", "counterclockwise", ["2"]],
+  ["F3", "in", ["q"]],
+  ["F4", "out", ["w"]],
+  ["F5", "up", ["a"]],
+  ["F6", "down", ["s"]],
+  ["F7", "left", ["z"]],
+  ["F8", "right", ["x"]],
+  ["F9", "squeeze", [","]],
+  ["FA", "release", [".", "\u00f7", "/"]],
+];
+
+export class Driving {
+  constructor(link, parts, robot, now) {
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    this.now = now;
+    this.held = null;
+    this.timer = null;
+    this.stepping = false;
+    this.buttons();
+    this.keys();
+    this.releases();
+    this.pads();
+  }
+
+  /** Whether something is held now. */
+  get isHeld() {
+    return this.held !== null;
+  }
+
+  tell(key, ...values) {
+    this.parts.said.textContent = key ? say(key, ...values) : "";
+  }
+
+  /** Why nothing may be driven now, as a word; null if it may. */
+  objection() {
+    const robot = this.robot();
+    if (!robot || !this.link.open) return ["lost"];
+    if (robot.isStale(this.now())) return ["old"];
+    if (!this.parts.armed.checked) return ["not_armed", say("armed")];
+    if (robot.driver !== this.link.me) return ["not_driver"];
+    return null;
+  }
+
+  hold(code, source) {
+    if (this.held) return;
+    const why = this.objection();
+    if (why) return this.tell(...why);
+    this.tell(null);
+    this.held = { code, source, robot: this.robot() };
+    this.timer = setInterval(() => this.renew(), RENEW_MS);
+    this.renew();
+  }
+
+  async renew() {
+    const { code, robot } = this.held;
+    if (this.objection() || robot !== this.robot()) return this.letGo();
+    if (this.link.backlog > BACKLOG) return this.letGo("full");
+    const held = this.held;
+    const answer = await this.link.act(robot, `drive ${code} ${LEASE_MS}`);
+    // What was let go meanwhile has its own end.
+    if (answer.refused && this.held === held) {
+      this.letGo();
+      this.tell("refused", answer.refused === "lost" ? say("lost") : answer.refused);
+    }
+  }
+
+  /** Ends what is held, for whatever reason. */
+  letGo(why = null) {
+    if (!this.held) return;
+    clearInterval(this.timer);
+    const { robot } = this.held;
+    this.held = null;
+    for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
+    if (this.link.open) this.link.act(robot, `drive ${STAND} ${LEASE_MS}`);
+    if (why) this.tell(why);
+  }
+
+  async once(action) {
+    const why = this.objection();
+    if (why) return this.tell(...why);
+    // What is held ends for it, so the robot is not driven on while something else runs.
+    if (action === `drive ${STAND} 1000`) this.letGo();
+    if (this.stepping) return this.tell("wait");
+    const robot = this.robot();
+    if (action.startsWith("arm") && this.held) {
+      this.letGo();
+      return this.tell("arm_waits");
+    }
+    this.tell(null);
+    this.stepping = true;
+    const answer = await this.link.act(robot, action);
+    this.stepping = false;
+    if (answer.refused) this.tell("refused", answer.refused === "lost" ? say("lost") : answer.refused);
+  }
+
+  buttons() {
+    const { pad, arm } = this.parts;
+    for (const name of PAD) {
+      const held = HELD.find(([, word]) => word === name);
+      const once = ONCE.find(([, word]) => word === name);
+      if (held) this.heldButton(pad, ...held);
+      else addButton(pad, name, once[2]).addEventListener("click", () => this.once(`drive ${once[0]} 1000`));
+    }
+    for (const [code, word, keys] of STEPS) {
+      addButton(arm, word, keys).addEventListener("click", () => this.once(`arm ${code}`));
+    }
+  }
+
+  heldButton(pad, code, word, keys) {
+    const button = addButton(pad, word, keys);
+    button.addEventListener("pointerdown", (event) => {
+      button.setPointerCapture(event.pointerId);
+      button.classList.add("down");
+      this.hold(code, button);
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      button.addEventListener(end, () => this.release(button));
+    }
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+    button.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && !event.repeat) this.hold(code, button);
+    });
+    button.addEventListener("keyup", () => this.release(button));
+  }
+
+  release(source) {
+    if (this.held?.source === source) this.letGo();
+  }
+
+  keys() {
+    const find = (table, key) => table.find(([, , keys]) => keys.includes(key));
+    addEventListener("keydown", (event) => {
+      if (isText(event.target) || event.ctrlKey || event.altKey || event.metaKey) return;
+      const held = find(HELD, event.key);
+      const once = find(ONCE, event.key);
+      const step = find(STEPS, event.key.toLowerCase());
+      if (!held && !once && !step) return;
+      // Unarmed, the arrows are the page's.
+      if (!this.parts.armed.checked) return;
+      event.preventDefault();
+      if (event.repeat) return;
+      if (held) this.hold(held[0], event.key);
+      else if (once) this.once(`drive ${once[0]} 1000`);
+      else this.once(`arm ${step[0]}`);
+    });
+    addEventListener("keyup", (event) => this.release(event.key));
+  }
+
+  /** Whatever may have eaten the end of a press is one. */
+  releases() {
+    addEventListener("blur", () => this.letGo());
+    addEventListener("pagehide", () => this.letGo());
+    document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
+    document.addEventListener("focusin", (event) => isText(event.target) && this.letGo());
+    this.parts.armed.addEventListener("change", () => this.letGo());
+    this.link.addEventListener("link", () => this.link.open || this.letGo());
+  }
+
+  /** Looks at the gamepads; called before each picture. */
+  pads() {
+    const pad = navigator.getGamepads?.().find((found) => found?.mapping === "standard");
+    if (!pad) return this.release("pad");
+    const [x, y] = pad.axes;
+    const pressed = (index) => pad.buttons[index]?.pressed;
+    let code = null;
+    if (y < -0.5 || pressed(12)) code = 2;
+    else if (y > 0.5 || pressed(13)) code = 4;
+    else if (x < -0.5 || pressed(14)) code = 6;
+    else if (x > 0.5 || pressed(15)) code = 7;
+    if (this.held?.source === "pad" && this.held.code !== code) this.letGo();
+    if (code && !this.held && this.parts.armed.checked && this.padWas !== code) this.hold(code, "pad");
+    this.padWas = code;
+  }
+}
+
+/** Whether keys belong to a field. */
+export function isText(element) {
+  return element instanceof HTMLElement && (element.matches("input:not([type=checkbox]), textarea, select") || element.isContentEditable);
+}
+
+function addButton(parent, word, keys) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.dataset.word = word;
+  button.id = `${parent.id}-${word}`;
+  button.textContent = say(word);
+  if (keys.length) button.setAttribute("aria-keyshortcuts", keys[0]);
+  parent.append(button);
+  return button;
+}

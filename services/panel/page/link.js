@@ -1,0 +1,240 @@
+// The one connection to the station: its lines become a model of every robot, orders go back.
+//
+// What the station says, one or more lines in a message (services/panel/src/speech.rs):
+//
+//   you <name> driver|viewer
+//   warehouse <json>
+//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [age_ms=<n>]
+//   from <robot> <a line of the extension, such as state ...>
+//   answer <number> done | refused <reason> | stopped <ms>
+//
+// What the page says:
+//
+//   do <robot> <number> <action>      the extension's action; answered once
+//   stop <robot> <number>             ahead of all else
+//   take <robot> <number>             the driver's seat; free <robot> <number> leaves it
+//   warehouse <number> <json>
+//
+// Nothing here draws, and nothing here is kept when the page is closed.
+
+/** Older than this, in ms, nothing is shown as true. */
+export const STALE_MS = 500;
+/** How long trail and strips look back, in ms. */
+export const SPAN_MS = 60_000;
+
+const RETRY_MS = [250, 500, 1_000, 2_000];
+
+/** What is known of one robot. */
+class Robot {
+  constructor(name) {
+    this.name = name;
+    this.connected = false;
+    this.speaks = false;
+    this.driver = null;
+    /** When the station last heard it, by this page's clock. */
+    this.heard = -Infinity;
+    this.state = {};
+    /** When its state last came, by this page's clock. */
+    this.stated = -Infinity;
+    this.truth = null;
+    this.latency = null;
+    this.route = [];
+    this.blocked = new Map();
+    this.queue = [];
+    this.events = [];
+    this.history = [];
+    this.past = [];
+    this.stoppedSince = null;
+  }
+
+  /** Milliseconds since the robot was last heard. */
+  age(now) {
+    return now - this.heard;
+  }
+
+  isStale(now) {
+    return !this.connected || now - this.heard > STALE_MS || now - this.stated > STALE_MS;
+  }
+}
+
+export class Link extends EventTarget {
+  constructor() {
+    super();
+    this.robots = new Map();
+    this.warehouse = null;
+    this.me = null;
+    this.mayDrive = false;
+    this.open = false;
+    this.number = 0;
+    this.waiting = new Map();
+    this.tries = 0;
+    this.connect();
+  }
+
+  connect() {
+    const url = new URL("live", location.href);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    url.hash = "";
+    const socket = new WebSocket(url);
+    this.socket = socket;
+    socket.onopen = () => {
+      this.open = true;
+      this.tries = 0;
+      this.emit("link");
+    };
+    socket.onmessage = (message) => {
+      for (const line of message.data.split("\n")) {
+        if (line) this.hear(line);
+      }
+      this.emit("news");
+    };
+    socket.onclose = () => {
+      this.open = false;
+      for (const settle of this.waiting.values()) settle({ refused: "lost" });
+      this.waiting.clear();
+      for (const robot of this.robots.values()) robot.connected = false;
+      this.emit("link");
+      const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
+      setTimeout(() => this.connect(), wait);
+    };
+  }
+
+  /** Gives an order; resolves to {done}, {stopped: ms} or {refused: reason}. */
+  ask(verb, robot, rest = "") {
+    const number = ++this.number;
+    if (!this.open || this.socket.readyState !== WebSocket.OPEN) {
+      return Promise.resolve({ refused: "lost" });
+    }
+    const words = [verb, robot, number, rest].filter((word) => word !== "" && word !== null);
+    this.socket.send(words.join(" "));
+    return new Promise((settle) => this.waiting.set(String(number), settle));
+  }
+
+  act(robot, action) {
+    return this.ask("do", robot.name, action);
+  }
+
+  /** Bytes that the browser has not sent yet: a dead link shows here first. */
+  get backlog() {
+    return this.socket.bufferedAmount;
+  }
+
+  hear(line) {
+    const [word, ...rest] = line.split(" ");
+    if (word === "from") {
+      this.report(this.robot(rest[0]), rest[1], rest.slice(2));
+    } else if (word === "about") {
+      this.about(this.robot(rest[0]), fields(rest.slice(1)));
+    } else if (word === "answer") {
+      this.answer(rest);
+    } else if (word === "warehouse") {
+      this.warehouse = JSON.parse(line.slice("warehouse ".length));
+      this.emit("warehouse");
+    } else if (word === "you") {
+      this.me = rest[0];
+      this.mayDrive = rest[1] === "driver";
+      this.emit("link");
+    }
+  }
+
+  robot(name) {
+    let robot = this.robots.get(name);
+    if (!robot) {
+      robot = new Robot(name);
+      this.robots.set(name, robot);
+      this.emit("robots");
+    }
+    return robot;
+  }
+
+  about(robot, said) {
+    robot.connected = said.connected === "1";
+    robot.speaks = said.speaks === "1";
+    robot.driver = said.driver === "-" ? null : said.driver;
+    // One that speaks only the document's language shows nothing that could be old.
+    robot.heard = said.age_ms === undefined ? -Infinity : performance.now() - Number(said.age_ms);
+  }
+
+  answer([number, what, ...rest]) {
+    const settle = this.waiting.get(number);
+    this.waiting.delete(number);
+    if (!settle) return;
+    if (what === "done") settle({ done: true });
+    else if (what === "stopped") settle({ stopped: Number(rest[0]) });
+    else settle({ refused: rest.join(" ") });
+  }
+
+  report(robot, word, rest) {
+    const now = performance.now();
+    if (word === "state") {
+      const state = fields(rest);
+      if (state.stopped === "1" && robot.state.stopped !== "1") robot.stoppedSince = Date.now();
+      if (state.stopped !== "1") robot.stoppedSince = null;
+      robot.state = state;
+      robot.stated = now;
+      remember(robot, now);
+    } else if (word === "route") {
+      robot.route = rest.slice(1).reduce(pairs, []);
+    } else if (word === "blocked") {
+      const seen = new Map();
+      for (let i = 1; i + 2 < rest.length; i += 3) {
+        const key = rest.slice(i, i + 3).join(" ");
+        seen.set(key, robot.blocked.get(key) ?? Date.now());
+      }
+      robot.blocked = seen;
+    } else if (word === "queue") {
+      robot.queue = [];
+      for (let i = 1; i + 1 < rest.length; i += 2) {
+        robot.queue.push({ order: rest[i], product: rest[i + 1] });
+      }
+    } else if (word === "truth") {
+      const [x, y, heading, carrying] = rest;
+      robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
+    } else if (word === "latency") {
+      const [count, p50, p90, p99] = rest.map(Number);
+      // Without a command measured there is no new figure.
+      if (count > 0) robot.latency = { p50, p90, p99 };
+    } else if (word === "event" || word === "thought") {
+      const entry = { at: Date.now(), kind: word, words: rest };
+      robot.events.push(entry);
+      if (robot.events.length > 1_000) robot.events.shift();
+      this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
+    }
+  }
+
+  emit(name) {
+    this.dispatchEvent(new Event(name));
+  }
+}
+
+function fields(words) {
+  return Object.fromEntries(words.map((word) => word.split("=", 2)));
+}
+
+function pairs(list, word, index) {
+  if (index % 2 === 0) list.push([Number(word), 0]);
+  else list[list.length - 1][1] = Number(word);
+  return list;
+}
+
+/** Keeps what the strips and the trail show. */
+function remember(robot, now) {
+  const { state } = robot;
+  const figure = (key) => (state[key] === undefined ? null : Number(state[key]));
+  robot.past.push({
+    at: now,
+    wall: Date.now(),
+    x: figure("x_mm"),
+    y: figure("y_mm"),
+    line_error: figure("line_error"),
+    left_duty: figure("left_duty"),
+    right_duty: figure("right_duty"),
+    distance_cm: figure("distance_cm"),
+    battery: state.battery_dv === undefined ? null : Number(state.battery_dv) / 10,
+    path_p50: robot.latency?.p50 ?? null,
+    path_p99: robot.latency?.p99 ?? null,
+    lost: ["sensor_lost", "steering_lost", "bus_lost"].reduce((sum, key) => sum + Number(state[key] ?? 0), 0),
+  });
+  // Ten minutes at twenty a second.
+  if (robot.past.length > 12_000) robot.past.splice(0, 1_000);
+}

@@ -1,0 +1,138 @@
+// Puts the page together: one link, one robot in view, everything drawn once a picture.
+
+import { Bar } from "./bar.js";
+import { Driving } from "./drive.js";
+import { Link } from "./link.js";
+import { Log } from "./log.js";
+import { WarehouseMap } from "./map.js";
+import { Missions } from "./missions.js";
+import { Setup } from "./setup.js";
+import { Strips } from "./strips.js";
+import { change, current, say, translate } from "./words.js";
+import { put } from "./bar.js";
+
+const at = (id) => document.getElementById(id);
+const now = () => performance.now();
+
+current();
+translate();
+const link = new Link();
+const robot = () => link.robots.get(at("robot").value) ?? [...link.robots.values()][0];
+
+const bar = new Bar(link, {
+  link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
+  stop: at("stop"), stopSaid: at("stop-said"), resume: at("resume"),
+}, robot);
+const map = new WarehouseMap(at("map"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") }, meetEdge);
+const missions = new Missions(link, {
+  fetch: at("fetch"), goods: at("goods"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"),
+  said: at("missions-said"), queue: at("queue"), arm: at("arm-drawing"), history: at("history"),
+}, robot);
+const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm") }, robot, now);
+const setup = new Setup(link, {
+  form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
+  gains: at("gains"), calibrate: at("calibrate"), boardSaid: at("board-said"),
+}, robot);
+const strips = new Strips(at("strips"));
+const log = new Log({ filter: at("filter"), entries: at("entries"), save: at("save-csv") }, robot);
+
+/** Puts an obstacle on an edge of a simulated world, or takes it away. */
+async function meetEdge([x, y, way]) {
+  const shown = robot();
+  // Somebody else's world is real.
+  if (!shown?.truth || !link.mayDrive) return;
+  const edge = `${x} ${y} ${way}`;
+  const put = await link.act(shown, `obstacle put ${edge}`);
+  if (put.done) return tell("obstacle_put");
+  const taken = await link.act(shown, `obstacle take ${edge}`);
+  tell(...(taken.done ? ["obstacle_taken"] : ["refused", put.refused]));
+}
+
+function tell(...words) {
+  put(at("map-said"), say(...words));
+}
+
+async function act(action) {
+  const shown = robot();
+  if (!shown) return;
+  const answer = await link.act(shown, action);
+  driving.tell(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+}
+
+at("manual").onclick = () => act("mode manual");
+at("autonomous").onclick = () => act("mode autonomous");
+at("reset").onclick = () => act("reset");
+at("control").onclick = async () => {
+  const shown = robot();
+  if (!shown) return;
+  const mine = shown.driver === link.me;
+  driving.letGo();
+  const answer = await link.ask(mine ? "free" : "take", shown.name);
+  driving.tell(...(answer.refused ? ["refused", answer.refused] : [null]));
+};
+at("language").onclick = () => {
+  change();
+  translate();
+  words();
+};
+
+for (const tab of document.querySelectorAll("[role=tab]")) {
+  tab.addEventListener("click", () => show(tab));
+  tab.addEventListener("keydown", (event) => {
+    const tabs = [...document.querySelectorAll("[role=tab]")];
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step || at("armed").checked) return;
+    const next = tabs[(tabs.indexOf(tab) + step + tabs.length) % tabs.length];
+    show(next);
+    next.focus();
+  });
+}
+
+function show(tab) {
+  for (const other of document.querySelectorAll("[role=tab]")) {
+    const chosen = other === tab;
+    other.setAttribute("aria-selected", chosen);
+    other.tabIndex = chosen ? 0 : -1;
+    at(other.getAttribute("aria-controls")).hidden = !chosen;
+  }
+  driving.letGo();
+}
+
+/** Words that change with the language or with who looks. */
+function words() {
+  at("language").textContent = say("language");
+  at("stop").textContent = say("stop");
+  for (const element of document.querySelectorAll(".driver-only")) element.disabled = !link.mayDrive;
+}
+
+link.addEventListener("robots", () => {
+  const list = at("robot");
+  const chosen = list.value;
+  list.replaceChildren(...[...link.robots.keys()].sort().map((name) => new Option(name, name)));
+  if (link.robots.has(chosen)) list.value = chosen;
+});
+link.addEventListener("warehouse", () => {
+  map.setWarehouse(link.warehouse);
+  missions.setWarehouse(link.warehouse);
+  setup.setWarehouse(link.warehouse);
+});
+link.addEventListener("link", words);
+words();
+
+function picture() {
+  const shown = robot();
+  const time = now();
+  bar.draw(shown, time);
+  map.draw(shown, time);
+  missions.draw(shown);
+  strips.draw(shown, time);
+  log.draw(shown);
+  driving.pads();
+  const mine = shown?.driver && shown.driver === link.me;
+  const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];
+  put(at("control"), say(...seat));
+  if (!link.warehouse) tell("no_map");
+  else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
+  requestAnimationFrame(picture);
+}
+requestAnimationFrame(picture);

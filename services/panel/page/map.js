@@ -1,0 +1,274 @@
+// The warehouse and the robots in it, as one drawing in mm that is panned and zoomed by its view box.
+
+import { SPAN_MS } from "./link.js";
+import { say } from "./words.js";
+
+const NS = "http://www.w3.org/2000/svg";
+/** The body in mm: track of the wheels, length before and behind the axle. */
+const BODY = { half: 90, front: 170, rear: 90 };
+/** How long a robot takes to glide to a new pose, in ms. */
+const GLIDE_MS = 100;
+/** How far the ends of the warehouse are from the view's edge, in mm. */
+const MARGIN = 350;
+const SIDES = { left: [-1, 0], up: [0, 1], right: [1, 0], down: [0, -1] };
+
+/** An element of SVG with attributes. */
+export function make(name, attributes = {}, parent = null, text = null) {
+  const element = document.createElementNS(NS, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text !== null) element.textContent = text;
+  parent?.append(element);
+  return element;
+}
+
+export class WarehouseMap {
+  constructor(svg, tools, act) {
+    this.svg = svg;
+    this.act = act;
+    this.warehouse = null;
+    this.side = 400;
+    this.view = [0, 0, 1000, 1000];
+    this.following = false;
+    this.floor = make("g", {}, svg);
+    this.goods = make("g", {}, svg);
+    this.ways = make("g", {}, svg);
+    this.trail = make("polyline", { class: "trail" }, svg);
+    this.route = make("polyline", { class: "route" }, svg);
+    this.next = make("circle", { class: "next", r: 70 }, svg);
+    this.ghost = robotShape(svg, "ghost");
+    this.body = robotShape(svg, "robot");
+    this.shown = null;
+    this.pan();
+    tools.zoomIn.onclick = () => this.zoom(0.8);
+    tools.zoomOut.onclick = () => this.zoom(1.25);
+    tools.fit.onclick = () => this.fit();
+    tools.follow.onclick = () => {
+      this.following = !this.following;
+      tools.follow.setAttribute("aria-pressed", this.following);
+    };
+    this.stopFollowing = () => {
+      this.following = false;
+      tools.follow.setAttribute("aria-pressed", false);
+    };
+  }
+
+  /** Draws another warehouse, or the same with other goods. */
+  setWarehouse(warehouse) {
+    const before = this.warehouse;
+    this.warehouse = warehouse;
+    this.floor.replaceChildren();
+    this.goods.replaceChildren();
+    if (!warehouse) return;
+    this.side = warehouse.side_length_cm * 10;
+    const [width, height] = warehouse.size;
+    for (let x = 0; x <= width; x++) this.tape(x, 0, x, height);
+    for (let y = 0; y <= height; y++) this.tape(0, y, width, y);
+    this.exit();
+    for (let x = 0; x <= width; x++) {
+      for (let y = 0; y <= height; y++) {
+        make("circle", { class: "node", cx: x * this.side, cy: -y * this.side, r: 14 }, this.floor);
+      }
+    }
+    for (const good of warehouse.product ?? []) this.good(good);
+    const same = before && String(before.size) === String(warehouse.size) && before.side_length_cm === warehouse.side_length_cm;
+    if (!same) this.fit();
+  }
+
+  tape(x1, y1, x2, y2) {
+    const at = (value) => value * this.side;
+    make("line", { class: "tape", x1: at(x1), y1: -at(y1), x2: at(x2), y2: -at(y2) }, this.floor);
+  }
+
+  /** The way out of the delivery corner, and the bar at its end. */
+  exit() {
+    const [x, y] = this.warehouse.delivery;
+    const away = x === 0 ? -1 : 1;
+    const length = 300;
+    const from = [x * this.side, -y * this.side];
+    const to = from[0] + away * length;
+    make("line", { class: "tape exit", x1: from[0], y1: from[1], x2: to, y2: from[1] }, this.floor);
+    make("line", { class: "bar", x1: to, y1: from[1] - 150, x2: to, y2: from[1] + 150 }, this.floor);
+  }
+
+  /** A box in its square, at the side from which it is reached. */
+  good({ id, name, square, side }) {
+    const [dx, dy] = SIDES[side] ?? [0, 0];
+    const reach = this.side / 2 - 110;
+    const x = (square[0] + 0.5) * this.side + dx * reach;
+    const y = -((square[1] + 0.5) * this.side + dy * reach);
+    const box = make("g", { class: "good", "data-product": id }, this.goods);
+    make("title", {}, box, name ? `${id} ${name}` : String(id));
+    make("rect", { x: x - 60, y: y - 60, width: 120, height: 120, rx: 12 }, box);
+    make("text", { x, y: y + 28 }, box, String(id));
+  }
+
+  /** Shows a robot as it is now; called before each picture. */
+  draw(robot, now) {
+    const known = robot && robot.state.x_mm !== undefined;
+    for (const part of [this.body, this.trail, this.route, this.next]) part.toggleAttribute("hidden", !known);
+    this.ghost.toggleAttribute("hidden", !robot?.truth);
+    if (!known) return;
+    const stale = robot.isStale(now);
+    this.svg.classList.toggle("stale", stale);
+    const aim = { x: Number(robot.state.x_mm), y: Number(robot.state.y_mm), heading: Number(robot.state.heading_deg ?? 0) };
+    const pose = this.glide(aim, now, stale);
+    place(this.body, pose);
+    if (robot.truth) place(this.ghost, robot.truth);
+    this.drawTrail(robot, now);
+    this.drawWay(robot, pose);
+    this.drawBlocked(robot);
+    this.markGoods(robot);
+    if (this.following) this.centre(pose.x, -pose.y);
+  }
+
+  /** Where to draw between two poses. */
+  glide(aim, now, stale) {
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const shown = this.shown;
+    const jump = !shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500;
+    const part = jump ? 1 : Math.min(1, (now - shown.at) / GLIDE_MS);
+    const turn = jump ? 0 : ((aim.heading - shown.heading + 540) % 360) - 180;
+    const pose = {
+      x: jump ? aim.x : shown.x + (aim.x - shown.x) * part,
+      y: jump ? aim.y : shown.y + (aim.y - shown.y) * part,
+      heading: jump ? aim.heading : shown.heading + turn * part,
+    };
+    if (!stale || jump) this.shown = { ...pose, at: now };
+    return stale && shown ? shown : pose;
+  }
+
+  drawTrail(robot, now) {
+    const points = [];
+    for (let i = robot.past.length - 1; i >= 0; i -= 4) {
+      const { at, x, y } = robot.past[i];
+      if (now - at > SPAN_MS) break;
+      if (x !== null && y !== null) points.push(`${x},${-y}`);
+    }
+    this.trail.setAttribute("points", points.join(" "));
+  }
+
+  drawWay(robot, pose) {
+    const nodes = robot.route.map(([x, y]) => `${x * this.side},${-y * this.side}`);
+    this.route.setAttribute("points", [`${pose.x},${-pose.y}`, ...nodes].join(" "));
+    const next = robot.state.next?.split(",").map(Number);
+    this.next.toggleAttribute("hidden", !next);
+    if (next) {
+      this.next.setAttribute("cx", next[0] * this.side);
+      this.next.setAttribute("cy", -next[1] * this.side);
+    }
+  }
+
+  drawBlocked(robot) {
+    const shown = [...robot.blocked.keys()].join(";");
+    const seconds = Math.floor(Date.now() / 1_000);
+    if (this.shownBlocked === shown && this.shownSecond === seconds) return;
+    this.shownBlocked = shown;
+    this.shownSecond = seconds;
+    this.ways.replaceChildren();
+    for (const [way, since] of robot.blocked) {
+      const [x, y, side] = way.split(" ");
+      const [dx, dy] = SIDES[side] ?? [0, 0];
+      const [cx, cy] = [(Number(x) + dx / 2) * this.side, -(Number(y) + dy / 2) * this.side];
+      const cross = make("g", { class: "blocked" }, this.ways);
+      make("path", { d: `M${cx - 60} ${cy - 60}l120 120m0 -120l-120 120` }, cross);
+      make("text", { x: cx + 75, y: cy - 40 }, cross, `${Math.floor((Date.now() - since) / 1_000)} s`);
+    }
+  }
+
+  markGoods(robot) {
+    for (const box of this.goods.children) {
+      const id = box.dataset.product;
+      const state = robot.state.product === id ? "wanted" : robot.queue.some(({ product }) => product === id) ? "queued" : "";
+      box.setAttribute("class", `good ${state}`);
+    }
+  }
+
+  fit() {
+    if (!this.warehouse) return;
+    const [width, height] = this.warehouse.size.map((squares) => squares * this.side);
+    this.view = [-MARGIN, -height - MARGIN, width + 2 * MARGIN, height + 2 * MARGIN];
+    this.stopFollowing?.();
+    this.show();
+  }
+
+  zoom(by, [cx, cy] = [this.view[0] + this.view[2] / 2, this.view[1] + this.view[3] / 2]) {
+    const [x, y, width, height] = this.view;
+    if (width * by < 500 || width * by > 200_000) return;
+    this.view = [cx - (cx - x) * by, cy - (cy - y) * by, width * by, height * by];
+    this.show();
+  }
+
+  centre(x, y) {
+    this.view = [x - this.view[2] / 2, y - this.view[3] / 2, this.view[2], this.view[3]];
+    this.show();
+  }
+
+  show() {
+    this.svg.setAttribute("viewBox", this.view.join(" "));
+  }
+
+  /** A point of the screen in mm of the drawing. */
+  point(event) {
+    const matrix = this.svg.getScreenCTM()?.inverse();
+    if (!matrix) return [0, 0];
+    const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix);
+    return [x, y];
+  }
+
+  /** Drag to pan, wheel to zoom, arrows to pan; a click that does not move meets an edge. */
+  pan() {
+    let from = null;
+    let moved = 0;
+    this.svg.addEventListener("pointerdown", (event) => {
+      from = this.point(event);
+      moved = 0;
+      this.svg.setPointerCapture(event.pointerId);
+    });
+    this.svg.addEventListener("pointermove", (event) => {
+      if (!from) return;
+      const [x, y] = this.point(event);
+      moved += Math.hypot(event.movementX, event.movementY);
+      if (moved < 5) return;
+      this.stopFollowing();
+      this.view[0] -= x - from[0];
+      this.view[1] -= y - from[1];
+      this.show();
+    });
+    this.svg.addEventListener("pointerup", (event) => {
+      if (from && moved < 5) this.meetEdge(this.point(event));
+      from = null;
+    });
+    this.svg.addEventListener("pointercancel", () => (from = null));
+    this.svg.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.zoom(event.deltaY > 0 ? 1.1 : 0.9, this.point(event));
+    }, { passive: false });
+  }
+
+  /** The edge of the grid that a click is near to, if it is near to one. */
+  meetEdge([px, py]) {
+    if (!this.warehouse) return;
+    const [gx, gy] = [px / this.side, -py / this.side];
+    const [width, height] = this.warehouse.size;
+    const [nx, ny] = [Math.round(gx), Math.round(gy)];
+    const near = 0.15;
+    let edge = null;
+    if (Math.abs(gy - ny) < near && gx > 0 && gx < width) edge = [Math.floor(gx), ny, "right"];
+    else if (Math.abs(gx - nx) < near && gy > 0 && gy < height) edge = [nx, Math.floor(gy), "up"];
+    if (edge && edge[0] >= 0 && edge[1] >= 0 && edge[0] <= width && edge[1] <= height) this.act(edge);
+  }
+}
+
+function robotShape(svg, name) {
+  const group = make("g", { class: name, hidden: "" }, svg);
+  make("title", {}, group, say(name === "robot" ? "robot" : "screen"));
+  const { half, front, rear } = BODY;
+  // It looks up at 0 degrees.
+  make("path", { d: `M${-half} ${rear}V${-front + 50}L${-half + 50} ${-front}H${half - 50}L${half} ${-front + 50}V${rear}Z` }, group);
+  make("path", { class: "arrow", d: `M0 ${-front + 25}l45 70h-90z` }, group);
+  return group;
+}
+
+function place(group, { x, y, heading }) {
+  group.setAttribute("transform", `translate(${x} ${-y}) rotate(${heading})`);
+}

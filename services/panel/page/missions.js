@@ -1,0 +1,115 @@
+// What is fetched: the queue, what the hands at the goods say, what has been delivered.
+
+import { say, span } from "./words.js";
+import { make } from "./map.js";
+import { put } from "./bar.js";
+
+export class Missions {
+  constructor(link, parts, robot) {
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    this.shown = null;
+    this.order = Date.now() % 1_000_000_000;
+    parts.fetch.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.act(`order ${++this.order} ${parts.goods.value}`);
+    });
+    parts.picked.onclick = () => this.act("picked");
+    parts.pickedForce.onclick = () => this.act("picked force");
+    parts.clear.onclick = () => this.act("clear");
+    link.addEventListener("event", ({ detail }) => this.remember(detail));
+  }
+
+  async act(action) {
+    const robot = this.robot();
+    if (!robot) return put(this.parts.said, say("no_robot"));
+    const answer = await this.link.act(robot, action);
+    const why = answer.refused === "lost" ? say("lost") : answer.refused;
+    put(this.parts.said, answer.refused ? say("refused", why) : "");
+  }
+
+  setWarehouse(warehouse) {
+    const { goods } = this.parts;
+    goods.replaceChildren(...(warehouse?.product ?? []).map(({ id, name }) => new Option(name ? `${id} ${name}` : id, id)));
+  }
+
+  /** Keeps when goods were fetched and delivered. */
+  remember({ robot, entry }) {
+    if (entry.kind !== "event") return;
+    const [what, , , , product] = entry.words;
+    if (what === "getting_item") robot.began = entry.at;
+    if (what === "next_node") robot.nodes = (robot.nodes ?? 0) + 1;
+    if (what !== "item_delivered") return;
+    const took = robot.began ? span(entry.at - robot.began) : "";
+    robot.history.unshift({ product, at: entry.at, took, nodes: robot.nodes ?? 0 });
+    robot.nodes = 0;
+  }
+
+  draw(robot) {
+    this.drawQueue(robot);
+    this.drawArm(robot);
+    const lines = (robot?.history ?? []).map(({ product, at, took }) => `${new Date(at).toLocaleTimeString()}  ${product}  ${took}`);
+    fill(this.parts.history, lines, (line) => item(line));
+  }
+
+  drawQueue(robot) {
+    const { queue } = this.parts;
+    const current = robot?.state.product;
+    const orders = (robot?.queue ?? []).filter(({ order }) => order !== robot.state.order);
+    const shown = JSON.stringify([current, orders, document.documentElement.lang]);
+    if (this.shown === shown) return;
+    this.shown = shown;
+    queue.replaceChildren();
+    if (current !== undefined) queue.append(item(`${current}  ${say("under_way")}`));
+    for (const { order, product } of orders) {
+      const line = item(product);
+      line.append(
+        button(say("first"), () => this.act(`first ${order}`)),
+        button(say("cancel"), () => this.act(`cancel ${order}`)),
+      );
+      queue.append(line);
+    }
+    if (!queue.children.length) queue.append(item(say("queue_empty")));
+  }
+
+  /** The servos as bars: where each of them stands. */
+  drawArm(robot) {
+    const { arm } = this.parts;
+    const positions = robot?.state.servos?.split(",") ?? [];
+    if (this.shownArm === String(positions)) return;
+    this.shownArm = String(positions);
+    arm.replaceChildren();
+    positions.forEach((position, index) => {
+      const y = 12 + index * 17;
+      make("text", { x: 0, y: y + 5 }, arm, `${say("servo")} ${index + 1}`);
+      make("rect", { class: "track", x: 70, y: y - 4, width: 180, height: 8 }, arm);
+      if (position === "-") return;
+      make("circle", { cx: 70 + (Number(position) / 1023) * 180, cy: y, r: 6 }, arm);
+      make("text", { x: 260, y: y + 5 }, arm, position);
+    });
+  }
+}
+
+/** An item of a list. */
+export function item(text) {
+  const element = document.createElement("li");
+  element.append(text);
+  return element;
+}
+
+/** Fills a list, if it has changed. */
+export function fill(list, lines, make) {
+  const shown = lines.join("\n");
+  if (list.dataset.shown === shown) return;
+  list.dataset.shown = shown;
+  list.replaceChildren(...lines.map(make));
+}
+
+function button(text, act) {
+  const element = document.createElement("button");
+  element.type = "button";
+  element.textContent = text;
+  element.onclick = act;
+  return element;
+}

@@ -1,0 +1,145 @@
+// Setting up: the warehouse with checks as one types, the line control's gains, the calibration.
+
+import { say } from "./words.js";
+import { put } from "./bar.js";
+
+const SIDES = ["left", "up", "right", "down"];
+
+export class Setup {
+  constructor(link, parts, robot) {
+    this.link = link;
+    this.parts = parts;
+    this.robot = robot;
+    this.past = [];
+    this.dirty = false;
+    const { form } = parts;
+    form.addEventListener("input", () => {
+      this.dirty = true;
+      this.corners();
+      this.check();
+    });
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.save(this.read());
+    });
+    parts.add.onclick = () => {
+      this.dirty = true;
+      this.row({ id: this.freeNumber(), square: [0, 0], side: "down" });
+      this.check();
+    };
+    parts.undo.onclick = () => this.past.length && this.save(this.past.pop(), false);
+    parts.gains.addEventListener("submit", (event) => {
+      event.preventDefault();
+      const { p, d } = parts.gains.elements;
+      this.act(`gains ${p.value} ${d.value}`, "saved");
+    });
+    parts.calibrate.onclick = () => {
+      put(parts.boardSaid, say("calibrating"));
+      this.act("calibrate", "calibrated");
+    };
+  }
+
+  async act(action, done) {
+    const robot = this.robot();
+    if (!robot) return put(this.parts.boardSaid, say("no_robot"));
+    const answer = await this.link.act(robot, action);
+    const why = answer.refused === "lost" ? say("lost") : answer.refused;
+    put(this.parts.boardSaid, answer.refused ? say("refused", why) : say(done));
+  }
+
+  async save(warehouse, undoable = true) {
+    const why = this.wrong(warehouse);
+    if (why) return put(this.parts.said, why);
+    const before = this.link.warehouse;
+    const answer = await this.link.ask("warehouse", JSON.stringify(warehouse), null);
+    if (answer.refused) return put(this.parts.said, answer.refused === "lost" ? say("lost") : answer.refused);
+    if (undoable && before) this.past.push(before);
+    this.dirty = false;
+    put(this.parts.said, say("saved"));
+  }
+
+  /** Fills the form in, unless somebody is at work in it. */
+  setWarehouse(warehouse) {
+    if (this.dirty || !warehouse) return;
+    const { elements } = this.parts.form;
+    [elements.width.value, elements.height.value] = warehouse.size;
+    elements.side.value = warehouse.side_length_cm;
+    this.corners();
+    elements.delivery.value = String(warehouse.delivery ?? [0, 0]);
+    this.parts.products.replaceChildren();
+    for (const product of warehouse.product ?? []) this.row(product);
+  }
+
+  corners() {
+    const { width, height, delivery } = this.parts.form.elements;
+    const [x, y] = [Number(width.value), Number(height.value)];
+    const chosen = delivery.selectedIndex;
+    const corners = [[0, 0], [x, 0], [0, y], [x, y]];
+    delivery.replaceChildren(...corners.map((corner) => new Option(`(${corner})`, String(corner))));
+    delivery.selectedIndex = Math.max(chosen, 0);
+  }
+
+  row({ id, name = "", square, side }) {
+    const line = document.createElement("tr");
+    const field = (type, value, key, size) => {
+      const input = document.createElement("input");
+      Object.assign(input, { type, value, name: key });
+      input.className = size;
+      input.setAttribute("aria-label", say(key === "id" ? "number" : key === "name" ? "name" : "square"));
+      return input;
+    };
+    const sides = document.createElement("select");
+    sides.name = "from";
+    sides.setAttribute("aria-label", say("reached_from"));
+    sides.append(...SIDES.map((word) => new Option(say(word), word)));
+    sides.value = side;
+    const remove = document.createElement("button");
+    Object.assign(remove, { type: "button", textContent: "×", title: say("remove") });
+    remove.setAttribute("aria-label", say("remove"));
+    remove.onclick = () => {
+      line.remove();
+      this.dirty = true;
+      this.check();
+    };
+    const cells = [[field("number", id, "id", "short")], [field("text", name, "name", "")], [field("number", square[0], "x", "short"), field("number", square[1], "y", "short")], [sides], [remove]];
+    for (const parts of cells) {
+      const cell = document.createElement("td");
+      cell.append(...parts);
+      line.append(cell);
+    }
+    this.parts.products.append(line);
+  }
+
+  read() {
+    const { elements } = this.parts.form;
+    const product = [...this.parts.products.rows].map((line) => {
+      const value = (name) => line.querySelector(`[name=${name}]`).value;
+      const good = { id: Number(value("id")), square: [Number(value("x")), Number(value("y"))], side: value("from") };
+      return value("name") ? { ...good, name: value("name") } : good;
+    });
+    return {
+      ...(this.link.warehouse ?? {}),
+      size: [Number(elements.width.value), Number(elements.height.value)],
+      side_length_cm: Number(elements.side.value),
+      delivery: elements.delivery.value.split(",").map(Number),
+      product,
+    };
+  }
+
+  /** What is wrong with a warehouse, as a sentence; the station checks it, too. */
+  wrong({ size, product }) {
+    const ids = product.map(({ id }) => id);
+    const twice = ids.find((id, index) => ids.indexOf(id) !== index);
+    if (twice !== undefined) return say("duplicate", twice);
+    const outside = product.find(({ square: [x, y] }) => x < 0 || y < 0 || x >= size[0] || y >= size[1]);
+    return outside ? say("outside", outside.id) : null;
+  }
+
+  check() {
+    put(this.parts.said, this.wrong(this.read()) ?? "");
+  }
+
+  freeNumber() {
+    return Math.max(0, ...[...this.parts.products.rows].map((line) => Number(line.querySelector("[name=id]").value))) + 1;
+  }
+}

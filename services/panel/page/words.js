@@ -1,0 +1,115 @@
+// Every word that the page shows, in Swedish and English. A test holds both to the same keys.
+
+const TABLE = {
+  en: {
+    add_product: "Add goods", age: "last heard {0} ago", arm: "Arm", arm_waits: "The robot drives: stop it first, then move the arm.",
+    armed: "keys and buttons drive", asks: "asks for it", autonomous: "Autonomous", backward: "back", battery: "battery",
+    blocked: "not possible: {0}", board_lost: "{0} board is not heard", calibrate: "Calibrate (5 s)", calibrated: "calibrated",
+    calibrating: "move the robot over tape and floor", calibration: "Line sensor",
+    calibration_how: "Press, then move the robot slowly over tape and floor for five seconds. The eleven values show in the strip below.",
+    cancel: "cancel", clear: "Clear queue", clockwise: "claw cw", collision: "collision", control_free: "Nobody drives. Take the wheel",
+    control_mine: "You drive. Let go", control_other: "{0} drives", counterclockwise: "claw ccw", delivered: "delivered {0}", delivery: "Delivery corner",
+    distance: "distance", down: "down", drive: "Drive", driving: "drives", dropping: "puts the goods down", duty: "duty",
+    duplicate: "two goods have the number {0}", dwell: "for {0}", event_failed: "cannot go on at {1}", event_getting_item: "fetches {0}",
+    event_in_position: "stands at goods {0}", event_item_delivered: "has delivered {0}", event_next_node: "goes to {1}",
+    event_pickup_refused: "does not feel the goods {0}", event_refused: "does not fetch {0}", exiting: "drives to the delivery bar",
+    fetch: "Fetch", fetches: "fetches {0}", filter: "filter", first: "first", fit: "Fit", follow: "Follow", follow_back: "follow line back",
+    follow_forward: "follow line", forward: "forward", full: "wait: the link does not keep up", gains: "Line control", goods: "goods",
+    heading: "heading", history: "Delivered", hold: "stands: {0}", in: "in", language: "Svenska", left: "left", left_diag: "45° left",
+    let_go: "hold to drive", line_error: "line error", link: "link {0} ms", log: "Log", lost: "there is no connection to the station",
+    losses: "lost", manual: "By hand", map: "map", missions: "Missions", moved: "Where does the robot stand now?", mode_autonomous: "AUTONOMOUS", mode_manual: "BY HAND",
+    name: "name", no_boards: "the boards do not answer yet", no_goods: "no goods are known", no_link: "no link, {0}", no_map: "The station knows no warehouse yet. Describe one under Set up.",
+    no_robot: "No robot has connected yet. It does so by itself once it is up.", no_trail: "nothing has been seen yet", not_armed: "tick “{0}” first", not_driver: "take the wheel first",
+    nobody: "nobody drives", number: "number", obstacle_put: "obstacle put; click again to take it away", obstacle_taken: "obstacle taken away",
+    old: "what is shown is old", out: "out", outside: "goods {0} stand outside", path: "path p50 / p99", person: "{0} drives", picked: "Pick-up done",
+    picked_force: "Pick-up done, not felt", picking: "picks up", phase: "{0}", plain: "speaks only the document's language: no live picture",
+    queue_empty: "Nothing waits.", reached_from: "from", refused: "{0}", release: "release", remove: "remove", reset: "It stands at the delivery, looking in",
+    reset_done: "the robot takes it that it stands at the delivery", resume: "Hold to resume", resume_how: "hold for a second", right: "right", right_diag: "45° right", robot: "robot",
+    route: "way", save: "Save", save_csv: "Save CSV", saved: "saved", screen: "screen", sent: "sent", servo: "servo", set: "Set", setup: "Set up",
+    side: "Side of a square", size: "Squares", square: "square", squeeze: "squeeze", stale: "nothing new for {0}", stand: "stand", stands: "both boards stand, {0} ms",
+    stop: "STOP", stop_lost: "NOT SENT: there is no connection to the station", stop_unconfirmed: "sent, not confirmed: the robot may still be moving",
+    stopped: "STOPPED {0} ago", strips: "the last minute", station_drives: "the robot drives itself", turn: "turns", under_way: "under way", undo: "Undo", unheard: "never heard",
+    up: "up", viewer: "you may look and stop", wait: "one at a time: a step is under way", where: "After driving by hand", zoom_in: "zoom in", zoom_out: "zoom out",
+    "phase_waiting-for-map": "waits for the warehouse", "phase_waiting-for-order": "waits for an order", phase_driving: "drives to {0}", phase_turning: "turns",
+    phase_approaching: "looks for the goods' mark", phase_positioning: "turns in at the goods", phase_picking: "stands at the goods", phase_leaving: "leaves the goods",
+    phase_exiting: "drives to the delivery bar", phase_dropping: "puts the goods down", "phase_backing-off": "backs away from the goods", phase_returning: "drives back in", "phase_turning-round": "turns round", phase_halted: "has stopped before something", "phase_turning-back": "turns back",
+    phase_stuck: "is stuck and needs a person", phase_lost: "does not know where it is", phase_looking: "looks whether the way is free",
+  },
+  sv: {
+    add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
+    armed: "tangenter och knappar kör", asks: "ber om ratten", autonomous: "Autonom", backward: "bakåt", battery: "batteri",
+    blocked: "går inte: {0}", board_lost: "{0} hörs inte", calibrate: "Kalibrera (5 s)", calibrated: "kalibrerad",
+    calibrating: "för roboten över tejp och golv", calibration: "Linjesensor",
+    calibration_how: "Tryck och för sedan roboten långsamt över tejp och golv i fem sekunder. De elva värdena syns i remsan nedan.",
+    cancel: "ta bort", clear: "Töm kön", clockwise: "klo medurs", collision: "kollision", control_free: "Ingen kör. Ta ratten",
+    control_mine: "Du kör. Släpp ratten", control_other: "{0} kör", counterclockwise: "klo moturs", delivered: "{0} levererade", delivery: "Leveranshörn",
+    distance: "avstånd", down: "ner", drive: "Kör", driving: "kör", dropping: "ställer ner varan", duty: "pådrag",
+    duplicate: "två varor har numret {0}", dwell: "i {0}", event_failed: "kommer inte vidare vid {1}", event_getting_item: "hämtar {0}",
+    event_in_position: "står vid vara {0}", event_item_delivered: "har levererat {0}", event_next_node: "kör till {1}",
+    event_pickup_refused: "känner inte vara {0}", event_refused: "hämtar inte {0}", exiting: "kör till leveransplatsen",
+    fetch: "Hämta", fetches: "hämtar {0}", filter: "filter", first: "först", fit: "Allt", follow: "Följ", follow_back: "följ linje bakåt",
+    follow_forward: "följ linje", forward: "framåt", full: "vänta: länken hinner inte med", gains: "Linjereglering", goods: "varor",
+    heading: "riktning", history: "Levererat", hold: "står: {0}", in: "in", language: "English", left: "vänster", left_diag: "45° vänster",
+    let_go: "håll för att köra", line_error: "linjefel", link: "länk {0} ms", log: "Logg", lost: "ingen förbindelse med stationen",
+    losses: "förlorat", manual: "För hand", map: "karta", missions: "Uppdrag", moved: "Var står roboten nu?", mode_autonomous: "AUTONOM", mode_manual: "FÖR HAND",
+    name: "namn", no_boards: "korten svarar inte ännu", no_goods: "inga varor är kända", no_link: "ingen länk, {0}", no_map: "Stationen känner inget lager än. Beskriv ett under Ställ in.",
+    no_robot: "Ingen robot har anslutit än. Den gör det själv när den är igång.", no_trail: "inget har setts än", not_armed: "kryssa i ”{0}” först", not_driver: "ta ratten först",
+    nobody: "ingen kör", number: "nummer", obstacle_put: "hinder utställt; klicka igen för att ta bort det", obstacle_taken: "hinder borttaget",
+    old: "det som visas är gammalt", out: "ut", outside: "vara {0} står utanför", path: "väg p50 / p99", person: "{0} kör", picked: "Upplockning klar",
+    picked_force: "Upplockning klar, känns ej", picking: "plockar upp", phase: "{0}", plain: "talar bara dokumentets språk: ingen levande bild",
+    queue_empty: "Inget väntar.", reached_from: "från", refused: "{0}", release: "släpp", remove: "ta bort", reset: "Den står vid leveransen och ser in i lagret",
+    reset_done: "roboten utgår från att den står vid leveransen", resume: "Håll för att fortsätta", resume_how: "håll en sekund", right: "höger", right_diag: "45° höger", robot: "robot",
+    route: "väg", save: "Spara", save_csv: "Spara CSV", saved: "sparat", screen: "skärm", sent: "skickat", servo: "servo", set: "Sätt", setup: "Ställ in",
+    side: "Rutans sida", size: "Rutor", square: "ruta", squeeze: "kläm", stale: "inget nytt på {0}", stand: "stå", stands: "båda korten står, {0} ms",
+    stop: "STOPP", stop_lost: "EJ SKICKAT: ingen förbindelse med stationen", stop_unconfirmed: "skickat, ej bekräftat: roboten kan röra sig",
+    stopped: "STOPPAD för {0} sedan", strips: "senaste minuten", station_drives: "roboten kör själv", turn: "svänger", under_way: "på väg", undo: "Ångra", unheard: "aldrig hörd",
+    up: "upp", viewer: "du får titta och stoppa", wait: "en i taget: ett steg pågår", where: "Efter körning för hand", zoom_in: "närmare", zoom_out: "längre bort",
+    "phase_waiting-for-map": "väntar på lagret", "phase_waiting-for-order": "väntar på en order", phase_driving: "kör till {0}", phase_turning: "svänger",
+    phase_approaching: "letar efter varans märke", phase_positioning: "svänger in vid varan", phase_picking: "står vid varan", phase_leaving: "lämnar varan",
+    phase_exiting: "kör till leveransplatsen", phase_dropping: "ställer ner varan", "phase_backing-off": "backar från varan", phase_returning: "kör in igen", "phase_turning-round": "vänder", phase_halted: "har stannat framför något", "phase_turning-back": "vänder tillbaka",
+    phase_stuck: "sitter fast och behöver en människa", phase_lost: "vet inte var den är", phase_looking: "ser efter om vägen är fri",
+  },
+};
+
+let language = null;
+
+/** The language in use: chosen before, or the browser's. */
+export function current() {
+  if (!language) {
+    const kept = localStorage.getItem("language");
+    language = kept in TABLE ? kept : navigator.language.startsWith("sv") ? "sv" : "en";
+    document.documentElement.lang = language;
+  }
+  return language;
+}
+
+/** Changes to the other language. */
+export function change() {
+  language = current() === "sv" ? "en" : "sv";
+  localStorage.setItem("language", language);
+  document.documentElement.lang = language;
+}
+
+/** A word or sentence; {0} and so on are filled in. */
+export function say(key, ...values) {
+  const text = TABLE[current()][key] ?? key.replace(/^phase_/, "");
+  return text.replace(/\{(\d)\}/g, (_, index) => values[index] ?? "");
+}
+
+/** A time in ms, in words. */
+export function span(ms) {
+  if (ms < 1_000) return `${Math.max(0, Math.round(ms))} ms`;
+  if (ms < 60_000) return `${(ms / 1_000).toFixed(1)} s`;
+  if (ms < 3_600_000) return `${Math.floor(ms / 60_000)} min`;
+  return `${Math.floor(ms / 3_600_000)} h`;
+}
+
+/** Fills in the words that stand in the page itself. */
+export function translate(root = document) {
+  for (const element of root.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
+  for (const element of root.querySelectorAll("[data-label]")) element.setAttribute("aria-label", say(element.dataset.label));
+  for (const element of root.querySelectorAll("[data-title]")) {
+    element.title = say(element.dataset.title);
+    element.setAttribute("aria-label", say(element.dataset.title));
+  }
+}

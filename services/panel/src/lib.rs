@@ -1,0 +1,295 @@
+//! The operator panel: one page in the browser that shows the station's robots and acts on them.
+//!
+//! ```text
+//!   browser <── files ──── Panel ──> Handle of the station ──> robots, by TCP
+//!           <── socket ──>   │
+//!                            └ one task for each socket: lines both ways
+//! ```
+//!
+//! - [`Panel`]: the server, in one thread with tasks of its own.
+//! - `page`: the files, embedded.
+//! - `access`: who may open them.
+//! - `speech`: the lines that page and panel say to each other.
+//! - `socket`: one page's conversation, and `visit`: what it may do, has asked and has been told.
+//!
+//! It knows of a robot what the station knows, joins no bus, and has no right that the station has
+//! not. What a page orders counts as long as its socket lives: the driver's seat is left with it.
+
+#![forbid(unsafe_code)]
+
+mod access;
+mod page;
+mod socket;
+mod speech;
+mod visit;
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::{Request, State, WebSocketUpgrade};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{any, get};
+use lager_station::Handle;
+use thiserror::Error;
+
+pub use access::Tokens;
+use access::{Access, Rank};
+
+/// Pages that may look at once.
+const MOST_PAGES: usize = 32;
+/// The longest message of a page, in bytes: a warehouse with all its goods.
+const LONGEST_MESSAGE: usize = 64 * 1024;
+/// How often the end is looked for.
+const LOOK: Duration = Duration::from_millis(100);
+/// The cookie that carries a token.
+const COOKIE: &str = "lager-token";
+
+/// Why there is no panel.
+#[derive(Debug, Error)]
+pub enum PanelError {
+    /// The address cannot be had.
+    #[error("the panel cannot listen at {address}: {error}; choose another one with --panel")]
+    Listen {
+        /// Which.
+        address: SocketAddr,
+        /// Why.
+        error: io::Error,
+    },
+    /// It would drive for anybody on the network.
+    #[error("a panel at {0}, which others can reach, needs tokens")]
+    NoTokens(SocketAddr),
+    /// The system does not let it run.
+    #[error("the panel cannot run: {0}")]
+    Run(#[from] io::Error),
+}
+
+/// A panel that listens and does not answer yet.
+#[derive(Debug)]
+pub struct Panel {
+    listener: TcpListener,
+    shared: Arc<Shared>,
+}
+
+/// What all its pages share.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) handle: Handle,
+    access: Access,
+    /// Numbers for the names of pages.
+    pages: AtomicU32,
+    open: AtomicUsize,
+}
+
+impl Panel {
+    /// Listens at `address`.
+    ///
+    /// # Errors
+    ///
+    /// When the address cannot be had, or others can reach it and there are no tokens.
+    pub fn open(
+        address: SocketAddr,
+        tokens: Option<Tokens>,
+        handle: Handle,
+    ) -> Result<Self, PanelError> {
+        if !address.ip().is_loopback() && tokens.is_none() {
+            return Err(PanelError::NoTokens(address));
+        }
+        let listener =
+            TcpListener::bind(address).map_err(|error| PanelError::Listen { address, error })?;
+        Self::on(listener, tokens, handle)
+    }
+
+    /// Answers at a socket that listens already.
+    ///
+    /// # Errors
+    ///
+    /// When it is none.
+    pub fn on(
+        listener: TcpListener,
+        tokens: Option<Tokens>,
+        handle: Handle,
+    ) -> Result<Self, PanelError> {
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        Ok(Self {
+            listener,
+            shared: Arc::new(Shared {
+                handle,
+                access: Access::new(address, tokens),
+                pages: AtomicU32::new(0),
+                open: AtomicUsize::new(0),
+            }),
+        })
+    }
+
+    /// Where it listens.
+    ///
+    /// # Errors
+    ///
+    /// When the system does not say.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Answers until `end` is set.
+    ///
+    /// # Errors
+    ///
+    /// When the system does not let it run.
+    pub fn run(self, end: &AtomicBool) -> Result<(), PanelError> {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()?;
+        runtime.block_on(async {
+            let listener = tokio::net::TcpListener::from_std(self.listener)?;
+            let router = Router::new()
+                .route("/live", any(live))
+                .fallback(get(file))
+                .with_state(self.shared);
+            let ended = async {
+                while !end.load(Ordering::Relaxed) {
+                    tokio::time::sleep(LOOK).await;
+                }
+            };
+            tokio::select! {
+                served = axum::serve(listener, router) => served,
+                () = ended => Ok(()),
+            }
+        })?;
+        Ok(())
+    }
+}
+
+/// One of the page's files.
+async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let headers = request.headers();
+    if host(&shared.access, headers).is_none() {
+        return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
+    }
+    let path = request.uri().path();
+    // The token is taken out of the address, which people copy and histories keep.
+    if let Some(token) = request
+        .uri()
+        .query()
+        .and_then(|query| query.strip_prefix("token="))
+    {
+        if shared.access.rank(Some(token)).is_none() {
+            return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+        }
+        let cookie = format!("{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/");
+        let mut response = (StatusCode::SEE_OTHER, [(header::LOCATION, "/")]).into_response();
+        if let Ok(cookie) = HeaderValue::from_str(&cookie) {
+            response.headers_mut().insert(header::SET_COOKIE, cookie);
+        }
+        return response;
+    }
+    if rank(&shared.access, headers).is_none() {
+        return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+    }
+    let Some((kind, content)) = page::file(path) else {
+        return refuse(
+            StatusCode::NOT_FOUND,
+            "there is no such file here; the page is at /",
+        );
+    };
+    let mut response = ([(header::CONTENT_TYPE, kind)], content).into_response();
+    for (name, value) in page::HEADERS {
+        let (name, value) = (
+            HeaderName::from_static(name),
+            HeaderValue::from_static(value),
+        );
+        response.headers_mut().insert(name, value);
+    }
+    response
+}
+
+const WRONG_TOKEN: &str =
+    "open the address with ?token= that `lager station` has printed; without it nobody gets in";
+
+const WRONG_HOST: &str = "the panel answers to its address and not to this name";
+
+/// A page's socket.
+async fn live(
+    State(shared): State<Arc<Shared>>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    let Some(host) = host(&shared.access, &headers) else {
+        return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
+    };
+    let origin = text(&headers, &header::ORIGIN).unwrap_or_default();
+    if !shared.access.is_origin(origin, host) {
+        return refuse(
+            StatusCode::FORBIDDEN,
+            "this socket is for the panel's own page",
+        );
+    }
+    let Some(rank) = rank(&shared.access, &headers) else {
+        return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+    };
+    let Some(place) = Place::take(&shared) else {
+        return refuse(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "as many pages look as may; close one of them",
+        );
+    };
+    upgrade
+        .max_message_size(LONGEST_MESSAGE)
+        .on_upgrade(move |socket| socket::converse(socket, place, rank))
+}
+
+/// One of the places for pages; it is free again when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Place {
+    pub(crate) shared: Arc<Shared>,
+    /// The page's number, which no other has had.
+    pub(crate) number: u32,
+}
+
+impl Place {
+    fn take(shared: &Arc<Shared>) -> Option<Self> {
+        let taken = shared
+            .open
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |open| {
+                (open < MOST_PAGES).then_some(open + 1)
+            });
+        taken.ok()?;
+        Some(Self {
+            shared: Arc::clone(shared),
+            number: shared.pages.fetch_add(1, Ordering::Relaxed) + 1,
+        })
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.shared.open.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// The host that was asked, if it is this panel.
+fn host<'h>(access: &Access, headers: &'h HeaderMap) -> Option<&'h str> {
+    text(headers, &header::HOST).filter(|host| access.is_host(host))
+}
+
+/// What the sender of these headers may do.
+fn rank(access: &Access, headers: &HeaderMap) -> Option<Rank> {
+    let cookies = text(headers, &header::COOKIE).unwrap_or_default();
+    let token = cookies
+        .split("; ")
+        .find_map(|cookie| cookie.strip_prefix(COOKIE)?.strip_prefix('='));
+    access.rank(token)
+}
+
+fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
+    headers.get(name)?.to_str().ok()
+}
+
+fn refuse(status: StatusCode, why: &'static str) -> Response {
+    (status, format!("{why}\n")).into_response()
+}

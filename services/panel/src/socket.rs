@@ -1,0 +1,108 @@
+//! One page's conversation: what it says is carried out at once, what has changed is told it.
+//!
+//! Reading and telling are two futures beside each other: a page that takes nothing in can still
+//! stop a robot, and is dropped when it has taken nothing in for [`SLOW`].
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt as _, StreamExt as _};
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+use crate::Place;
+use crate::access::Rank;
+use crate::visit::Visit;
+
+/// How often it is looked what there is to tell.
+const LOOK: Duration = Duration::from_millis(20);
+/// How often a page is asked whether it is there.
+const PING: Duration = Duration::from_secs(1);
+/// How long a page may take to take a message in.
+const SLOW: Duration = Duration::from_secs(2);
+/// How long a page may say nothing, its answers to pings included.
+const SILENT: Duration = Duration::from_secs(5);
+/// Messages that a page may send within a second.
+const MOST_MESSAGES: u32 = 200;
+
+/// Talks with a page until one of the two ends it.
+pub(crate) async fn converse(socket: WebSocket, place: Place, rank: Rank) {
+    let visit = Mutex::new(Visit::new(place, rank));
+    let (mut sink, stream) = socket.split();
+    let why = tokio::select! {
+        why = listen(stream, &visit) => why,
+        why = tell(&mut sink, &visit) => why,
+    };
+    // Before the page is told, which may take its time: whoever drove drives no more.
+    drop(visit);
+    if let Some(why) = why {
+        let frame = CloseFrame {
+            code: close_code::POLICY,
+            reason: Utf8Bytes::from_static(why),
+        };
+        let _ = timeout(SLOW, sink.send(Message::Close(Some(frame)))).await;
+    }
+}
+
+/// Carries out what the page says; why it is closed, if that is to be told.
+async fn listen(mut stream: SplitStream<WebSocket>, visit: &Mutex<Visit>) -> Option<&'static str> {
+    let mut since = Instant::now();
+    let mut messages = 0;
+    loop {
+        let message = match timeout(SILENT, stream.next()).await {
+            Ok(Some(Ok(message))) => message,
+            Ok(_) => return None,
+            Err(_) => return Some("the page does not answer"),
+        };
+        if since.elapsed() >= Duration::from_secs(1) {
+            since = Instant::now();
+            messages = 0;
+        }
+        messages += 1;
+        let mut visit = lock(visit);
+        visit.is_there();
+        if let Message::Text(line) = &message {
+            // A stop counts, however much was said before it.
+            let is_stop = line.as_str().starts_with("stop ");
+            if messages > MOST_MESSAGES && !is_stop {
+                return Some("more is said than a person can");
+            }
+            if !visit.heard(line.as_str()) {
+                return Some("this page speaks another language; load it anew");
+            }
+        } else if matches!(message, Message::Binary(_)) {
+            return Some("a page says lines of text");
+        }
+    }
+}
+
+/// Tells the page what has changed.
+async fn tell(
+    sink: &mut SplitSink<WebSocket, Message>,
+    visit: &Mutex<Visit>,
+) -> Option<&'static str> {
+    let mut look = interval(LOOK);
+    look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut pinged = Instant::now();
+    loop {
+        look.tick().await;
+        let news = lock(visit).news();
+        if !news.is_empty() {
+            send(sink, Message::text(news)).await?;
+        }
+        if pinged.elapsed() >= PING {
+            pinged = Instant::now();
+            send(sink, Message::Ping(Vec::new().into())).await?;
+        }
+    }
+}
+
+/// `None` if the page takes nothing in.
+async fn send(sink: &mut SplitSink<WebSocket, Message>, message: Message) -> Option<()> {
+    timeout(SLOW, sink.send(message)).await.ok()?.ok()
+}
+
+fn lock<'v>(visit: &'v Mutex<Visit>) -> MutexGuard<'v, Visit> {
+    visit.lock().unwrap_or_else(PoisonError::into_inner)
+}

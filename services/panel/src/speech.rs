@@ -1,0 +1,182 @@
+//! The lines that a page and the panel say to each other: the station's extension
+//! ([`lager_lines::extension`]) with the robot's name in it, and a few words about the station itself.
+//!
+//! # Page to panel, one line in a message
+//!
+//! ```text
+//! do <robot> <number> <action>      as in the extension; answered by `answer <number> ...`, once
+//! stop <robot> <number>             stand at once; carried out before all that waits
+//! take <robot> <number>             the driver's seat; `free <robot> <number>` leaves it
+//! warehouse <number> <json>         another warehouse; the fields of the station's file
+//! ```
+//!
+//! # Panel to page, one or more lines in a message
+//!
+//! ```text
+//! you <name> driver|viewer          what this page is called and may do; the first line
+//! warehouse <json>                  the warehouse, or `null`; when it has changed
+//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [age_ms=<int>]
+//! from <robot> <report>             a line of the extension, or `thought <text>`
+//! answer <number> done | stopped <ms> | refused <text>
+//! ```
+//!
+//! A line that cannot be read is refused if it has a number; a page that goes on like this is closed.
+
+use lager_lines::Name;
+use lager_lines::extension::{Action, Order};
+use lager_station::Warehouse;
+
+/// What a page says.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Said {
+    /// Have a robot do something.
+    Do {
+        robot: Name,
+        number: u32,
+        action: Action,
+    },
+    /// Stop a robot.
+    Stop { robot: Name, number: u32 },
+    /// Take the driver's seat of a robot.
+    Take { robot: Name, number: u32 },
+    /// Leave it.
+    Free { robot: Name, number: u32 },
+    /// Describe the warehouse.
+    Warehouse {
+        number: u32,
+        warehouse: Box<Warehouse>,
+    },
+}
+
+/// Why a line is none.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Unread {
+    /// The line's number, if it could be read.
+    pub(crate) number: Option<u32>,
+    /// What is wrong with it.
+    pub(crate) why: String,
+}
+
+impl Unread {
+    fn new(number: Option<u32>, why: impl Into<String>) -> Self {
+        let why = why.into();
+        Self { number, why }
+    }
+}
+
+/// Reads a line of a page.
+///
+/// # Errors
+///
+/// When it is none.
+pub(crate) fn read(line: &str) -> Result<Said, Unread> {
+    let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+    match word {
+        "warehouse" => read_warehouse(rest),
+        "do" | "stop" | "take" | "free" => read_for_robot(word, rest),
+        _ => Err(Unread::new(
+            None,
+            "a page says do, stop, take, free or warehouse",
+        )),
+    }
+}
+
+fn read_warehouse(rest: &str) -> Result<Said, Unread> {
+    let (number, json) = rest.split_once(' ').unwrap_or((rest, ""));
+    let number = read_number(number)?;
+    let warehouse = serde_json::from_str(json)
+        .map_err(|error| Unread::new(Some(number), format!("this is no warehouse: {error}")))?;
+    Ok(Said::Warehouse {
+        number,
+        warehouse: Box::new(warehouse),
+    })
+}
+
+fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
+    let (robot, rest) = rest.split_once(' ').unwrap_or((rest, ""));
+    let (number, action) = rest.split_once(' ').unwrap_or((rest, ""));
+    let number = read_number(number)?;
+    let robot = Name::new(robot).map_err(|error| Unread::new(Some(number), error.to_string()))?;
+    if word == "do" {
+        return match Order::read(&format!("do {number} {action}")) {
+            Some(Ok(Order::Do { number, action })) => Ok(Said::Do {
+                robot,
+                number,
+                action,
+            }),
+            Some(Err(error)) => Err(Unread::new(Some(number), error.to_string())),
+            _ => Err(Unread::new(Some(number), "this is no action")),
+        };
+    }
+    // A stop is one whatever stands behind it.
+    match (word, action) {
+        ("stop", _) => Ok(Said::Stop { robot, number }),
+        ("take", "") => Ok(Said::Take { robot, number }),
+        ("free", "") => Ok(Said::Free { robot, number }),
+        _ => Err(Unread::new(
+            Some(number),
+            "nothing belongs behind the number",
+        )),
+    }
+}
+
+fn read_number(text: &str) -> Result<u32, Unread> {
+    text.parse()
+        .map_err(|_| Unread::new(None, "a number from 0 to 4294967295 belongs here"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_action_is_the_extensions() {
+        let Ok(Said::Do {
+            robot,
+            number: 5,
+            action,
+        }) = read("do r1 5 drive 2 200")
+        else {
+            panic!();
+        };
+        assert_eq!(robot, Name::new("r1").unwrap());
+        assert_eq!(action.to_string(), "drive 00000010 200");
+    }
+
+    #[test]
+    fn what_is_none_says_why_and_whose() {
+        let why = |line| read(line).unwrap_err();
+        assert_eq!(why("do r1 5 fly").number, Some(5));
+        assert!(why("do r1 5 fly").why.contains("one of order"));
+        assert_eq!(why("do r1 x resume").number, None);
+        assert_eq!(why("do R! 5 resume").number, Some(5));
+        assert_eq!(why("take r1 5 6").number, Some(5));
+        assert!(why("hello").why.contains("warehouse"));
+        assert_eq!(why("").number, None);
+        let wrong = why("warehouse 7 {\"size\":[2,2]}");
+        assert_eq!(wrong.number, Some(7));
+        assert!(wrong.why.contains("side_length_cm"), "{wrong:?}");
+    }
+
+    #[test]
+    fn a_stop_is_read_whatever_stands_behind_it() {
+        assert!(matches!(
+            read("stop r1 5 please"),
+            Ok(Said::Stop { number: 5, .. })
+        ));
+    }
+
+    #[test]
+    fn a_warehouse_is_the_files() {
+        let line = r#"warehouse 7 {"size":[2,3],"side_length_cm":40,"product":[{"id":1,"square":[0,0],"side":"up"}],"exit":{"length_cm":80}}"#;
+        let Ok(Said::Warehouse { warehouse, .. }) = read(line) else {
+            panic!();
+        };
+        assert_eq!(warehouse.size, [2, 3]);
+        assert_eq!(warehouse.products.len(), 1);
+        assert!(
+            warehouse.rest.contains_key("exit"),
+            "what else is there stays"
+        );
+    }
+}

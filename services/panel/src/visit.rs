@@ -1,0 +1,287 @@
+//! What one page may do, has asked and has been told. It waits for nobody.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::time::{Duration, Instant};
+
+use lager_lines::Name;
+use lager_lines::extension::{Action, Report};
+use lager_station::{Awaited, Doing, Driver, Reply, Subscription, Told, View, Warehouse};
+
+use crate::Place;
+use crate::access::Rank;
+use crate::speech::{Said, Unread, read};
+
+/// How often a driver who drives nowhere is still there.
+const STAY: Duration = Duration::from_secs(1);
+/// How often a page is told of a robot that says nothing.
+const ABOUT: Duration = Duration::from_millis(100);
+/// Lines without a number that a page may say.
+const MOST_UNREAD: u32 = 20;
+
+const ONLY_LOOKS: &str = "this page may look and stop; a driver's address is needed for more";
+const NOT_DRIVER: &str = "take the wheel first";
+
+/// A page that is open.
+#[derive(Debug)]
+pub(crate) struct Visit {
+    place: Place,
+    /// What others are told who drives.
+    name: String,
+    rank: Rank,
+    /// The robots that this page drives.
+    wheels: BTreeMap<Name, Driver>,
+    /// What robots have not answered yet, with the page's number.
+    asked: Vec<(u32, Awaited)>,
+    subscription: Subscription,
+    /// Lines to be said.
+    lines: String,
+    robots: BTreeMap<Name, LastTold>,
+    warehouse: Option<Option<Warehouse>>,
+    revision: Option<u64>,
+    about: Instant,
+    stayed: Instant,
+    there: bool,
+    unread: u32,
+}
+
+/// When what a page was told of a robot last was new.
+#[derive(Debug, Default)]
+struct LastTold {
+    at: [Option<Duration>; 6],
+}
+
+impl Visit {
+    pub(crate) fn new(place: Place, rank: Rank) -> Self {
+        let name = format!("panel-{}", place.number);
+        let now = Instant::now();
+        Self {
+            lines: format!("you {name} {}\n", rank.as_str()),
+            subscription: place.shared.handle.subscribe(),
+            place,
+            name,
+            rank,
+            wheels: BTreeMap::new(),
+            asked: Vec::new(),
+            robots: BTreeMap::new(),
+            warehouse: None,
+            revision: None,
+            about: now,
+            stayed: now,
+            there: true,
+            unread: 0,
+        }
+    }
+
+    /// The page has said something, if only that it is there.
+    pub(crate) fn is_there(&mut self) {
+        self.there = true;
+    }
+
+    /// Carries out a line; whether the page may go on.
+    pub(crate) fn heard(&mut self, line: &str) -> bool {
+        match read(line) {
+            Ok(said) => self.carry_out(said),
+            Err(Unread { number, why }) => {
+                self.unread += u32::from(number.is_none());
+                if let Some(number) = number {
+                    self.refuse(number, &why);
+                }
+            }
+        }
+        self.unread <= MOST_UNREAD
+    }
+
+    fn carry_out(&mut self, said: Said) {
+        let handle = self.place.shared.handle.clone();
+        if let Said::Stop { robot, number } = said {
+            return match handle.stop(&robot) {
+                Ok(Some(awaited)) => self.asked.push((number, awaited)),
+                // It speaks the document's language, which confirms nothing.
+                Ok(None) => self.answer(number, "done"),
+                Err(why) => self.refuse(number, &why.to_string()),
+            };
+        }
+        let (Said::Do { number, .. }
+        | Said::Stop { number, .. }
+        | Said::Take { number, .. }
+        | Said::Free { number, .. }
+        | Said::Warehouse { number, .. }) = said;
+        if self.rank != Rank::Driver {
+            return self.refuse(number, ONLY_LOOKS);
+        }
+        match said {
+            Said::Do { robot, action, .. } => self.act(&robot, number, action),
+            Said::Take { robot, .. } if self.wheels.contains_key(&robot) => {
+                self.answer(number, "done");
+            }
+            Said::Take { robot, .. } => match handle.take_wheel(&robot, &self.name) {
+                Ok(driver) => {
+                    self.wheels.insert(robot, driver);
+                    self.answer(number, "done");
+                }
+                Err(why) => self.refuse(number, &why.to_string()),
+            },
+            Said::Free { robot, .. } => {
+                self.wheels.remove(&robot);
+                self.answer(number, "done");
+            }
+            Said::Warehouse { warehouse, .. } => match handle.set_warehouse(*warehouse) {
+                Ok(()) => self.answer(number, "done"),
+                Err(why) => self.refuse(number, &why.to_string()),
+            },
+            Said::Stop { .. } => {}
+        }
+    }
+
+    fn act(&mut self, robot: &Name, number: u32, action: Action) {
+        let driver = self.wheels.get(robot);
+        let asked = match (action, driver) {
+            (Action::Drive { .. } | Action::Arm(_), None) => {
+                return self.refuse(number, NOT_DRIVER);
+            }
+            // Its lease is the station's.
+            (Action::Drive { wheels, .. }, Some(driver)) => driver.drive(wheels),
+            (Action::Arm(step), Some(driver)) => driver.arm(step),
+            (Action::Resume | Action::Mode(_) | Action::Reset, None)
+                if self.driver_of(robot).is_some() =>
+            {
+                let by = self.driver_of(robot).unwrap_or_default();
+                return self.refuse(number, &format!("{by} drives the robot; ask him"));
+            }
+            (other, _) => self.place.shared.handle.act(robot, other),
+        };
+        match asked {
+            Ok(awaited) => self.asked.push((number, awaited)),
+            Err(why) => self.refuse(number, &why.to_string()),
+        }
+    }
+
+    fn driver_of(&self, robot: &Name) -> Option<String> {
+        self.place
+            .shared
+            .handle
+            .look(|station| station.robot(robot)?.driver().map(str::to_owned))
+    }
+
+    fn answer(&mut self, number: u32, what: &str) {
+        let _ = writeln!(self.lines, "answer {number} {what}");
+    }
+
+    fn refuse(&mut self, number: u32, why: &str) {
+        self.answer(number, &format!("refused {}", why.replace('\n', " ")));
+    }
+
+    /// What the page has not been told yet.
+    pub(crate) fn news(&mut self) -> String {
+        self.take_answers();
+        self.keep_wheels();
+        self.tell_events();
+        let handle = self.place.shared.handle.clone();
+        let revision = handle.revision();
+        if self.revision != Some(revision) || self.about.elapsed() >= ABOUT {
+            self.revision = Some(revision);
+            self.about = Instant::now();
+            self.tell_warehouse();
+            for view in handle.robots() {
+                self.tell_robot(&view);
+            }
+        }
+        std::mem::take(&mut self.lines)
+    }
+
+    fn take_answers(&mut self) {
+        let asked = std::mem::take(&mut self.asked);
+        for (number, awaited) in asked {
+            match awaited.wait(Duration::ZERO) {
+                None => self.asked.push((number, awaited)),
+                Some(Reply::Done) => self.answer(number, "done"),
+                Some(Reply::Stopped { after_ms }) => {
+                    self.answer(number, &format!("stopped {after_ms}"));
+                }
+                Some(Reply::Refused(why)) => self.refuse(number, why.as_str()),
+                Some(Reply::Lost) => self.refuse(number, "the robot does not answer"),
+            }
+        }
+    }
+
+    /// Stays at the wheels as long as the page is there.
+    fn keep_wheels(&mut self) {
+        if self.stayed.elapsed() < STAY {
+            return;
+        }
+        self.stayed = Instant::now();
+        if std::mem::take(&mut self.there) {
+            // Whoever has lost the wheel reads it in the next line about the robot.
+            self.wheels.retain(|_, driver| driver.stay().is_ok());
+        }
+    }
+
+    fn tell_events(&mut self) {
+        while let Some(news) = self.subscription.next(Duration::ZERO) {
+            let robot = news.robot;
+            let line = match news.told {
+                Told::Event(event) => Report::Event(event).to_string(),
+                Told::Thought(text) => format!("thought {text}"),
+                Told::Replied { .. } => continue,
+            };
+            let _ = writeln!(self.lines, "from {robot} {line}");
+        }
+    }
+
+    fn tell_warehouse(&mut self) {
+        let told = self.warehouse.as_ref();
+        let changed = self.place.shared.handle.look(|station| {
+            let now = station.warehouse();
+            (told.map(Option::as_ref) != Some(now)).then(|| now.cloned())
+        });
+        let Some(now) = changed else { return };
+        // What a file of TOML can say JSON can say, too.
+        if let Ok(json) = serde_json::to_string(&now) {
+            let _ = writeln!(self.lines, "warehouse {json}");
+        }
+        self.warehouse = Some(now);
+    }
+
+    fn tell_robot(&mut self, view: &View) {
+        let View { name, shown, .. } = view;
+        let connected = u8::from(view.doing != Doing::Away);
+        let speaks = u8::from(view.is_extended);
+        let driver = view.driver.as_deref().unwrap_or("-");
+        let age = shown.state.as_ref().map(|state| state.age(view.now));
+        let _ = write!(
+            self.lines,
+            "about {name} connected={connected} speaks={speaks} driver={driver}"
+        );
+        if let Some(age) = age {
+            let _ = write!(self.lines, " age_ms={}", age.as_millis());
+        }
+        self.lines.push('\n');
+
+        let told = self.robots.entry(name.clone()).or_default();
+        let lines = &mut self.lines;
+        let mut tell = |index: usize, at: Duration, report: &dyn Fn() -> Report| {
+            if told.at[index].replace(at) != Some(at) {
+                let _ = writeln!(lines, "from {name} {}", report());
+            }
+        };
+        if let Some(seen) = &shown.state {
+            tell(0, seen.at, &|| Report::State(Box::new(seen.value.clone())));
+        }
+        if let Some(seen) = &shown.truth {
+            tell(1, seen.at, &|| Report::Truth(seen.value));
+        }
+        if let Some(seen) = &shown.route {
+            tell(2, seen.at, &|| Report::Route(seen.value.clone()));
+        }
+        if let Some(seen) = &shown.blocked {
+            tell(3, seen.at, &|| Report::Blocked(seen.value.clone()));
+        }
+        if let Some(seen) = &shown.queue {
+            tell(4, seen.at, &|| Report::Queue(seen.value.clone()));
+        }
+        if let Some(seen) = &shown.latency {
+            tell(5, seen.at, &|| Report::Latency(seen.value));
+        }
+    }
+}
