@@ -46,6 +46,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     // The external computer is on no bus.
     ("lager-station", &["lager-lines", "lager-wire"]),
+    // It shows the station in a browser, so it is on no bus either.
+    ("lager-panel", &["lager-lines", "lager-station"]),
     (
         "lager-simulator",
         &[
@@ -77,6 +79,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "lager-lines",
             "lager-comm",
             "lager-station",
+            "lager-panel",
             "lager-ports",
             "lager-topics",
             "lager-wire",

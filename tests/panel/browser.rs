@@ -1,0 +1,243 @@
+//! Chromium without a window, driven by its DevTools protocol: one browser, a page or more.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use lager_tests::wait_for;
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
+
+/// A browser, with a profile of its own that goes with it.
+pub(crate) struct Browser {
+    child: Child,
+    profile: PathBuf,
+    /// Where its protocol is spoken.
+    port: u16,
+}
+
+impl Browser {
+    /// Starts one.
+    ///
+    /// # Panics
+    /// When there is none: `tests/run` installs it.
+    pub(crate) fn new() -> Self {
+        let profile = std::env::temp_dir().join(format!("lager-browser-{}", std::process::id()));
+        let mut command = Command::new("chromium");
+        command
+            .args([
+                "--headless=new",
+                "--disable-gpu",
+                "--disable-quic",
+                "--disable-sync",
+                "--no-first-run",
+                // It is to speak to the panel alone.
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--remote-debugging-port=0",
+                "--window-size=1280,720",
+            ])
+            .arg(format!("--user-data-dir={}", profile.display()))
+            .arg("about:blank")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        if rustix::process::geteuid().is_root() {
+            // Its sandbox wants another user.
+            command.arg("--no-sandbox");
+        }
+        let mut child = command
+            .spawn()
+            .unwrap_or_else(|error| panic!("chromium: {error}; `tests/run` installs it"));
+        let mut said = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+        let port = said
+            .by_ref()
+            .map_while(Result::ok)
+            .find_map(|line| {
+                let (_, rest) = line.split_once("DevTools listening on ws://127.0.0.1:")?;
+                rest.split('/').next()?.parse().ok()
+            })
+            .expect("a browser that says where it listens");
+        // What it says further is read, so that it never waits for a reader.
+        std::thread::spawn(move || said.for_each(drop));
+        Self {
+            child,
+            profile,
+            port,
+        }
+    }
+
+    /// A page of its own at this address.
+    pub(crate) fn page(&self, url: &str) -> Page {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("a browser");
+        write!(
+            stream,
+            "PUT /json/new?about:blank HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+        )
+        .expect("a browser that listens");
+        // It keeps the connection, whatever it is asked for.
+        let mut answer = BufReader::new(stream);
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            answer.read_line(&mut line).expect("a head");
+            let line = line.trim_end().to_ascii_lowercase();
+            if let Some(given) = line.strip_prefix("content-length:") {
+                length = given.trim().parse().expect("a length");
+            }
+            if line.is_empty() {
+                break;
+            }
+        }
+        let mut body = vec![0; length];
+        answer.read_exact(&mut body).expect("a body");
+        let target: Value = serde_json::from_slice(&body).expect("JSON");
+        let at = target["webSocketDebuggerUrl"].as_str().expect("an address");
+        let stream = TcpStream::connect(("127.0.0.1", self.port)).expect("a browser");
+        stream
+            .set_read_timeout(Some(lager_tests::WATCHDOG))
+            .expect("a socket");
+        let (socket, _) = tungstenite::client(at, stream).expect("a page's socket");
+        let mut page = Page { socket, number: 0 };
+        page.call("Page.enable", &json!({}));
+        // Several people look, each at a page that is in front.
+        page.call(
+            "Emulation.setFocusEmulationEnabled",
+            &json!({ "enabled": true }),
+        );
+        page.call("Page.navigate", &json!({ "url": url }));
+        page
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = std::fs::remove_dir_all(&self.profile);
+    }
+}
+
+/// A page that is open.
+pub(crate) struct Page {
+    socket: WebSocket<TcpStream>,
+    number: u64,
+}
+
+impl Page {
+    /// Has the browser do something.
+    pub(crate) fn call(&mut self, method: &str, params: &Value) -> Value {
+        self.number += 1;
+        let number = self.number;
+        let call = json!({ "id": number, "method": method, "params": params });
+        self.socket
+            .send(Message::text(call.to_string()))
+            .expect("a page that listens");
+        loop {
+            let Message::Text(text) = self.socket.read().expect("a page that answers") else {
+                continue;
+            };
+            let said: Value = serde_json::from_str(&text).expect("JSON");
+            if said["id"] == number {
+                assert!(said["error"].is_null(), "{method}: {said}");
+                return said["result"].clone();
+            }
+        }
+    }
+
+    /// What an expression of the page is.
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let params = json!({ "expression": expression, "returnByValue": true });
+        let said = self.call("Runtime.evaluate", &params);
+        assert!(said["exceptionDetails"].is_null(), "{expression}: {said}");
+        said["result"]["value"].clone()
+    }
+
+    /// What the first element that fits says.
+    pub(crate) fn text(&mut self, selector: &str) -> String {
+        let value = self.value(&format!(
+            "document.querySelector({})?.textContent ?? ''",
+            json!(selector)
+        ));
+        value.as_str().expect("a text").to_owned()
+    }
+
+    /// Waits until an element says this.
+    pub(crate) fn wait_for(&mut self, selector: &str, words: &str) {
+        wait_for(&format!("{selector} to say {words:?}"), || {
+            self.text(selector).contains(words).then_some(())
+        });
+    }
+
+    /// Waits until an expression of the page is true.
+    pub(crate) fn wait_until(&mut self, expression: &str) {
+        wait_for(expression, || {
+            (self.value(expression) == true).then_some(())
+        });
+    }
+
+    /// The middle of the first element that fits, in pixels.
+    pub(crate) fn middle(&mut self, selector: &str) -> (f64, f64) {
+        let place = self.value(&format!(
+            "(() => {{ const element = document.querySelector({}); \
+             element.scrollIntoView({{ block: 'nearest' }}); \
+             const box = element.getBoundingClientRect(); \
+             return [box.x + box.width / 2, box.y + box.height / 2]; }})()",
+            json!(selector)
+        ));
+        (place[0].as_f64().expect("x"), place[1].as_f64().expect("y"))
+    }
+
+    /// Presses or lets go of the mouse.
+    pub(crate) fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) {
+        let params = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", &params);
+    }
+
+    /// Clicks on an element.
+    pub(crate) fn click(&mut self, selector: &str) {
+        let at = self.middle(selector);
+        self.click_at(at);
+    }
+
+    /// Clicks at a place.
+    pub(crate) fn click_at(&mut self, at: (f64, f64)) {
+        self.mouse("mouseMoved", at);
+        self.mouse("mousePressed", at);
+        self.mouse("mouseReleased", at);
+    }
+
+    /// Puts a finger on an element, or takes it away (`touchStart`, `touchEnd`, `touchCancel`).
+    pub(crate) fn touch(&mut self, kind: &str, selector: &str) {
+        let (x, y) = self.middle(selector);
+        let points = if kind == "touchStart" {
+            json!([{ "x": x, "y": y }])
+        } else {
+            json!([])
+        };
+        let params = json!({ "type": kind, "touchPoints": points });
+        self.call("Input.dispatchTouchEvent", &params);
+    }
+
+    /// Presses a key.
+    pub(crate) fn key_down(&mut self, key: &str) {
+        self.key("keyDown", key);
+    }
+
+    /// Lets go of it.
+    pub(crate) fn key_up(&mut self, key: &str) {
+        self.key("keyUp", key);
+    }
+
+    fn key(&mut self, kind: &str, key: &str) {
+        let params = json!({ "type": kind, "key": key, "code": key });
+        self.call("Input.dispatchKeyEvent", &params);
+    }
+
+    /// For things that need a moment and show nothing.
+    pub(crate) fn pause(&mut self) {
+        std::thread::sleep(Duration::from_millis(300));
+    }
+}

@@ -1,0 +1,284 @@
+//! The operator panel in a real browser, on a real simulated robot: whoever lets go, whatever way,
+//! the robot stands; a stop is confirmed; goods are fetched; two people do not drive at once.
+
+mod browser;
+
+use browser::{Browser, Page};
+use lager_ports::{Bus, Clock, Subscriber};
+use lager_tests::{Domain, Running, pid, wait_for};
+use lager_topics::{NavStatus, TruthPose};
+use rustix::process::{Signal, kill_process};
+
+/// A robot that is up with its panel, and what really happens.
+struct Scene {
+    truth: Subscriber<TruthPose>,
+    bus: Bus,
+    up: Running,
+    browser: Browser,
+    url: String,
+    domain: Domain,
+}
+
+impl Scene {
+    fn new(speed: f64, more: &[&str]) -> Self {
+        let domain = Domain::new();
+        let speed_word = speed.to_string();
+        let mut args = vec!["up", "--panel", "127.0.0.1:0", "--speed", &speed_word];
+        args.extend(more);
+        let up = domain.start(&args);
+        let bus = domain.observe("r1", speed);
+        let url = wait_for("the panel's address", || {
+            let told = up.output();
+            let (_, rest) = told.split_once("the panel is at ")?;
+            rest.split_whitespace().next().map(str::to_owned)
+        });
+        Self {
+            truth: bus.subscriber().expect("a topic"),
+            bus,
+            up,
+            browser: Browser::new(),
+            url,
+            domain,
+        }
+    }
+
+    fn page(&self) -> Page {
+        let mut page = self.browser.page(&self.url);
+        // It speaks English, whatever this machine does.
+        page.wait_until("document.readyState === 'complete'");
+        page.value("localStorage.setItem('language', 'en')");
+        page.call("Page.reload", &serde_json::json!({}));
+        page.wait_for("#link", " ms");
+        page
+    }
+
+    fn moves(&mut self) -> Option<bool> {
+        let truth = self.truth.latest().expect("readable")?;
+        Some(truth.left_duty != 0 || truth.right_duty != 0)
+    }
+
+    fn wait_to_move(&mut self) {
+        wait_for("the robot to move", || self.moves().filter(|moves| *moves));
+    }
+
+    fn wait_to_stand(&mut self) {
+        wait_for("the robot to stand", || self.moves().filter(|moves| !moves));
+    }
+
+    /// It stands in all that the world shows from now on, for a while.
+    fn assert_stands(&mut self) {
+        let from = Clock::monotonic_ns();
+        let mut seen = 0;
+        while seen < 15 {
+            let truth = wait_for("the world", || self.truth.latest().expect("readable"));
+            if truth.stamp().publish_time_ns > from {
+                assert_eq!((truth.left_duty, truth.right_duty), (0, 0));
+                seen += 1;
+            }
+            drop(truth);
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    }
+
+    /// Takes the wheel and turns the robot over to the hand.
+    fn take_over(&mut self, page: &mut Page) {
+        page.click("#tab-drive");
+        page.click("#control");
+        page.wait_for("#control", "You drive");
+        page.click("#manual");
+        page.wait_for("#mode", "BY HAND");
+        self.wait_to_stand();
+    }
+
+    /// Presses a key until the robot moves by it: a person whose order was held up presses anew.
+    fn hold(&mut self, page: &mut Page, key: &str) {
+        wait_for("the robot to be driven", || {
+            page.key_down(key);
+            for _ in 0..100 {
+                if self.moves() == Some(true) {
+                    return Some(());
+                }
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            page.key_up(key);
+            None
+        });
+    }
+
+    /// Nothing is left of a stop.
+    fn resume(&self) {
+        self.domain.done(&["resume"]);
+    }
+
+    fn end(self) {
+        let Self {
+            truth,
+            bus,
+            up,
+            browser,
+            domain,
+            ..
+        } = self;
+        drop((truth, bus, browser, up));
+        domain.assert_clean();
+    }
+}
+
+#[test]
+fn whoever_lets_go_whatever_way_the_robot_stands() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.take_over(&mut page);
+
+    // Not armed, a key is no more than a key.
+    page.key_down("ArrowUp");
+    scene.assert_stands();
+    page.key_up("ArrowUp");
+    page.click("#armed");
+    page.value("document.activeElement.blur()");
+
+    scene.hold(&mut page, "ArrowUp");
+    page.key_up("ArrowUp");
+    scene.wait_to_stand();
+    scene.assert_stands();
+
+    // The key-up never comes: another window has the keys, or another tab is in front.
+    let ends = [
+        "dispatchEvent(new Event('blur'))",
+        "dispatchEvent(new Event('pagehide'))",
+        "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); \
+         document.dispatchEvent(new Event('visibilitychange')); delete document.hidden",
+        "document.querySelector('#filter').dispatchEvent(new FocusEvent('focusin', { bubbles: true }))",
+        "document.querySelector('#armed').click()",
+    ];
+    for end in ends {
+        scene.hold(&mut page, "ArrowLeft");
+        page.value(end);
+        scene.wait_to_stand();
+        scene.assert_stands();
+        page.key_up("ArrowLeft");
+    }
+    page.click("#armed");
+    page.value("document.activeElement.blur()");
+
+    // A finger.
+    page.touch("touchStart", "#pad-forward");
+    scene.wait_to_move();
+    page.touch("touchEnd", "#pad-forward");
+    scene.wait_to_stand();
+    page.touch("touchStart", "#pad-forward");
+    scene.wait_to_move();
+    page.touch("touchCancel", "#pad-forward");
+    scene.wait_to_stand();
+    scene.assert_stands();
+
+    // The whole station is gone while a key is held, and the page comes back to its successor.
+    scene.hold(&mut page, "ArrowUp");
+    let station = scene.up.service("station").expect("it runs");
+    kill_process(pid(station), Signal::KILL).expect("it runs");
+    scene.wait_to_stand();
+    page.wait_for("#link", " ms");
+    scene.assert_stands();
+    page.key_up("ArrowUp");
+
+    // A page that is loaded anew has let go, and has left the wheel.
+    page.wait_for("#control", "Nobody drives");
+    scene.take_over(&mut page);
+    scene.hold(&mut page, "ArrowDown");
+    page.call("Page.reload", &serde_json::json!({}));
+    scene.wait_to_stand();
+    page.wait_for("#control", "Nobody drives");
+    scene.assert_stands();
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.wait_to_move();
+    page.key_down("Escape");
+    page.key_up("Escape");
+    page.wait_for("#stop-said", "both boards stand");
+    scene.assert_stands();
+    // A click is too short for it.
+    page.click("#resume");
+    page.pause();
+    scene.assert_stands();
+    let at = page.middle("#resume");
+    page.mouse("mousePressed", at);
+    page.wait_until("document.querySelector('#resume').hidden");
+    page.mouse("mouseReleased", at);
+    scene.wait_to_move();
+
+    // From a field, too; and by hand.
+    page.click("#tab-setup");
+    page.value("document.querySelector('#warehouse input').focus()");
+    page.key_down("Escape");
+    page.wait_for("#stop-said", "both boards stand");
+    scene.assert_stands();
+    page.key_up("Escape");
+    scene.resume();
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn two_people_do_not_drive_at_once_and_either_may_stop() {
+    let mut scene = Scene::new(1.0, &[]);
+    let (mut anna, mut bo) = (scene.page(), scene.page());
+    scene.take_over(&mut anna);
+    bo.click("#tab-drive");
+    bo.wait_for("#control", "drives");
+    bo.click("#control");
+    bo.wait_for("#drive-said", "drives the robot");
+    bo.click("#armed");
+    bo.value("document.activeElement.blur()");
+    bo.key_down("ArrowUp");
+    bo.wait_for("#drive-said", "take the wheel first");
+    bo.key_up("ArrowUp");
+
+    anna.click("#armed");
+    anna.value("document.activeElement.blur()");
+    scene.hold(&mut anna, "ArrowUp");
+    bo.click("#stop");
+    bo.wait_for("#stop-said", "both boards stand");
+    scene.assert_stands();
+    anna.key_up("ArrowUp");
+    scene.resume();
+
+    anna.click("#control");
+    bo.wait_for("#control", "Nobody drives");
+    bo.click("#control");
+    bo.wait_for("#control", "You drive");
+    anna.wait_for("#control", "drives");
+    drop((anna, bo));
+    scene.end();
+}
+
+#[test]
+fn goods_are_queued_shown_and_delivered() {
+    let mut scene = Scene::new(4.0, &[]);
+    let mut page = scene.page();
+    let mut status = scene.bus.subscriber::<NavStatus>().expect("a topic");
+    page.value("document.querySelector('#goods').value = '2'");
+    page.click("#fetch button");
+    wait_for("it to wait or to be under way", || {
+        page.text("#queue").contains('2').then_some(())
+    });
+    // Where it is drawn moves with where it is.
+    let place = "document.querySelector('#map .robot').getAttribute('transform')";
+    let before = page.value(place);
+    wait_for("the picture to move", || {
+        (page.value(place) != before).then_some(())
+    });
+    wait_for("both to be delivered", || {
+        let status = status.latest().expect("readable")?;
+        (status.delivered == 2).then_some(())
+    });
+    page.wait_until("document.querySelectorAll('#history li').length >= 1");
+    drop((page, status));
+    scene.wait_to_stand();
+    scene.end();
+}
