@@ -127,14 +127,14 @@ fn the_terminal_says_what_the_robot_does_and_a_person_orders_more() {
             .filter(|status| status.delivered == 1 && status.product == 2)
             .map(|_| ())
     });
-    let told = up.output();
+    // What tells of it follows what shows it.
     for words in [
         "fetches product 1",
         "is in position at product 1",
         "leaves the station with product 1",
         "DELIVERED product 1",
     ] {
-        assert!(told.contains(words), "`{words}` is missing:\n{told}");
+        wait_for(words, || up.output().contains(words).then_some(()));
     }
     drop((status, observer, up));
     domain.assert_clean();

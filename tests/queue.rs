@@ -91,8 +91,10 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     wait_for("both to be delivered", || {
         (listed(&domain) == "no order is under way or waits").then_some(())
     });
-    let delivered = up.output().matches("DELIVERED product").count();
-    assert_eq!(delivered, 2, "{}", up.output());
+    // What tells of a delivery follows what shows it.
+    let delivered = |up: &Running| up.output().matches("DELIVERED product").count();
+    wait_for("both to be told", || (delivered(&up) >= 2).then_some(()));
+    assert_eq!(delivered(&up), 2, "{}", up.output());
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0));
     domain.assert_clean();
