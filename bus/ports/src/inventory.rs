@@ -1,9 +1,9 @@
 //! Whether what living processes have of a bus can still be found by those who come.
 //!
-//! A file that is removed stays with whoever has it mapped: the robot drives on, nothing fails, and
-//! nobody new can see it, stop it with a tool, or take over from a service that ends. So whoever
-//! attends a robot looks at what its processes have mapped (`/proc/PID/maps`), and at the files
-//! that describe it. Nothing is opened and nothing waited for.
+//! A file that is removed stays with every process that has it mapped. The robot drives on and
+//! nothing fails, but no new process can see it, stop it with a tool, or take over from a service
+//! that ends. So once a second the attendant looks at what the robot's processes have mapped
+//! (`/proc/PID/maps`) and at the files that describe it. It opens nothing and waits for nothing.
 //!
 //! | file | is missed when |
 //! |---|---|

@@ -12,13 +12,15 @@
 //!             gag, warehouse.toml, warehouse.toml.queue                its station's
 //!     /dev/shm/lager_<8 hex>_…      the transport's segments; the number is made from the folder
 //! ```
-//! A bus that was damaged and cleared gets a new generation of names. An observer of the old one may
-//! live on, and what it removes at its end it removes by name.
+//!
+//! A bus that was damaged and cleared gets new names for its files (a new generation), because an
+//! observer of the old bus may still live, and removes files by name when it ends.
 //!
 //! The folder is `/run/lager` where that belongs to this user, as for a system service, else
-//! `/dev/shm/lager-<uid>`: nothing that tidies up `/tmp`, no other session of the user and no
-//! stranger can part what belongs together. One that others may enter, or that is a link, is
-//! refused, so nobody can put files in its place.
+//! `/dev/shm/lager-<uid>`. Nothing that tidies up `/tmp` and no other session of the user can
+//! remove a part of it. A folder that others may enter, or that is a link, is refused, so nobody
+//! else can put files there. Whoever takes a robot's name meets the robot that has it, and a sweep
+//! removes only files of this user's bus.
 
 use std::fmt;
 use std::fs::{self, DirBuilder};

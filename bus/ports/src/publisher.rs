@@ -1,4 +1,11 @@
 //! The writing end of a topic.
+//!
+//! What a publish costs: for each sample iceoryx2 visits every place for a subscriber of the topic
+//! three times, whether it is taken or not, and the topics of the path have 74 places. That is most
+//! of the 5 000 instructions of `publish/to-1`, and most of what waking a reader on the same core
+//! costs beside the futex. The cost is instructions, not cache misses: boxing what stands in the
+//! places, so that the places lie side by side, was measured and changes nothing (1.65 and 1.67 us
+//! a hop).
 
 use core::fmt;
 use core::marker::PhantomData;

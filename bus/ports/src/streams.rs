@@ -3,11 +3,15 @@
 //! A stream is one publisher's life, `(writer, epoch)`, numbered from 0 without gaps. Pure, so
 //! that the laws can be tested without a bus:
 //!
-//! * **received + lost = sent**, for every stream that began after its reader, whatever was
-//!   overwritten, once its last sample has been received.
-//! * **A stamp may be a lie**, by a damaged or foreign writer. So a gap counts only if it could
-//!   have been sent since the stream was last heard, a later lower number shows that a gap was
-//!   none, and a sample from the future is not newer than the present ([`Newest`]).
+//! - **received + lost = sent**, once a stream's last sample has been received, for every stream
+//!   that began after its reader attached. Of a stream that was there before, the reader counts
+//!   from the first sample that it receives: of those overwritten earlier it does not know how many
+//!   were sent after it attached.
+//! - **A stamp may be false**, if its writer is damaged or foreign. So a gap counts only if that
+//!   many samples could have been sent since the stream was last heard; a later, lower number shows
+//!   that there was no gap; and a sample from the future is not newer than the present
+//!   ([`Newest`]).
+//! - **A restart is not a loss.** A restarted writer has a new epoch and numbers from 0 again.
 
 use core::ops::Range;
 

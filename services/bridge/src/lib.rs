@@ -23,6 +23,9 @@
 //! **Invariants:** no other process opens the ports; a reader never writes and the main loop
 //! never reads; nothing is written that the arbiter did not decide, handshakes and settings
 //! excepted; the bridge never decides where the robot goes.
+//!
+//! The main loop publishes `steering/state`, because only the arbiter knows the end of an order.
+//! Line and distance frames are published by the reader thread directly.
 
 pub mod arbiter;
 mod boards;

@@ -11,6 +11,9 @@
 //! ```
 //! A process that takes the script over from one that was killed starts from its [`Script`] and
 //! finds its place by what logic says of the order (`Joining`).
+//!
+//! `up` plays the script on a simulated or emulated robot. Real boards move by it only where both
+//! `--script` and `--mission` are given. `--headless` means "no panel", and there is none yet.
 
 use core::time::Duration;
 

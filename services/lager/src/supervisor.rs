@@ -8,6 +8,9 @@
 //!
 //! A child reads its configuration from its standard input, which is memory: no file has to be
 //! there for a restart.
+//!
+//! A service that ends by itself at every start is given up after five times where a mission is
+//! waited for. One that was killed is always started again.
 
 use std::fs::File;
 use std::io::{Seek, Write};

@@ -7,12 +7,13 @@
 //!                                                         at most the longest spin
 //! ```
 //!
-//! Looking must be earned by a streak of rings that came close to each other. A distance that is too
-//! long halves the streak; a look in vain does so too, and doubles what is needed for the next. So a
-//! quiet robot sleeps, a stream that ends costs one look in vain, a late ring among many is forgiven,
-//! and a waiter that takes the processor from the very writer it waits for (both on one core) soon
-//! gives up. A short sleep within the distance leaves
-//! the core to others while nothing is due.
+//! A waiter may look without pause only after a streak of rings that came close to each other. A
+//! distance that is too long halves the streak. A look in vain halves it too, and doubles the
+//! streak that is needed next time. So a quiet robot sleeps, a stream that ends costs one look in
+//! vain, and a single late ring is forgiven. A waiter that takes the core from the very writer it
+//! waits for soon stops looking; for the same reason at most one waiter fewer than the machine has
+//! cores looks at a time. Between two rings the waiter sleeps for as long as none is due, which
+//! leaves the core to others.
 //!
 //! **Invariant:** pure; the clock is an argument, in nanoseconds, and the answer is a plan.
 

@@ -15,9 +15,11 @@
 //! event; then [`BridgeCore::decide`], and carry out the rest. Look at the stop word before each
 //! action, and hand a stop in: then nothing is written that was decided before it.
 //!
-//! The order of the actions matters: `link/health` goes out before the bytes are written, so that
-//! no successor can take a carried-out order for a new one. Only what may be said twice is said
-//! first: a setpoint in place of a setpoint, and the standby of a stop.
+//! The order of the actions matters. `link/health` goes out before the bytes are written, so that
+//! no successor takes an order that was carried out for a new one. Only what may be said twice is
+//! written first: a setpoint that replaces a setpoint, and the standby of a stop. For a setpoint a
+//! successor leaves out one sequence number, which may have been used. Turns and steps of the arm
+//! run once, so they go out after the state.
 //!
 //! * `asks`: requests.
 //! * `ports`: what happens at the ports.
@@ -259,10 +261,11 @@ impl BridgeCore {
         self.stop = Some(stop);
         self.rest = Rest::default();
         self.arbiter.stop();
-        // A board of ours finds the standby behind a packet that was cut in two, by its structure,
-        // or the next one where the first was taken for the check. An original one would take the
-        // standby's first bytes for the rest of that packet and carry it out, so there the packet
-        // is finished.
+        // A board of ours finds the standby behind a packet that was cut in two, by its structure.
+        // A packet that lacks only its check value may find it in the standby's first byte, once in
+        // 256 times; the packet is then carried out until the next standby, at most 40 ms later. An
+        // original board would take the standby's first bytes for the rest of that packet and carry
+        // it out, so there the packet is finished.
         if self.boards.version(Callsign::Steering) == Some(Version::One)
             && let Some(place) = self.boards.place(Callsign::Steering)
         {

@@ -9,8 +9,12 @@
 //!   no port can be had, or no line can tell the warehouse: none
 //! ```
 //!
-//! The socket is opened here and handed to the station as its standard output, so the port stays the
-//! same over the death of a station, and whoever connects meanwhile waits for its successor.
+//! The socket is opened here and handed to the station as its standard output, so the port stays
+//! the same when a station dies, and a robot that connects meanwhile waits for its successor.
+//!
+//! Station and comm end after bridge and logic, and no process that moves the robot waits for them.
+//! They publish nothing that says they live, so nobody checks whether they hang: a robot that is
+//! driven through them stops then, any other goes on.
 
 use std::fs;
 use std::net::TcpListener;
