@@ -1,9 +1,8 @@
 //! How a service that acts on topics waits for them.
 //!
 //! A wake is a hint. It says which topics were rung for, and the service drains those. At every
-//! sixteenth wake and at every time-out the waiter asks the service to drain all its topics.
-//! Services choose a time-out of at most 20 ms, so a ring that was lost delays a sample by no more
-//! than that.
+//! sixteenth wake and at every time-out it drains all its topics. The services' time-outs are at
+//! most 20 ms, so in silence all topics are drained at least every 20 ms.
 //!
 //! A waiter that looks without pause yields its core every 4 us. The ring may depend on a thread
 //! that waits for that core, such as the kernel thread that delivers a serial port's bytes; without

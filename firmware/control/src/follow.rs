@@ -7,8 +7,10 @@
 //!      '-------------------------------> lost: tape
 //! ```
 //!
-//! Both states last until the next command: a robot that has lost its line and stands does not start again
-//! by itself because something dark is pushed under its sensors, or a loose plug touches.
+//! Both states last until the next command: a robot that has lost its line and stands does not
+//! start again by itself because something dark is pushed under its sensors, or a loose plug
+//! touches. The board reports the command as aborted by its failsafe, the bridge ends the order as
+//! `no-word` or `no-tape`, and only a new order follows again.
 //!
 //! The longest legal way without tape is the Pi's to judge, which knows where the robot is: it stands 80 mm
 //! after the line was last seen, and drives 40 mm past the bar of the delivery. A board knows no millimetres

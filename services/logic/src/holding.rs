@@ -8,9 +8,10 @@
 //!   no line frame for 120 ms --> Blind ------ a line frame ----------------------------------->
 //! ```
 //!
-//! It is apart from the phases because any of them can be held, and goes on where it was. A hold
-//! never begins in the middle of anything but a lost report or frame: the others wait until the
-//! robot stands anyway, or is at a node.
+//! It is apart from the phases because any of them can be held, and goes on where it was. Without
+//! reports the robot stands because every limit counts the odometer's millimetres. A hold never
+//! begins in the middle of anything but a lost report or frame: the others wait until the robot
+//! stands anyway, or is at a node.
 
 use core::time::Duration;
 

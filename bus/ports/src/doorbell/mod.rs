@@ -1,10 +1,10 @@
 //! How one thread wakes another, in its own process or not: a board of bells in shared memory.
 //!
 //! It takes the place of iceoryx2's events. Each waiter has a seat on the board of its robot: one
-//! futex word in shared memory, on which it sleeps for all its topics at once. A publisher adds 1
-//! to the word of each role that acts on its topic, and makes a system call only where the word
-//! says that its owner sleeps. Observers have no seat and cost a ringer nothing. There is nothing
-//! to connect: a waiter that starts late, restarts or replaces a killed one is rung by the next
+//! futex word in shared memory, on which it sleeps for all its topics at once. A publisher adds to
+//! the words of the roles that act on its topic, and makes a system call only where a word says
+//! that its owner sleeps. Observers have no seat and cost a ringer nothing. There is nothing to
+//! connect: a waiter that starts late, restarts or replaces a killed one is rung by the next
 //! sample.
 //!
 //! | file | what it is |

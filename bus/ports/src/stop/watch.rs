@@ -1,6 +1,6 @@
 //! The thread that watches the stop word's file, so that the bridge's main loop needs no system
-//! call for it: it sleeps until somebody writes to the file, removes it or puts another in its
-//! place, mends what has to be mended, and rings.
+//! call for it. It sleeps until the file is written to, removed, replaced or cut short, mends what
+//! has to be mended, and rings. A file that is removed, replaced or cut short stops the robot.
 //!
 //! Watched are the file, its folder, and the folder above, which may be moved. Where the kernel
 //! has no watch to give, the thread looks every 20 ms.

@@ -1,8 +1,9 @@
 //! The state on its way out to `nav/status`, and back into a navigator after a restart.
 //!
 //! What is not in the status is either told again by others (map, mode), or begins anew without
-//! harm (which line state was seen last, how long the robot has stood). The ways that are blocked
-//! and the orders that wait are published beside it.
+//! harm (which line state was seen last, how long the robot has stood). A mark that ends before a
+//! successor has its map is judged when the map is there. The blocked ways and the waiting orders
+//! are published beside the status.
 
 use lager_topics::{BlockedWays, Hold, Mode, NavigatorStatus, Order, OrderQueue, Remedy};
 use lager_wire::{Command, WheelCommand};
