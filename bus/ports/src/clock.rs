@@ -1,9 +1,8 @@
 //! The one clock of a process.
 //!
-//! Robot time is `CLOCK_MONOTONIC` times the speed of the body, so that leases, time-outs and a
-//! simulated body agree at any speed and between processes. An emulated body cannot promise a
-//! speed: it publishes its time, and the clock follows it ([`page`]). Stamps stay in real
-//! nanoseconds.
+//! Robot time is `CLOCK_MONOTONIC` times the speed of the body, so leases, time-outs and a
+//! simulated body agree at any speed and in all processes. An emulated body cannot promise a speed:
+//! it publishes its time, and the clock follows it ([`page`]). Stamps are in real nanoseconds.
 
 mod page;
 

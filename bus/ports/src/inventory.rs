@@ -1,4 +1,4 @@
-//! Whether what living processes have of a bus can still be found by those who come.
+//! Whether new processes can still find the shared files that running processes use.
 //!
 //! A file that is removed stays with every process that has it mapped. The robot drives on and
 //! nothing fails, but no new process can see it, stop it with a tool, or take over from a service
@@ -11,8 +11,8 @@
 //! | the samples of a port (`.data`) | likewise, while the port has its tag |
 //! | what a service is (`.service`) | its list of ends is mapped, and no description has its number |
 //!
-//! A newcomer that finds no description makes another one, with a number of its own. Ports come and
-//! go at any moment, so only what two looks in a row miss is missed.
+//! A new process that finds no description makes another one, with another number. Ports come and
+//! go at any moment, so a file counts as missing only when two looks in a row miss it.
 
 use std::collections::BTreeSet;
 use std::fs::{self, DirEntry};

@@ -1,8 +1,9 @@
 //! Keeping a service's last value for its successor.
 //!
-//! A killed publisher takes its history with it. The supervisor holds a [`Keeper`] for each state
-//! a service resumes from: it remembers the last value, and when the service has died it hands
-//! the value over, with history, so that the successor reads it with [`crate::Bus::kept`].
+//! A killed publisher takes its history with it. So the attendant holds a [`Keeper`] for each state
+//! that a service resumes from. The keeper remembers the last value, and when the service has died
+//! it publishes the value with history, so that the successor can read it with
+//! [`crate::Bus::kept`].
 //!
 //! ```text
 //! supervisor, every tick:   remember(), which tries again what a hand_over() could not; sweep

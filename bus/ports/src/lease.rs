@@ -1,10 +1,10 @@
-//! Whether anybody at all has a file open: the kernel's word for it.
+//! Whether any process has a file open: the kernel answers that with a write lease.
 //!
-//! A write lease is granted on a file that nobody else has open or mapped, in whatever process,
-//! container or namespace; as long as it lasts whoever opens the file waits. So what is done under
-//! a lease is done to a file without users, and needs no guess from ages or process ids. Every file
-//! of the transport is open in the process that uses it for as long as it does, also while it is
-//! being made: what can be leased has been left behind.
+//! The kernel grants a write lease on a file only if no other process has it open or mapped, in any
+//! container or namespace; while the lease lasts, a process that opens the file waits. So a file
+//! under a lease has no users, and nothing needs to be guessed from ages or process ids. Every file
+//! of the transport is open in its process for as long as the process uses it, also while it makes
+//! the file: a file that can be leased has been left behind.
 
 #![allow(
     unsafe_code,

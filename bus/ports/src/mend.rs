@@ -1,5 +1,5 @@
-//! Mending a bus by its files alone: nothing is mapped, opened as a service or waited for, so it
-//! works when nothing answers and whatever the files hold.
+//! Mends a bus by its files alone. It maps nothing, opens nothing as a service and waits for
+//! nothing, so it works when no process answers, and whatever the files hold.
 //!
 //! | what | when it goes |
 //! |---|---|
@@ -8,9 +8,9 @@
 //! | a node's folder without the node | likewise, if it is older than a creation takes |
 //! | any segment, description or socket; a node's files; bells, locks, what `up` kept | in [`mend`], if nobody has it open |
 //!
-//! That nobody has a file open is the kernel's word ([`lease`]), so the files of living
-//! processes are left alone, also of those that are stopped, or are just making them. What a dead
-//! process has registered with living ones is for the ordinary sweep ([`sweep`](crate::sweep)).
+//! The kernel says whether a process has a file open ([`lease`]). So the files of living processes
+//! are left alone, also of processes that are stopped or are just making them. What a dead process
+//! has registered with living ones is removed by the ordinary sweep ([`sweep`](crate::sweep)).
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};

@@ -1,4 +1,4 @@
-//! Patience with processes that come, go and die while something is opened.
+//! How long opening waits for processes that come, go or die meanwhile.
 
 use core::time::Duration;
 use std::ffi::OsStr;

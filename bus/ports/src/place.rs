@@ -1,4 +1,4 @@
-//! Where a bus lives: one folder of its user, and nothing of it anywhere else but in `/dev/shm`.
+//! Where a bus lives: in one folder of its user, and in `/dev/shm`.
 //!
 //! ```text
 //!     <folder>/              0700, owned by the user who runs the robots

@@ -11,9 +11,10 @@
 //!                  spare blocks of the thread, at most SPARES
 //! ```
 //!
-//! The list is full before it is first used, and a value that does not fit into a block, or finds
-//! the list empty, is allocated as ever. So a thread allocates nothing as long as at most `SPARES`
-//! small values live in it at a time. iceoryx2's larger values are made once per port.
+//! The list is filled before it is first used. A value that does not fit into a block, or that
+//! finds the list empty, is allocated as usual. So a thread allocates nothing as long as at most
+//! `SPARES` small values live in it at a time. iceoryx2's larger values are made once for each
+//! port.
 //!
 //! **Invariants**, on which the unsafe code rests:
 //! 1. `place` points to an initialised [`Counted`] for as long as it has holders, and `holders`

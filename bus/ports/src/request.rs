@@ -1,7 +1,8 @@
-//! Asking and answering: for what must be confirmed, such as a change of mode.
+//! Requests and replies, for what must be confirmed, such as a change of mode.
 //!
-//! Both sides may be killed and restarted at any time. A question is put again to an answering
-//! process that appears while its asker waits, and is forgotten when its asker gives up.
+//! Both sides may be killed and restarted at any time. If an answering process appears while the
+//! asker waits, the question is sent to it again. When the asker gives up, the question is
+//! forgotten.
 
 use core::fmt;
 use core::marker::PhantomData;

@@ -1,4 +1,4 @@
-//! What this process or this machine has run out of: asked when something failed and the
+//! What this process or this machine has run out of. It is asked when something failed and the
 //! transport does not say why.
 
 use core::fmt;

@@ -1,11 +1,11 @@
 //! The stop word: how anybody of the robot's user stops it, without the bus.
 //!
 //! It is apart because it must work when nothing else does: when every place on the bus is taken,
-//! when its files are gone, when the bridge is frozen. Whoever stops writes eight bytes into a
-//! file with one `pwrite` and has mapped nothing, so nothing that happens to the file can hurt
-//! him. The bridge has the file's page in its memory and looks at the word before each packet that
-//! it writes ([`StopPage`]). The file outlives every process; only a resume, which the bridge
-//! carries out, clears the word.
+//! when its files are gone, when the bridge is frozen. A process that stops the robot writes eight
+//! bytes into a file with one `pwrite`. It maps nothing, so no damage to the file can end it. The
+//! bridge has the file's page in its memory and looks at the word before each packet that it writes
+//! ([`StopPage`]). The file outlives every process. Only a resume, which the bridge carries out
+//! with a compare-and-swap, clears the word.
 //!
 //! The file `stop` in the robot's folder, mode 0600, 4096 bytes, in the machine's byte order:
 //!

@@ -1,14 +1,15 @@
 //! A segment of the transport that can be opened without waiting for ever.
 //!
-//! iceoryx2's storage in POSIX shared memory waits for the creator of a segment that has no size
-//! yet, however long that takes: a process killed between `shm_open` and `ftruncate` leaves one that
-//! nobody could open, and whoever may write to a segment can make it one. It also maps what is too
-//! short for its value, and the first look at that ends the process. Here both are looked at before:
-//! what a dead creator has left is removed, a living one is waited for as long as any creation takes,
-//! and what is too short is refused.
+//! iceoryx2's storage in POSIX shared memory waits without limit for the creator of a segment that
+//! has no size yet. A process that was killed between `shm_open` and `ftruncate` leaves such a
+//! segment, and so can any process that may write to it; nobody could open it again. iceoryx2 also
+//! maps a segment that is too short for its value, and the first access then ends the process.
 //!
-//! **Invariant:** everything else is the transport's own storage; names, hashes, sizes and modes are
-//! the same, so stock processes meet ours.
+//! This storage checks both first. It removes what a dead creator has left, waits for a living
+//! creator as long as any creation takes, and refuses a segment that is too short.
+//!
+//! **Invariant:** all else is the transport's own storage. Names, hashes, sizes and modes are the
+//! same, so stock processes and ours share segments.
 
 use core::fmt::Debug;
 use core::mem::MaybeUninit;

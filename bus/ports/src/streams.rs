@@ -1,7 +1,7 @@
-//! What a reader believes of stamps: exact loss accounting, and which of two samples is newer.
+//! How a reader judges stamps: exact loss accounting, and which of two samples is newer.
 //!
-//! A stream is one publisher's life, `(writer, epoch)`, numbered from 0 without gaps. Pure, so
-//! that the laws can be tested without a bus:
+//! A stream is one life of a publisher, `(writer, epoch)`, numbered from 0 without gaps. This file
+//! is pure, so that its laws can be tested without a bus:
 //!
 //! - **received + lost = sent**, once a stream's last sample has been received, for every stream
 //!   that began after its reader attached. Of a stream that was there before, the reader counts

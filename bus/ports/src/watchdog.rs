@@ -1,10 +1,10 @@
 //! A watch over calls into the bus, which may never return.
 //!
-//! The transport waits without a time-out for a shared-memory segment to get its size; a process
-//! that is killed or frozen in between leaves one that never does, and whoever opens it hangs.
-//! Services have a supervisor for that. A tool has this: a thread of its own, which touches
+//! The transport waits without a time-out for a shared-memory segment to get its size. A process
+//! that is killed or frozen in between leaves a segment that never does, and a process that opens
+//! it hangs. Services have a supervisor for that; a tool has this watchdog. Its own thread touches
 //! nothing of the bus, counts how long a call takes and says when it has taken too long. It also
-//! sees to it that one wish to stop is enough, whatever the tool's other threads are in.
+//! makes one wish to stop enough, whatever the tool's other threads are doing.
 //!
 //! ```text
 //!            enter                        limit is over

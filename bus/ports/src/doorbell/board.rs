@@ -8,11 +8,11 @@
 //!     384 seat 1     …                                             32 seats of 128 bytes
 //! ```
 //!
-//! A seat has 128 bytes, since processors fetch lines in pairs and a neighbour's rings must not
-//! disturb one that is spinning.
+//! A seat has 128 bytes because processors fetch cache lines in pairs: a ring of a neighbour must
+//! not disturb a waiter that spins.
 //!
-//! **Invariant:** nothing here asks the system; who may write what is decided by the locks of
-//! `segment.rs`. A seat's callers, spinner bit and occupant are written only by who holds its lock.
+//! **Invariant:** nothing here makes a system call. The locks of `segment.rs` decide who may write
+//! what: only the holder of a seat's lock writes its callers, its spinner bit and its occupant.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 

@@ -1,7 +1,7 @@
 //! A seat in shared memory: its word is an atomic that the kernel can put a process to sleep on.
 //!
-//! Apart from the protocol, which knows of no kernel. The futex is a shared one, found by its page
-//! in memory, so ringer and waiter need nothing in common but the mapping.
+//! It is apart from the protocol, which knows no kernel. The futex is a shared one: the kernel
+//! finds it by its page in memory, so ringer and waiter share only the mapping.
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;

@@ -16,8 +16,8 @@
 //! | `pace` | when looking without pause is worth it |
 //! | `standard` | listeners of plain iceoryx2, which know nothing of boards |
 //!
-//! **Invariant:** a ring is a hint, and so are its reasons, which topics it was for; whoever waits has
-//! a time-out and looks at everything now and then. Ringing and waiting do not allocate.
+//! **Invariant:** a ring is a hint, and so are its reasons (the topics it was for). A waiter has a
+//! time-out and looks at everything now and then. Ringing and waiting do not allocate.
 
 mod board;
 mod futex;

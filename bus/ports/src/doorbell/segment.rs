@@ -7,10 +7,11 @@
 //!     2+n  seat n    exclusively, by the bus whose waiter sits there
 //! ```
 //!
-//! The kernel drops all of them when a process dies, so what a killed one has left is known by a
-//! lock that can be had: its seats are cleared by whoever sweeps or needs one, and a board without
-//! presence is removed. Joining and leaving exclude each other by the door, so of two that leave at
-//! once the second knows that it is the last, and nobody joins a board that is being removed.
+//! The kernel drops all of them when a process dies. So a lock that can be taken shows what a
+//! killed process has left: a sweep, or a process that needs a seat, clears its seats, and a board
+//! without presence is removed. The door excludes joining and leaving at the same time: of two
+//! processes that leave at once the second knows that it is the last, and no process joins a board
+//! that is being removed.
 //!
 //! The file is `bells` in the robot's folder ([`Place`]).
 
@@ -79,7 +80,8 @@ pub(crate) struct Segment {
     file: File,
     path: PathBuf,
     board: Mapping,
-    /// The seats whose locks this holds, as bits: asking the kernel for them would only say yes.
+    /// The seats whose locks this process holds, as bits. The kernel would grant their locks again,
+    /// since the same open file already has them, so they must be remembered here.
     own: Mutex<u32>,
 }
 

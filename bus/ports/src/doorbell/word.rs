@@ -13,15 +13,17 @@
 //! ```
 //!
 //! One waiter, any number of ringers. A ring and the decision to sleep are read-modify-writes of
-//! the same word, so one of the two comes first: either the waiter finds the ring and does not
-//! sleep, or the ringer finds `S` and wakes. Only the waiter clears `S`: a ringer that is killed
-//! between its addition and its wake leaves `S` standing, and the next one wakes.
+//! the same word, so one of them comes first: either the waiter finds the ring and does not sleep,
+//! or the ringer finds `S` and wakes the waiter. Only the waiter clears `S`: a ringer that is
+//! killed between its addition and its wake leaves `S` set, and the next ringer wakes the waiter.
 //!
-//! The reasons tell what is worth looking at. Whoever takes one sees what was written before it was
-//! set; it is a byte, so that setting it is a plain store into a line that the addition needs in any
-//! case. A ringer killed before its addition leaves a reason that the next wake finds.
+//! The reasons tell which topics to look at. A waiter that takes a reason sees all that was written
+//! before the reason was set. A reason is a byte, so setting it is a plain store into the cache
+//! line that the addition needs anyway. A ringer that is killed before its addition leaves a reason
+//! that the next wake finds.
 //!
-//! Apart and generic, so that `model.rs` can run this very source under every interleaving.
+//! It is generic over the atomics, so that `model.rs` can run this very source under every
+//! interleaving.
 //!
 //! **Invariant:** `S` is set only by the one waiter of the word and only while it is in
 //! [`Sleeper::sleep`]. A waiter that does not look for 2^31 rings may miss them all.

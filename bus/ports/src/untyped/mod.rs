@@ -1,13 +1,12 @@
 //! The transport's ports without their payload's type, compiled here and nowhere else.
 //!
-//! iceoryx2 is generic over its service type, and what is generic is compiled again by every crate
-//! that uses it: some six thousand functions each time, for a port of any type. So the typed ports
-//! hold one of these, which knows its payload by size and alignment only, and nothing of the
-//! transport is left in what they hand on, not even how to drop it ([`Here`]).
+//! iceoryx2 is generic over its service type, and every crate that uses generic code compiles it
+//! again: some six thousand functions, for a port of any type. So a typed port holds one of these,
+//! which knows its payload by size and alignment only, as iceoryx2's bindings for other languages
+//! do. What it hands on contains nothing of the transport, not even its drop code ([`Here`]).
 //!
-//! The services are the typed ones to everybody else: name, size and alignment of payload and header
-//! are the same, and a typed process of plain iceoryx2 is at the other end of them
-//! (tests/bus/interop.rs).
+//! To other processes the services look typed: name, size and alignment of payload and header are
+//! the same, and a typed port of plain iceoryx2 may be at the other end (tests/bus/interop.rs).
 //!
 //! **Invariant:** a payload's address is only ever read or written as the type whose [`Kind`] or
 //! [`Question`] the port was made with.
