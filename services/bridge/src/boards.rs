@@ -1,4 +1,4 @@
-//! What is known of the two boards, in the form in which `link/health` shows it.
+//! What the bridge knows of the two boards, in the form in which `link/health` shows it.
 //!
 //! It is apart from the main loop because it outlives links and ports: a board keeps its counts
 //! of restarts, epochs and losses when it changes its port or the bridge is restarted.

@@ -1,8 +1,8 @@
 //! How long frames take to become commands: what `latency/path` shows.
 //!
-//! It is pure and apart from the main loop because what counts has to be proven: it takes stamps
-//! and moments as arguments and reads no clock. The histograms are made once; taking up, measuring
-//! and telling do not allocate.
+//! It is pure and apart from the main loop, because it has to be proven which frames count: it
+//! takes stamps and moments as arguments and reads no clock. The histograms are made once; taking
+//! up, measuring and publishing do not allocate.
 //!
 //! ```text
 //!   begin(order in force, its stamp)          written: measured

@@ -1,7 +1,7 @@
 //! Presses of the switch: each one counts once, however often and however late its sample comes.
 //!
-//! A press toggles the mode, so a repeated one would undo itself. Pure; it goes on where an
-//! earlier life of the bridge ended.
+//! A press toggles the mode, so a repeated press would undo itself. This file is pure, and a new
+//! bridge goes on where the one before ended.
 
 use lager_topics::Health;
 

@@ -2,9 +2,8 @@
 //! the rest to the main loop.
 //!
 //! It is apart so that a sensor packet goes from the port to the bus without a second thread: one
-//! `read`, the decoder, one loaned sample. It never writes to the port; what has to be answered
-//! it asks the main loop to send. After start-up of a link it does not allocate, and it holds no
-//! lock.
+//! `read`, the decoder, one loaned sample. It never writes to the port; it asks the main loop to
+//! send an answer. Once a link is up it allocates nothing and holds no lock.
 //!
 //! ```text
 //!          open                  gone (unplugged, hung up)

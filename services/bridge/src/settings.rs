@@ -1,7 +1,7 @@
 //! Settings on their way to the boards: sent until the board answers, and sent again to a board
 //! that has restarted and forgotten them.
 //!
-//! It is pure and apart from the main loop because it has time in it: tries, answers that fit no
+//! It is pure and apart from the main loop because it deals with time: tries, answers that fit no
 //! question, boards that come back. It knows nothing of ports and requests.
 
 use core::time::Duration;

@@ -10,8 +10,9 @@
 //!                          └─────────────────────┘
 //! ```
 //!
-//! Nothing here ends a setpoint in time: that nobody renews it does, 120 ms later, in the bridge.
-//! Whoever was held up for as long has lost it, and does not take it up again.
+//! Nothing here ends a setpoint in time. A setpoint that is not renewed ends in the bridge, 120 ms
+//! later. If comm was held up for that long, the setpoint is over, and comm does not take it up
+//! again.
 
 use core::time::Duration;
 

@@ -5,8 +5,9 @@
 //!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, each ± a quarter ──> connecting
 //! ```
 //!
-//! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing is
-//! the other thread's, which never waits: what the peer does not take stays with [`Link`], bounded.
+//! What it reads goes through a bounded channel to the thread of the bus, and rings that thread.
+//! The other thread writes, and never waits: what the peer does not take stays in [`Link`], whose
+//! size is bounded.
 
 use std::io;
 use std::net::{Shutdown as Direction, TcpStream, ToSocketAddrs};

@@ -1,9 +1,9 @@
 //! The conversation's shell between the socket and the bus: it carries lines and samples and decides
 //! nothing.
 //!
-//! **Safe state**: silence. When this process ends, however it ends, nobody renews the command that
-//! it gave, and the bridge brings the robot to rest when the lease is over, 120 ms later. What logic
-//! was ordered it goes on with.
+//! **Safe state**: silence. When this process ends, for whatever reason, its command is no longer
+//! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with
+//! its orders.
 
 use core::time::Duration;
 use std::path::PathBuf;

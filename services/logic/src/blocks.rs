@@ -1,9 +1,9 @@
-//! What blocks ways at run time: which way, since when, and who says so. The floor below it never
-//! changes ([`crate::map`]); what is blocked is never part of the published map.
+//! What blocks ways at run time: which way, since when, and who says so. The map never changes
+//! ([`crate::map`]), and a block is never part of the published map.
 //!
-//! It is told what is blocked and asked what is open. It never senses anything, and forgets only
-//! what it is told to, or, where there are more blocks than places, the oldest of those that the robot
-//! has found by itself.
+//! It is told what is blocked and asked what is open. It senses nothing. It forgets a block only
+//! when it is told to, or, when its places are full, the oldest block that the robot has found by
+//! itself.
 
 use core::time::Duration;
 

@@ -1,7 +1,7 @@
 //! Whether somebody has driven the robot by hand since the navigator was last sure of its place.
 //!
-//! The bridge sums what the wheels turn in manual mode, over all lives of both services, so that
-//! a navigator that was not there finds out as well. This only compares and converts.
+//! The bridge sums what the wheels turn in manual mode, over all lives of both services, so that a
+//! navigator that was not running then finds out as well. This file only compares and converts.
 
 use lager_topics::NavigatorStatus;
 

@@ -1,7 +1,7 @@
 //! The one steering order the navigator wants to be in force, with the id that makes it execute.
 //!
-//! The same id renews, a new id executes: so a changed command, and one that has to be given
-//! again, gets the next id, and everything else keeps the one it has. It knows nothing of maps.
+//! The same id renews an order, a new id executes it. So a changed command, and one that has to be
+//! given again, gets the next id; every other order keeps its id. This file knows nothing of maps.
 
 use core::time::Duration;
 

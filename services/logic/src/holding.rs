@@ -1,5 +1,5 @@
-//! Standing although the phase would turn the wheels: the steering board is unheard, the arm is
-//! not where goods are carried, or the battery is low.
+//! Why the robot stands although its phase would turn the wheels: the steering board is unheard,
+//! the arm is not in the carry pose, the battery is low, or no line frames come.
 //!
 //! ```text
 //!   no report for 200 ms ------> Unheard ---- a report; a turn that was under way is judged --->

@@ -1,8 +1,8 @@
 //! Marks on the floor: from single line states to one mark with its sides, judged once.
 //!
-//! The sensors take about 200 ms to cross a tape. Seen at an angle a crossing shows one side
-//! first, frames get lost, and noise shows a mark that is none. So sides are counted while a mark
-//! lasts, and the mark is given out when it has ended:
+//! The sensors take about 200 ms to cross a tape. At an angle, a crossing first shows one side;
+//! frames get lost; and noise shows marks that do not exist. So the sides are counted while a mark
+//! lasts, and the mark is reported when it has ended:
 //!
 //! ```text
 //!  OnLine OnLine StationToLeft FourWay FourWay StationToRight OnLine

@@ -1,11 +1,11 @@
 //! Dead reckoning from the steering board's reports: how far the axle has come and how far the
 //! robot has turned.
 //!
-//! Speed is taken as proportional to duty. That is wrong by ten per cent and more, so every judged
-//! mark sets the way anew and teaches how fast these wheels really are: half of what was missing on
-//! the way between two marks is believed. A successor learns it anew. This is only the bridge
-//! between two marks. It never guesses beyond the reports: what the board did not confirm lately
-//! counts as standing still, because a board that is silent stops by itself.
+//! Speed is taken as proportional to duty. That is wrong by ten per cent and more. So every judged
+//! mark corrects the way and teaches how fast these wheels really are: half of what was missing on
+//! the way between two marks is taken over. A successor learns it again. Dead reckoning only fills
+//! the gap between two marks. It never extrapolates beyond the reports: without a recent report the
+//! wheels count as standing still, because a board that is silent stops by itself.
 
 use core::time::Duration;
 

@@ -1,9 +1,9 @@
 //! The orders that wait for their turn (F3): in the order given, unless a person moves one up or
 //! takes one back.
 //!
-//! It keeps them and nothing else: whose turn it is, and who can be reached, is the mission's
-//! question. An order that was under way and has to wait comes back to the first place, and for it
-//! one place is always kept.
+//! It only keeps the orders. The mission decides whose turn it is and which station can be reached.
+//! An order that was under way and has to wait goes back to the first place; one place is always
+//! kept free for it.
 
 use lager_topics::{Order, OrderQueue, WaitingOrder};
 

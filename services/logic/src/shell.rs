@@ -1,18 +1,19 @@
 //! The navigator's shell on the bus: it carries samples in and out and decides nothing.
 //!
-//! One turn: wait, drain what has been rung for, hand each sample to the navigator, and send what
-//! changed at once: events first, then the blocked ways, the queue and the status, then the order,
-//! and what nobody acts upon last. Killed between any two of the first five, the successor knows at
-//! least as much as the bridge; an event can come twice, never not at all. Only a setpoint in place of a
-//! setpoint goes before the status, since giving it twice is giving it once; its number, which the
-//! successor may not know, is left out when a status is taken up. An unchanged order is renewed
-//! every 40 ms of robot time.
+//! One turn: wait, drain the topics that were rung for, hand each sample to the navigator, and send
+//! at once what changed. Events go out first, then the blocked ways, the queue and the status, then
+//! the order; what no service acts upon goes last. If the process is killed between any two of the
+//! first five, its successor knows at least as much as the bridge: an event may come twice, but is
+//! never lost. Only a setpoint that replaces a setpoint goes out before the status, because giving
+//! it twice has the effect of giving it once. The successor may not know its number, so it leaves
+//! one number out when it takes up a status. An unchanged order is renewed every 40 ms of robot
+//! time.
 //!
 //! A turn takes one decision for each sample and, only if there was none, one for the time that
 //! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`).
 //!
-//! **Safe state**: silence. When this process ends, however it ends, nobody renews the order in
-//! force; the bridge brings the robot to rest when the lease is over, 120 ms later.
+//! **Safe state**: silence. When this process ends, for whatever reason, the order in force is no
+//! longer renewed, and the bridge stops the robot when the lease is over, 120 ms later.
 
 use core::time::Duration;
 

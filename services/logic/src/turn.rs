@@ -1,4 +1,4 @@
-//! What a turn that has ended amounts to.
+//! How many quarters a turn that has ended has turned.
 //!
 //! The steering board turns by time and ends early when the tape comes under its centre sensors
 //! (AMB-22), so "done" alone does not say where the robot looks: a cross bar, a spot of dirt or an
@@ -10,8 +10,8 @@
 //!   | fragment | by line | one quarter     | by line   | two quarters
 //! ```
 //!
-//! Two quarters come of one turn when there was no tape at the first, and when an interrupted
-//! turn is given again.
+//! One turn makes two quarters when there was no tape at the first, or when an interrupted turn is
+//! given again.
 
 use lager_wire::LineState;
 

@@ -11,11 +11,11 @@
 //!   epoch                  1           1
 //! ```
 //!
-//! Nothing here knows a topic; what a sample means is said by [`crate::sentence`]. Order, names and
-//! kinds of the fields are the table's; a unit is what a field's name ends with; a value that is the
-//! payload's stated blank value is not known and shown as `-`. Enums are words, fields of the same
-//! make stand beside each other. Numbers are exact but for floating-point ones, which have three
-//! decimals; programs take the JSON.
+//! Nothing here knows a topic; [`crate::sentence`] says what a sample means. The table gives order,
+//! names and kinds of the fields, and the end of a field's name is its unit. A value that equals
+//! the payload's blank value is unknown and shown as `-`. Enums are words, and fields of the same
+//! structure stand beside each other. Numbers are exact, except for floating-point ones, which have
+//! three decimals; programs take the JSON.
 
 use std::fmt::Write;
 

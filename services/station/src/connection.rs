@@ -1,7 +1,7 @@
 //! One connection: bytes to lines and lines to bytes, without ever waiting for its peer.
 //!
-//! What is kept of a peer is bounded: one line that it has not ended, and [`MOST_UNREAD`] bytes
-//! that it has not read. Whoever is slower than that is closed, see [`Connection::overdue`].
+//! The memory for a peer is bounded: one line that it has not ended, and [`MOST_UNREAD`] bytes that
+//! it has not read. A connection that is slower than that is closed, see [`Connection::overdue`].
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;

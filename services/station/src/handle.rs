@@ -1,6 +1,7 @@
 //! What other threads see of the station and do with it.
 //!
-//! The station is behind one lock that nobody holds while he waits for a peer or for the disk.
+//! The station is behind one lock. No thread holds the lock while it waits for a peer or for the
+//! disk.
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;

@@ -1,4 +1,4 @@
-//! The external computer: what it answers robots and a GaG, and the warehouse it keeps.
+//! The external computer: it answers the robots and a GaG, and keeps the warehouse.
 //!
 //! ```text
 //!   robots ── TCP ──┐                     ┌── unix socket ── somebody's GaG
@@ -14,9 +14,9 @@
 //! - [`Warehouse`]: squares, delivery and goods, as they lie in a file that is saved atomically.
 //! - [`Queues`]: what waits to be fetched by each robot, in a file beside it.
 //! - [`Server`]: the sockets, in one thread that waits for all of them.
-//! - [`Handle`]: what another thread sees of the station and does with it.
+//! - [`Handle`]: through it another thread reads and changes the station.
 //!
-//! It never joins a robot's bus: whatever it knows, robots have told it.
+//! It never joins a robot's bus. It knows only what robots have told it.
 
 #![forbid(unsafe_code)]
 

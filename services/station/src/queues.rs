@@ -6,8 +6,8 @@
 //! r2 = [7]
 //! ```
 //!
-//! It is saved after robots have been told: a product that a robot was told at the last moment may
-//! stand here still and is then told again, but none is lost.
+//! It is saved after robots have been told. So a product that a robot was told at the last moment
+//! may still be in the file and be told again, but none is lost.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;

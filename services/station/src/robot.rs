@@ -10,7 +10,7 @@
 //!  armcomm                   with pickup_done, once a person has said so and no command waits
 //! ```
 //!
-//! - One question is held; a new one takes its place, and nothing is said to the old one any more.
+//! - One question is held. A new question takes its place, and the old one is never answered.
 //! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
 //!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. When the robot asks
 //!   for something else, or its connection ends, they are dropped: nobody's old command moves it
@@ -21,8 +21,7 @@
 //! - While a GaG speaks for the robot only commands are answered from here, those that were given
 //!   besides the GaG's: a stop above all.
 //!
-//! Time is no part of it: how long a robot has not been heard is the matter of who carries the
-//! lines.
+//! Time plays no part here: the code that carries the lines knows how long a robot has been silent.
 
 use std::collections::VecDeque;
 

@@ -6,13 +6,13 @@
 //!   anything else of a robot          robot-1, robot-2 ..., the first that is free
 //! ```
 //!
-//! - A name has one connection, the newest: one before it is closed, since a robot that comes back
-//!   may have left one behind of which nobody here has heard the end.
-//! - A line that nobody could have said closes its connection; nothing of it has counted.
+//! - A name has one connection, the newest: the one before is closed, because a robot that comes
+//!   back may have left a connection whose end this station has not noticed.
+//! - A line that breaks the grammar closes its connection; no part of it counts.
 //! - A GaG's language has no names of robots, so it speaks for one: the one that has been connected
 //!   for longest. The others are answered from the warehouse and their queues.
-//! - What a GaG answers is checked as a file is. What cannot be is told it in a `thought`, and it is
-//!   asked again. What it says of the warehouse becomes the station's warehouse.
+//! - A GaG's answers are checked as a file is. The station refuses an impossible answer in a
+//!   `thought` and asks again. It takes over what a GaG says of the warehouse.
 //!
 //! It is pure: lines and wishes in, [`Output`]s out, in the order in which they came about.
 

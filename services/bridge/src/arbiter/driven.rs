@@ -1,7 +1,7 @@
-//! What the wheels turn while a person drives, for whoever must know whether the robot stands
-//! where it stood.
+//! How far the wheels turn while a person drives, for services that must know whether the robot
+//! still stands where it stood.
 //!
-//! Apart from the arbiter because it only counts: nothing is decided by it. It is in the bridge
+//! It is apart from the arbiter because it only counts and decides nothing. It is in the bridge
 //! because the bridge sees every report and outlives the services that want to know.
 
 use core::time::Duration;

@@ -1,7 +1,8 @@
-//! How orders end: by their lease, by the board's word, by a stop or a change of the mode.
+//! How orders end: when their lease lapses, when the board reports it, by a stop or by a change of
+//! mode.
 //!
-//! Apart from the judgement of orders because an end needs nobody's word. What is written to a
-//! board afterwards is the wire's side.
+//! It is apart from the judgement of orders because no origin has to ask for an end. What is
+//! written to the board afterwards is `wire.rs`'s task.
 
 use core::time::Duration;
 

@@ -1,7 +1,7 @@
-//! What outlives the arbiter: all that a successor needs, as `link/health` carries it, and what
-//! `steering/state` tells of orders.
+//! What outlives the arbiter: the state that a successor needs, as `link/health` carries it, and
+//! what `steering/state` says of orders.
 //!
-//! Apart from the arbiter because it decides nothing: what is written here is read here.
+//! It is apart from the arbiter because it decides nothing: what is written here is read here.
 
 use core::time::Duration;
 

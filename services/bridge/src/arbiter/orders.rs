@@ -1,7 +1,7 @@
-//! Whose word counts: the judgement of orders.
+//! Which orders are obeyed: the judgement of orders.
 //!
-//! Apart from the arbiter's other side, the wire: nothing here knows how a command gets to a
-//! board, only who may give it, what it replaces, and that it ends with its origin.
+//! It is apart from the arbiter's other side, the wire. It does not know how a command gets to a
+//! board, only which origin may give it, what it replaces, and that it ends with its origin.
 
 use core::time::Duration;
 

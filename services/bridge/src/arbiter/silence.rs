@@ -1,5 +1,5 @@
-//! Nobody drives unseen: what follows when the steering board does not report, is not there, or is
-//! one that must not be driven.
+//! No order moves the robot unseen: what the arbiter does when the steering board does not report,
+//! is absent, or is one that must not be driven.
 //!
 //! ```text
 //!            report                     200 ms without a report

@@ -1,6 +1,6 @@
 //! What the arbiter says about an order.
 //!
-//! Apart from the arbiter so that it stands in one place; it holds no logic.
+//! It is apart from the arbiter so that the answers stand in one place; it holds no logic.
 
 use lager_topics::{Finish, Refusal};
 

@@ -1,6 +1,7 @@
 //! What the bridge's core wants done, one thing at a time.
 //!
-//! Apart from the core, because whoever carries the actions out needs nothing else of it.
+//! It is apart from the core, because the code that carries the actions out needs nothing else of
+//! it.
 
 use lager_topics::{ArmProfileState, AskKind, Mode, StopCause};
 use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};

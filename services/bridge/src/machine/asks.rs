@@ -1,7 +1,7 @@
 //! Requests: changes of the mode, the release of a stop, and settings of the boards.
 //!
-//! It is apart because an answer may have to wait: for a board, or for the stop word. Whoever runs
-//! the core turns it meanwhile. One request is under way at a time.
+//! It is apart because an answer may have to wait: for a board, or for the stop word. The core's
+//! turns go on meanwhile. One request is under way at a time.
 
 use core::time::Duration;
 

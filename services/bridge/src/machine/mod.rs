@@ -2,8 +2,8 @@
 //!
 //! It is apart from the service so that `lager simulate` runs the very same bridge: boards that
 //! come and go, the arm's profile and the settings on their way to them, requests, the stop, and
-//! what is told when. Whoever runs it owns the ports, the bus, the stop word and the clock, and
-//! decides nothing. Nothing here allocates.
+//! what is published when. The process that runs it owns the ports, the bus, the stop word and the
+//! clock, and decides nothing. Nothing here allocates.
 //!
 //! ```text
 //!   port, order, press, ask, stop ──> what is due at once ─┐
@@ -11,9 +11,9 @@
 //!   decide, once a turn ────> health, commands, settings ──┘
 //! ```
 //!
-//! One turn: hand in all that has come and carry out what [`BridgeCore::next`] gives after each
-//! event; then [`BridgeCore::decide`], and carry out the rest. Look at the stop word before each
-//! action, and hand a stop in: then nothing is written that was decided before it.
+//! One turn: hand in all that has come, and carry out what [`BridgeCore::next`] returns after each
+//! event; then call [`BridgeCore::decide`] and carry out the rest. Look at the stop word before
+//! each action and hand a stop in. Then nothing that was decided before a stop is written after it.
 //!
 //! The order of the actions matters. `link/health` goes out before the bytes are written, so that
 //! no successor takes an order that was carried out for a new one. Only what may be said twice is

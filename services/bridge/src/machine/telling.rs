@@ -1,6 +1,6 @@
 //! What the core tells: the state of everything, and what the steering board does.
 //!
-//! It is apart because it only tells: nothing here decides.
+//! It is apart because it only publishes: nothing here decides.
 
 use core::time::Duration;
 

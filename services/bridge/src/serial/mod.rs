@@ -1,8 +1,8 @@
 //! One serial port as the boards need it: raw, 8 data bits, no parity, 1 stop bit, exclusive.
 //!
-//! It is apart so that everything the operating system can say about a port is turned into a
-//! sentence in one place. It never blocks except in [`SerialPort::read`], never allocates after
-//! opening, and knows nothing of packets.
+//! It is apart so that every error of the operating system about a port becomes a sentence in one
+//! place. It blocks only in [`SerialPort::read`], allocates nothing after opening, and knows
+//! nothing of packets.
 //!
 //! A pseudo terminal is as good as a real port: modem lines are ignored, and the driver's
 //! low-latency mode is asked for but not needed.

@@ -1,6 +1,6 @@
 //! Carrying out what the core wants: writing, publishing, and the stop word.
 //!
-//! It is apart from the turn because here is all that has an effect outside this process.
+//! It is apart from the turn because everything here has an effect outside this process.
 
 use lager_ports::{Cause, Clock, Release, Stop};
 use lager_wire::{Callsign, PACKET_LENGTH, Version};

@@ -2,10 +2,9 @@
 //! what [`BridgeCore`] gives it to do.
 //!
 //! One turn: wait, obey the stop word, take what the readers have brought, answer requests, drain
-//! all orders, let the core decide, and carry out what it wants, in its order. The stop word is
-//! looked at before each action and after the last one, so before each packet, with one load each:
-//! nothing that was decided before a stop is written after it, also when this process was frozen
-//! meanwhile.
+//! all orders, let the core decide, and carry out its actions in its order. The stop word is read
+//! before each action and after the last one, so before each packet, with one load each. So nothing
+//! that was decided before a stop is written after it, even if this process was frozen meanwhile.
 //!
 //! Nobody is woken in vain. `link/health` rings only when it changes who may move the robot, which
 //! logic must know. The order in force shows on `steering/state` with the board's next report; that

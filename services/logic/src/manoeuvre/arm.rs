@@ -7,8 +7,8 @@
 //!              +----------------- aim elsewhere, five times ---------+----------> Failed
 //! ```
 //!
-//! The robot stands while the arm works. How far it has come is published, so that a successor goes
-//! on with the same attempt; a move that may have been made is made again.
+//! The robot stands while the arm works. Its progress is published, so that a successor goes on
+//! with the same attempt; it repeats a move that may already have been made.
 
 use lager_topics::{FailureKind, Finish};
 use lager_wire::{ArmCommand, ArmProfile, Command};

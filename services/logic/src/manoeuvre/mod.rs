@@ -8,9 +8,9 @@
 //!                          +---> the command it needs now
 //! ```
 //!
-//! A manoeuvre knows the line, its marks and the odometer. It never knows what it is good for: that
-//! is the mission's. A new one is a variant here, with its arms, and a place where the mission
-//! begins it.
+//! A manoeuvre knows the line, its marks and the odometer. It does not know its purpose: only the
+//! mission does. A new manoeuvre is a variant here, with its match arms, and a place in the mission
+//! that begins it.
 
 mod arm;
 mod follow;

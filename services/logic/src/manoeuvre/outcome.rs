@@ -1,4 +1,4 @@
-//! What a manoeuvre has come to: all that the mission hears of it.
+//! How a manoeuvre has ended: all that the mission learns of it.
 
 use lager_topics::FailureKind;
 

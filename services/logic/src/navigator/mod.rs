@@ -10,10 +10,10 @@
 //! It joins three things that do not know each other: the mission (what to do next), the manoeuvre
 //! (line, marks and way) and what keeps the robot standing all the same.
 //!
-//! The state is a handful of plain values, nearly all of them in the published status, because
-//! the process may be killed at any moment and the next one must end the mission. The order in
-//! force follows from the state and is never state itself: [`Navigator::handle`] changes the
-//! state and then settles what the order must be, once.
+//! The state is a handful of plain values. Nearly all of them are in the published status, because
+//! the process may be killed at any moment and its successor must finish the mission. The order in
+//! force follows from the state and is not itself state: [`Navigator::handle`] changes the state
+//! and then computes the order, once.
 //!
 //! **Invariant:** nothing here reads a clock, allocates, or knows of the bus.
 
