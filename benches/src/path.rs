@@ -5,10 +5,10 @@
 //!                                            -> bridge's main loop -> pty -> read | t1
 //! ```
 //!
-//! Bridge and logic are the real services in processes of their own ([`robot`]); the floor is the
-//! same chain of the barest primitives ([`floor`]). Frames come at 1 kHz and each one must be
-//! answered, or the measurement ends with an error. Chains take turns within each run, and those
-//! that wait for their turn stand still (SIGSTOP).
+//! Bridge and logic are the real services in processes of their own ([`robot`]). The floor is the
+//! same chain made of bare system calls ([`floor`]). Frames come at 1 kHz and each of them must be
+//! answered, or the measurement ends with an error. The chains take turns within each run; those
+//! that wait for their turn are stopped (SIGSTOP).
 //!
 //! | `what` | row | compared with |
 //! |---|---|---|

@@ -5,17 +5,17 @@
 //!
 //! The robot's first line is `lager 1 <name>`, with the highest version that it speaks and its
 //! name. It does not wait for an answer but goes on with `sidelength`. A station that speaks the
-//! extension answers `lager 1 <name>`; from then on both use the lower of the two versions. To any
-//! other peer the robot never says another line of it, and what such a peer says to the first line
-//! is passed over.
+//! extension answers `lager 1 <name>`, and from then on both use the lower of the two versions. To
+//! any other peer the robot never sends another line of the extension, and it ignores what such a
+//! peer answers to the first line.
 //!
-//! A robot may repeat its first line at any time, and such a station answers it each time: so each
-//! side knows that the other is there. A robot that is driven by hand does so every 50 ms, and
-//! stands if nothing at all has come from the station for 150 ms.
+//! A robot may repeat its first line at any time, and a station answers it each time, so each side
+//! knows that the other is there. A robot that is driven by hand repeats it every 50 ms, and stops
+//! when nothing at all has come from the station for 150 ms.
 //!
-//! The document's questions and answers go on between the lines below, which are asynchronous in
-//! both directions: nobody waits for a line before he sends his own. The first word tells what a
-//! line is.
+//! The document's questions and answers go on between the lines below. These are asynchronous in
+//! both directions: neither side waits for a line before it sends its own. The first word tells the
+//! kind of a line.
 //!
 //! # Station to robot
 //!
@@ -47,11 +47,11 @@
 //! code 8 and 9 are turns that run once and need no renewal. A robot counts the time by its own
 //! clock from when it has read the line.
 //!
-//! **A stop has a lane of its own.** Whoever sends puts it before all lines that wait to be sent;
-//! whoever receives reads on to the end of what has arrived and carries out every stop in it before
-//! anything else. It is never queued, and commands to wheels and arm that wait are dropped (C5); the
-//! products to fetch still wait. A line whose first word is `stop` is a stop even if what follows
-//! cannot be read; then it has no number and is not confirmed. Only `resume` ends it.
+//! **A stop has a lane of its own.** The sender puts it before all lines that wait to be sent. The
+//! receiver reads to the end of what has arrived and carries out every stop in it before anything
+//! else. A stop is never queued, and drops the waiting commands to wheels and arm (C5); the
+//! products to fetch still wait. A line whose first word is `stop` is a stop even if the rest
+//! cannot be read; it then has no number and is not confirmed. Only `resume` ends a stop.
 //!
 //! # Robot to station
 //!

@@ -1,7 +1,8 @@
 //! Data that an interrupt and the main loop share.
 //!
-//! The chip has one core and its interrupts do not nest, so whoever has interrupts off is alone. Locks are
-//! held for a few cycles: the servos' UART must be served within 20 us. Queues need none.
+//! The chip has one core and its interrupts do not nest, so code that runs with interrupts off is
+//! alone. Locks are held for a few cycles, because the servos' UART must be served within 20 us.
+//! Queues need no lock.
 
 use avr_device::interrupt::{self, Mutex};
 use core::cell::UnsafeCell;

@@ -1,7 +1,8 @@
 //! What a board must offer to the code that decides.
 //!
-//! The traits stand apart so that decisions never name a pin (O7). Implementations move bits and bytes and
-//! decide nothing. No call waits for anything from outside; reading a sensor takes as long as its conversion.
+//! The traits stand apart so that decisions never name a pin (O7). Implementations move bits and
+//! bytes and decide nothing. No call waits for anything from outside; reading a sensor takes as
+//! long as its conversion.
 
 use lager_wire::ResetCause;
 

@@ -1,4 +1,4 @@
-//! Every decision the robot's two boards take, on integers, behind a board trait.
+//! Every decision of the robot's two boards, in integers, behind a board trait.
 //!
 //! ```text
 //!  Pi <== UART ==> SensorUnit --- ExDe ---> SteeringUnit <== UART ==> Pi
@@ -7,11 +7,11 @@
 //!             sensors     ranger
 //! ```
 //!
-//! The same code runs on the two ATmega1284P and, in the simulator, on the host: a chip's crate implements
-//! [`SensorBoard`] or [`SteeringBoard`] by moving bits, a simulated body implements them by arithmetic.
-//! Each unit has one entry, `step`, which takes in everything that has arrived, decides, and tells when it
-//! wants to be stepped next. Stepping more often changes nothing, stepping somewhat later delays and never
-//! confuses.
+//! The same code runs on the two ATmega1284P and, in the simulator, on the host: a chip's crate
+//! implements [`SensorBoard`] or [`SteeringBoard`] by moving bits, a simulated body implements them
+//! by arithmetic. Each unit has one entry, `step`, which takes in everything that has arrived,
+//! decides, and returns when it wants to be stepped next. An additional step changes nothing, and a
+//! late step delays the unit but does not confuse it.
 //!
 //! Nothing here reads a clock, sleeps, allocates, uses a float or touches a register. Times are wrapping
 //! microseconds in `u32` and are only ever compared over spans far below the clock's round of 71 minutes.

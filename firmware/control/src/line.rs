@@ -11,9 +11,9 @@
 //!                error: held, +-10 when the line left on that side
 //! ```
 //!
-//! A bar that is met at an angle leaves the array corner first, so its last trace is not a FourWay but tape
-//! at one edge. The end of the line is therefore remembered from a FourWay on until tape is seen that
-//! touches neither edge, which is what a line that goes on looks like:
+//! A bar that is met at an angle leaves one corner of the array first, so its last trace is not a
+//! FourWay but tape at one edge. So the reader remembers a possible end of the line from a FourWay
+//! until it sees tape that touches neither edge, which is what a line that goes on looks like:
 //!
 //! ```text
 //!               FourWay                no tape

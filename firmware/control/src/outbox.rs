@@ -1,7 +1,7 @@
 //! Packets that are encoded and wait for room in the UART's queue.
 //!
-//! An encoded packet has its number, so it may not be thrown away when the UART is full: the Pi would count
-//! it as lost. It waits here, in order.
+//! An encoded packet already has its number. If it were dropped when the UART is full, the Pi would
+//! count it as lost, so it waits here, in order.
 
 use heapless::Deque;
 use lager_wire::PACKET_LENGTH;

@@ -4,9 +4,10 @@
 //! from the sensor board; D is a difference over ten milliseconds however often words come, so that the
 //! gains mean the same at every baud rate. Words that come at another pace are scaled to it.
 //!
-//! Where the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the sign
-//! of `e`. A robot whose motors need much duty for little speed gets round the tightest bend by it;
-//! without, the error stands at its end there, and the least disturbance more loses the line.
+//! Where the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the
+//! sign of `e`. This brings a robot whose motors need much duty for little speed round the tightest
+//! bend. Without it the error stays at its limit there, and the least further disturbance loses the
+//! line.
 //!
 //! ```text
 //!   samples:   ...  e3   e2   e1   e(now)

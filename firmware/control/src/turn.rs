@@ -10,7 +10,7 @@
 //!
 //! Without words from the sensor board a turn is purely timed. With them it gets three eighths of
 //! its time more while no tape has come: motors and batteries differ, and a turn that ends before
-//! its tape ends nowhere.
+//! its tape leaves the robot without a line.
 
 use lager_wire::LineBits;
 

@@ -1,8 +1,8 @@
 //! The chips' time for everybody on this machine, in one shared page.
 //!
-//! Leases and time-outs of the robot's services count the body's time. A simulated body follows
-//! their clock; an emulated one cannot promise a speed, so they follow its. The page holds eight
-//! 64-bit words in the machine's byte order:
+//! Leases and time-outs of the robot's services count the body's time. A simulated body follows the
+//! services' clock. An emulated body cannot promise a speed, so the services follow its clock. The
+//! page holds eight 64-bit words in the machine's byte order:
 //!
 //! ```text
 //! byte  0  the letters "LAGERCLK"

@@ -1,13 +1,14 @@
 //! The service `lager attend`: what `up` needs done on the bus, and must not do itself.
 //!
-//! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file is cut off
-//! ends the process. So the supervisor stays away from the bus, and this child of it keeps each
-//! service's last state for a successor, sweeps what dead processes leave, listens whether all
-//! are heard, tells what the robot does, and plays the operator. Where there is no external computer
-//! it tells the robot its warehouse. Whatever happens
-//! to it, the supervisor starts another one; the script goes on where it was.
+//! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file was cut
+//! short ends the process. So the supervisor stays away from the bus. This child of it keeps each
+//! service's last state for a successor, sweeps what dead processes leave, listens whether every
+//! service is heard, prints what the robot does, and plays the operator. Where there is no external
+//! computer it tells the robot its warehouse. If this process fails, the supervisor starts another
+//! one, and the script goes on where it was.
 //!
-//! It decides nothing about processes: it says what it hears (`words.rs`), the supervisor acts.
+//! It decides nothing about processes: it reports what it hears (`words.rs`), and the supervisor
+//! acts.
 
 mod ears;
 

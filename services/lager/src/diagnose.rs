@@ -1,6 +1,6 @@
-//! Why a robot does not answer: what can be told of it without its bus.
+//! Why a robot does not answer, as far as that can be found out without its bus.
 //!
-//! An error of the bus says what failed. What stands here is asked after it, and before a tool
+//! An error of the bus says what failed. This file is asked after such an error, and before a tool
 //! waits for a robot that is not there.
 
 use anyhow::{Result, bail};

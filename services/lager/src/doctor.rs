@@ -1,8 +1,8 @@
 //! `lager doctor`: what is wrong with this machine, and how to mend it.
 //!
-//! Each check looks at one thing and returns a finding; nothing is changed but what `--fix` is
-//! for: what dead processes left on the bus. This process opens nothing of the bus that it could be
-//! kept waiting by.
+//! Each check looks at one thing and returns a finding. Only `--fix` changes anything: it removes
+//! what dead processes left on the bus. This process opens nothing of the bus that could make it
+//! wait.
 
 mod realtime;
 

@@ -1,9 +1,9 @@
 //! What the attendant remembers for the services: the last state each one published, handed to its
 //! successor when it has to be restarted.
 //!
-//! A service restarted with `--resume` reads the last value of its own topic; this is where that
-//! value comes from once the process that published it is gone. Each topic is served by itself: what
-//! is wrong with one is no reason for another service to stand there without its state.
+//! A service that is restarted with `--resume` reads the last value of its own topic. That value
+//! comes from here once the process that published it is gone. Each topic is served separately, so
+//! a fault on one does not leave another service without its state.
 
 use anyhow::{Context, Result};
 use lager_ports::{Bus, Keeper};

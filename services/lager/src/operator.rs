@@ -1,7 +1,7 @@
 //! The scripted operator: what a person would do at the panel, as a pure state machine.
 //!
 //! It sees only what a person sees (link health and what logic is doing) and acts only through what
-//! a person has: the mode and orders. The robot picks by itself. It is apart from `up` because
+//! a person has (the mode and orders). The robot picks by itself. It is apart from `up` because
 //! `simulate` plays the same script in virtual time.
 //!
 //! ```text
@@ -9,8 +9,8 @@
 //!                                      ^                                  |
 //!                                      +------------ delivered -----------+
 //! ```
-//! A process that takes the script over from one that was killed starts from its [`Script`] and
-//! finds its place by what logic says of the order (`Joining`).
+//! A process that takes the script over from a killed one starts from its [`Script`]. It finds its
+//! place by what logic says of the order (`Joining`).
 //!
 //! `up` plays the script on a simulated or emulated robot. Real boards move by it only where both
 //! `--script` and `--mission` are given. `--headless` means "no panel", and there is none yet.

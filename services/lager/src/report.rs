@@ -1,5 +1,5 @@
-//! What the attendant tells of the robot: a line whenever it begins something new. It reads the bus
-//! as an observer and never writes to it; `terminal.rs` shows the lines.
+//! What the attendant prints of the robot: a line whenever the robot begins something new. It reads
+//! the bus as an observer and never writes to it; `terminal.rs` shows the lines.
 
 use std::time::Duration;
 

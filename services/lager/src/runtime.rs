@@ -1,8 +1,6 @@
 //! What a running robot keeps in its folder of the bus ([`Place`]): the lock of its `up`, the
 //! effective configuration, the links to the simulated or emulated ports, an emulated body's clock
 //! and EEPROMs, and what a station of its own keeps.
-//!
-//! The folder lies with the bus, so that nobody can take a robot's name without meeting the robot.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! `lager simulate`: the whole robot in one process in virtual time.
 //!
-//! The same state machines as in the real processes are joined by function calls: no bus, no
-//! clock, no thread. The bridge is the real one but for its ports: its core, and the receiving end
-//! of each port. A run is a function of warehouse, mission and seed. It is the proof that the
-//! shells decide nothing, and the fast way to try a warehouse or a change.
+//! It joins the same state machines as the real processes by function calls: no bus, no clock, no
+//! thread. The bridge is the real one except for its ports: its core, and the receiving end of each
+//! port. A run is a function of warehouse, mission and seed. It proves that the shells decide
+//! nothing, and it is the fast way to try a warehouse or a change.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};

@@ -1,6 +1,6 @@
-//! The one-shot commands: `drive`, `arm`, `resume`, `mode`, `picked`, `reset`, `gains`,
-//! `calibrate`, and in files of their own those about orders and those that do what hands do.
-//! `stop` is apart, since it must do without the bus.
+//! The one-shot commands: `drive`, `arm`, `resume`, `mode`, `picked`, `reset`, `gains` and
+//! `calibrate`. The commands about orders and those that act like hands have their own files.
+//! `stop` is apart, because it must work without the bus.
 //!
 //! Each opens the bus as an operator, does one thing through the same [`Hands`] as `up`, waits
 //! until the robot shows the effect, and says what came of it.

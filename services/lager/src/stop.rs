@@ -1,8 +1,8 @@
 //! `lager stop`: sets the robot's stop word and says what became of it.
 //!
 //! It opens nothing of the bus, so it works when every place there is taken, when the bus's files
-//! are gone or damaged and when the bridge is frozen. What it says it has from the word's file,
-//! where the bridge answers, and from the kernel, which knows what the bridge's process does.
+//! are gone or damaged, and when the bridge is frozen. It reads the bridge's answers from the
+//! word's file, and asks the kernel what the bridge's process does.
 
 use std::fs;
 use std::path::PathBuf;

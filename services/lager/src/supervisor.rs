@@ -1,13 +1,13 @@
 //! The supervisor of the service processes: starts them, restarts them with back-off, ends them
 //! in order.
 //!
-//! It knows processes, not what they do, and never touches the bus: what to hand over before a
-//! restart, and whether a silent process hangs, is its caller's business. Children die with it. Each
-//! asks the kernel for SIGTERM at its parent's death ([`adopt`]), so even `kill -9` of the
-//! supervisor leaves no child.
+//! It knows processes, not what they do, and never touches the bus. Its caller decides what to hand
+//! over before a restart, and whether a silent process hangs. Children die with it: each asks the
+//! kernel for SIGTERM at its parent's death ([`adopt`]), so even `kill -9` of the supervisor leaves
+//! no child.
 //!
-//! A child reads its configuration from its standard input, which is memory: no file has to be
-//! there for a restart.
+//! A child reads its configuration from its standard input, which is a file in memory, so a restart
+//! needs no file on disk.
 //!
 //! A service that ends by itself at every start is given up after five times where a mission is
 //! waited for. One that was killed is always started again.

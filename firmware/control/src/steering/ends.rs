@@ -4,8 +4,8 @@
 //!   done, aborted, refused --> waiting, in order --> one report each --> told
 //! ```
 //!
-//! A report has room for one end. Two ends in one step would hide the first, so each waits for a report of
-//! its own; the last one told stands in every report until the next.
+//! A report has room for one end. Two ends in one step would hide the first, so each waits for its
+//! own report; the last reported one stands in every report until the next.
 
 use heapless::Deque;
 

@@ -6,8 +6,8 @@
 //!                                                                                        UART is idle
 //! ```
 //!
-//! A servo's state comes before the end of the command that moved it, so whoever hears of the end knows
-//! where the arm is.
+//! A servo's state is sent before the end of the command that moved it, so a Pi that learns of the
+//! end already knows where the arm is.
 
 use lager_wire::{BoardStatus, Command, Payload, SteerData, SteerFlags};
 

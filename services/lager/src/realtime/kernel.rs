@@ -1,7 +1,7 @@
 //! What is asked of the kernel for real time, and what it answers when asked what is allowed.
 //!
-//! Apart because it has this crate's only `unsafe`, and because everything here acts on the
-//! calling thread or process at once: nothing here chooses, explains or forgives.
+//! It is apart because it has this crate's only `unsafe`, and because everything here acts on the
+//! calling thread or process at once. It chooses nothing and explains nothing.
 
 #![allow(
     unsafe_code,

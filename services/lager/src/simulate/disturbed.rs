@@ -1,8 +1,8 @@
 //! Whole missions with noise on the steering board's cable in the middle of turns.
 //!
-//! What the board reports is what dead reckoning lives on: without it nobody knows how far a turn
-//! has gone. The mission must be delivered all the same. Of 1 200 that is not so in four (371, 588,
-//! 666, 1280): three stand with a lost line, because a turn ended askew, beside the tape.
+//! Dead reckoning lives on what the board reports: without reports nothing says how far a turn has
+//! gone. The mission must be delivered all the same. Four of 1 200 are not (371, 588, 666, 1280):
+//! three of them stand with a lost line, because a turn ended askew, beside the tape.
 
 use std::time::Duration;
 

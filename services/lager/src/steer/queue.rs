@@ -1,5 +1,5 @@
-//! The commands about orders: `fetch` and `queue`. What the robot has understood is read from
-//! `mission/queue`, never assumed.
+//! The commands about orders: `fetch` and `queue`. They read what the robot has understood from
+//! `mission/queue` and never assume it.
 
 use std::fmt::Write;
 use std::time::{Duration, Instant};

@@ -6,9 +6,9 @@
 //!     ^                                             │
 //!     +-- all ended, in order; what is left swept <-+ the bus is damaged (three times, then the end)
 //! ```
-//! One service that ends or falls silent is started again by itself. The bus counts as damaged where
-//! that would not help: a process that hangs before its first word, or whose memory was gone, has met
-//! shared files that the next one would meet too.
+//! A service that ends or falls silent is restarted alone. The bus counts as damaged where that
+//! would not help: a process that hangs before its first sample, or whose memory was gone, has met
+//! shared files that its successor would meet too.
 //!
 //! Every wait here is one sleep that children, signals and the attendant end ([`Supervisor::wait`]).
 
