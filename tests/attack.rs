@@ -1,7 +1,7 @@
 //! Everything a running robot shares is spoilt under it: it is up again or has ended with a reason,
-//! no tool hangs, nothing is left, and the motors do not run on. `tests/soak attack` tries every kind
-//! of file in every way, a full memory and a full disk, and kills observers by the thousand; here a
-//! part of it runs.
+//! no tool hangs, nothing is left, and the motors do not run on. `tests/soak attack` tries every
+//! kind of file in every way, a full memory and a full disk, and kills observers by the thousand;
+//! here a part of it runs.
 //!
 //! The boards are a process on a bus of their own, as real ones would be, behind a cable that knows
 //! when the bridge last spoke; so what the motors do is seen whatever becomes of the robot's bus.

@@ -213,7 +213,8 @@ fn a_comm_that_is_killed_makes_the_robot_stand_and_its_successor_asks_again() {
 #[test]
 fn a_stop_is_confirmed_and_stays() {
     let mut scene = Scene::new();
-    // A machine that is held up loses the link, which makes the robot stand as well; then once more.
+    // A machine that is held up loses the link, which makes the robot stand as well; then once
+    // more.
     let (mut robot, stopped) = loop {
         let mut robot = scene.drive(true);
         robot.says("stop 7");

@@ -74,7 +74,8 @@ fn kill(process: u32, signal: Signal) {
     kill_process(pid(process), signal).expect("a living process");
 }
 
-/// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it is.
+/// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it
+/// is.
 fn assert_only_a_stop_is_left(domain: &Domain) {
     let mut left = domain.leftovers();
     left.retain(|file| !file.ends_with("/r1/stop"));

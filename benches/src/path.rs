@@ -14,7 +14,7 @@
 //! |---|---|---|
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
-//! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; services and boards SCHED_FIFO |
+//! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
 //! | `path-stages` | each stage of `lager/block`, as the robot itself publishes it | |
 //!
 //! An observer is a process of its own on a node of its own, subscribed to `sensor/line` and

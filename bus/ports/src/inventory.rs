@@ -9,7 +9,7 @@
 //! |---|---|
 //! | a service's list of ends (`.dynamic`), a board of bells, a clock | it is mapped and removed |
 //! | the samples of a port (`.data`) | likewise, while the port has its tag |
-//! | what a service is (`.service`) | its list of ends is mapped, and no description has its number |
+//! | what a service is (`.service`) | its list of ends is mapped, but has no description |
 //!
 //! A new process that finds no description makes another one, with another number. Ports come and
 //! go at any moment, so a file counts as missing only when two looks in a row miss it.
@@ -30,8 +30,8 @@ pub struct Inventory {
 }
 
 impl Inventory {
-    /// Looks at what `processes` have of the bus at `place`; returns a file that was missed, or whose
-    /// description was, at the look before, too. A process that has ended has nothing.
+    /// Looks at what `processes` have of the bus at `place`; returns a file that was missed, or
+    /// whose description was, at the look before, too. A process that has ended has nothing.
     pub fn look(&mut self, place: &Place, processes: &[u32]) -> Option<PathBuf> {
         let (ports, services) = (ports(place), services(place));
         let mapped = processes.iter().flat_map(|pid| mapped(*pid));

@@ -3,10 +3,11 @@
 //!
 //! | what | when it goes |
 //! |---|---|
-//! | a segment that was never finished: empty, or not readable yet | at every look, if nobody has it open |
-//! | a service's description that was never finished | likewise |
+//! | an unfinished segment: empty, or not readable yet | at every look, if no process has it open |
+//! | an unfinished description of a service | likewise |
 //! | a node's folder without the node | likewise, if it is older than a creation takes |
-//! | any segment, description or socket; a node's files; bells, locks, what `up` kept | in [`mend`], if nobody has it open |
+//! | any segment, description or socket | in [`mend`], if no process has it open |
+//! | a node's files; bells, locks, what `up` kept | likewise |
 //!
 //! The kernel says whether a process has a file open ([`lease`]). So the files of living processes
 //! are left alone, also of processes that are stopped or are just making them. What a dead process

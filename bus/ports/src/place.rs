@@ -55,7 +55,8 @@ const BELOW_FOLDER: usize = 1 + TRANSPORT.len() + 2 + 1 + 39 + 6;
 /// `lager_`, eight digits, the generation, `_`.
 const PREFIX_LENGTH: usize = 16;
 
-/// A bus's generations: the first, and after it one for each letter and digit but 0, again and again.
+/// A bus's generations: the first, and after it one for each letter and digit but 0, again and
+/// again.
 const GENERATIONS: &[u8] = b"0123456789abcdefghijklmnopqrstuvwxyz";
 
 /// The longest folder, in bytes.
@@ -184,8 +185,8 @@ impl Place {
     }
 
     /// Removes everything of a damaged bus but the robots' folders, and begins its next generation,
-    /// so that `robot`, none of whose services runs, can be started on a new one. Observers lose it.
-    /// Where another robot is up nothing is removed; says whether it was.
+    /// so that `robot`, none of whose services runs, can be started on a new one. Observers lose
+    /// it. Where another robot is up nothing is removed; says whether it was.
     pub fn clear(&self, robot: &RobotName) -> bool {
         if self.up().keys().any(|other| other != robot) {
             return false;

@@ -19,9 +19,12 @@
 //! | 88 | | when |
 //! | 96 | | the word after which the steering board reported wheels at rest |
 //! | 104 | | when |
-//! | 112 | | the boards: sensor in bits 0 to 15, steering in 16 to 31; of each bit 0 = up, from bit 8 on the version of its protocol |
+//! | 112 | | the boards: sensor in bits 0 to 15, steering in 16 to 31 (1) |
 //! | 120 | | when the steering board reported last, 0 = never |
 //! | 128 | | the duties it reported: left in bits 0 to 7, right in 8 to 15 |
+//!
+//! (1) Of each board's 16 bits, bit 0 says whether it is up, and bits 8 to 15 are the version of its
+//! protocol.
 //!
 //! Every entry is an unsigned number of 64 bits, every time in microseconds of `CLOCK_MONOTONIC`.
 //! The word:

@@ -95,8 +95,8 @@ const LOOKS: u32 = 64;
 /// How long to look before yielding the core, in ns. The head of this file says why.
 const GIVE_WAY_NS: u64 = 4_000;
 
-/// Of so many wakes one is taken to be for everything: samples may come without a ring, from writers
-/// that know of none.
+/// Of so many wakes one is taken to be for everything: samples may come without a ring, from
+/// writers that know of none.
 const WAKES: u32 = 16;
 
 /// What a service that acts on topics waits on: one for all of them. It stays in the thread that
@@ -163,9 +163,9 @@ impl Waiter {
         if rung { Wake::Rung } else { Wake::TimedOut }
     }
 
-    /// Whether the topic has to be drained after a [`Waiter::wait`]: somebody has rung for it since this
-    /// was last asked, or the wait was for everything, as it is without a ring, and now and then
-    /// besides.
+    /// Whether the topic has to be drained after a [`Waiter::wait`]: somebody has rung for it since
+    /// this was last asked, or the wait was for everything, as it is without a ring, and now and
+    /// then besides.
     #[inline]
     pub fn has<T: Topic>(&self) -> bool {
         self.rung_for(doorbell::reason(T::ID))

@@ -200,7 +200,8 @@ macro_rules! topics {
 }
 
 topics! {
-    // A chip sends a line and a distance each millisecond: a quarter of a second, as with the reports.
+    // A chip sends a line and a distance each millisecond: a quarter of a second, as with the
+    // reports.
     SensorLine = "sensor/line", LineFrame,
     "The line under the robot, as the sensor board classifies it.",
     { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };

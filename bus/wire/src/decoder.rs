@@ -110,7 +110,8 @@ impl Decoder {
         }
     }
 
-    /// The same for a decoder of version 1, by name: so the original's rules take no room on the boards.
+    /// The same for a decoder of version 1, by name: so the original's rules take no room on the
+    /// boards.
     #[inline]
     pub(crate) fn push_one(&mut self, byte: u8) -> Option<Packet> {
         self.keep(byte);

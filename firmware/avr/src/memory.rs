@@ -50,8 +50,8 @@ pub unsafe extern "C" fn memmove(
         return unsafe { memcpy(to, from, length) };
     }
     if length > 0 {
-        // SAFETY: by the caller's promise both areas hold `length` bytes; a copy downwards never overwrites
-        // what it still has to read.
+        // SAFETY: by the caller's promise both areas hold `length` bytes; a copy downwards never
+        // overwrites what it still has to read.
         unsafe {
             asm!(
                 "2:",

@@ -49,7 +49,8 @@ const CENTRE: u16 = 0b000_0111_0000;
 pub struct Reading {
     /// The class the Pi is told.
     pub state: LineState,
-    /// The line's place in half sensor steps, -10..=10, positive = the line is to the right of the robot.
+    /// The line's place in half sensor steps, -10..=10, positive = the line is to the right of the
+    /// robot.
     pub error: i8,
 }
 

@@ -29,8 +29,8 @@ impl Outbox {
         self.packets.is_empty()
     }
 
-    /// Hands a packet to the UART, or puts it behind the others that wait for room there. The callers make at
-    /// most four at a time and only into an empty box.
+    /// Hands a packet to the UART, or puts it behind the others that wait for room there. The
+    /// callers make at most four at a time and only into an empty box.
     pub(crate) fn send(&mut self, board: &mut impl Board, packet: [u8; PACKET_LENGTH]) {
         if self.packets.is_empty() && board.uart_write(&packet) {
             return;

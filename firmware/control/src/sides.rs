@@ -28,8 +28,8 @@ const SETTLED: u8 = 100;
 const LEAST: u8 = 175;
 /// The most bias, in duty steps.
 const MOST: i16 = 12;
-/// For so many words the line may look like one after tape to both sides, as the bar does that is left
-/// at an angle: 150 ms.
+/// For so many words the line may look like one after tape to both sides, as the bar does that is
+/// left at an angle: 150 ms.
 const ASKEW: u8 = 30;
 /// Stands in `end` where the line has ended and no mark has come since.
 const ENDED: u8 = u8::MAX;

@@ -1,5 +1,6 @@
-//! The battery's part in the wheels' speed, taken out: a full battery drives the same duty faster
-//! than one that is nearly empty, and near the duty at which the wheels break loose much faster.
+//! Takes the battery's influence out of the wheels' speed. With the same duty a full battery drives
+//! faster than one that is nearly empty, and much faster near the duty at which the wheels break
+//! loose.
 //!
 //! `duty at the pins = duty * 11.1 V / battery`. Every duty that is decided, ordered or reported is
 //! a duty at 11.1 V, three lithium cells at rest; only the motor drivers get another one. The

@@ -23,8 +23,8 @@
 //!   was held up for [`Conversation::LONGEST_PAUSE`] may be old, so in manual mode comm closes the
 //!   connection instead. `styrcomm 1` makes the robot stand even when nothing was asked.
 //! - **A link that is lost makes the robot stand in manual mode.** A peer that speaks the extension
-//!   repeats its `lager` line whenever the robot repeats its own, every 50 ms in manual mode; 150 ms
-//!   without a word while something is carried out are a lost link. A peer that speaks only the
+//!   repeats its `lager` line whenever the robot repeats its own, every 50 ms in manual mode; 150
+//!   ms without a word while something is carried out are a lost link. A peer that speaks only the
 //!   document's language may be silent as long as it likes, so there only the end of its connection
 //!   counts, which the kernel finds some 3 s after the last sign of the peer's machine.
 //! - In autonomous mode a lost link changes nothing: the order is carried out (AMB-49 leaves it

@@ -2,7 +2,7 @@
 //! ever.
 //!
 //! ```text
-//!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, each ± a quarter ──> connecting
+//!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, ± a quarter ──> connecting
 //! ```
 //!
 //! What it reads goes through a bounded channel to the thread of the bus, and rings that thread.
@@ -36,9 +36,9 @@ const GLANCE: Duration = Duration::from_millis(20);
 const MOST_UNREAD: usize = 64 * 1024;
 /// What is read that nobody has taken yet, in pieces of at most 4 KiB.
 const PIECES: usize = 16;
-/// When the kernel begins to ask a silent peer's machine whether it is there, how often, and when it
-/// gives up. Seconds are the shortest that it counts in; a peer that speaks the extension is found
-/// silent long before.
+/// When the kernel begins to ask a silent peer's machine whether it is there, how often, and when
+/// it gives up. Seconds are the shortest that it counts in; a peer that speaks the extension is
+/// found silent long before.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 const UNCONFIRMED_MS: u32 = 3_000;
 

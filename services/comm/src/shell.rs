@@ -1,5 +1,5 @@
-//! The conversation's shell between the socket and the bus: it carries lines and samples and decides
-//! nothing.
+//! The conversation's shell between the socket and the bus: it carries lines and samples and
+//! decides nothing.
 //!
 //! **Safe state**: silence. When this process ends, for whatever reason, its command is no longer
 //! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with

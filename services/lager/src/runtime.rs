@@ -159,8 +159,8 @@ impl NameLock {
 }
 
 impl Drop for NameLock {
-    /// Leaves nothing of `up` behind after a clean stop but a stop that is set, and what boards have
-    /// written into their EEPROM.
+    /// Leaves nothing of `up` behind after a clean stop but a stop that is set, and what boards
+    /// have written into their EEPROM.
     fn drop(&mut self) {
         if self.is_held() {
             for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, WAREHOUSE] {

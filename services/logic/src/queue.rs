@@ -128,8 +128,8 @@ impl Queue {
     }
 
     /// As a predecessor published them, who may have been killed before it told what it did with
-    /// them: `known` is the order that its status tells of. Any other one that was under way by then
-    /// waits again.
+    /// them: `known` is the order that its status tells of. Any other one that was under way by
+    /// then waits again.
     pub fn from_payload(queue: &OrderQueue, known: Order) -> Self {
         let under_way = (queue.under_way != 0).then_some(Waiting {
             order: Order {

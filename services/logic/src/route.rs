@@ -8,8 +8,8 @@
 //! Only the tables are allocated, at start-up.
 //!
 //! The search queues the nodes by their distance, so a second pass in that order knows the turns of
-//! every nearer node already: leaving `n` along `h` towards `m`, the turns to come are the fewest of
-//! `m` after arriving there along `h`.
+//! every nearer node already: leaving `n` along `h` towards `m`, the turns to come are the fewest
+//! of `m` after arriving there along `h`.
 
 use lager_topics::{Heading, Route, RouteNode};
 

@@ -70,8 +70,8 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
     Ok(())
 }
 
-/// What an earlier navigator has left. Whatever stands in the way of it, without it the robot may be
-/// anywhere.
+/// What an earlier navigator has left. Whatever stands in the way of it, without it the robot may
+/// be anywhere.
 fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
     bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
         tracing::warn!("the earlier navigator's {} is lost: {error}", T::NAME);

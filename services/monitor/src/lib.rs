@@ -51,8 +51,8 @@ impl<W: Write> Tools<'_, W> {
     }
 
     /// Waits a moment for the next sample. A subscriber that cannot reach a writer for want of
-    /// something, or whose bus was cleared, hears nothing and no error, so whoever has heard nothing
-    /// asks.
+    /// something, or whose bus was cleared, hears nothing and no error, so whoever has heard
+    /// nothing asks.
     fn pause(&self, silent_since: Instant) -> Result<(), ToolError> {
         if silent_since.elapsed() >= SILENCE {
             if let Some(shortage) = Shortage::now() {

@@ -1,5 +1,5 @@
-//! The robots' queues as they lie in a file beside the warehouse's, so that orders outlive a station
-//! that was killed.
+//! The robots' queues as they lie in a file beside the warehouse's, so that orders outlive a
+//! station that was killed.
 //!
 //! ```toml
 //! r1 = [3, 1, 2]                # the next one first

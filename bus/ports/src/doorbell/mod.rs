@@ -47,8 +47,8 @@ use crate::place::Place;
 /// The reason of a ring by a thread of the waiter's own process.
 pub(crate) const INSIDE: usize = 0;
 
-/// The reason of a ring for the topic or request with the number `id`, the same in every process and
-/// build. Two may share one, and then each is looked at for the other's rings.
+/// The reason of a ring for the topic or request with the number `id`, the same in every process
+/// and build. Two may share one, and then each is looked at for the other's rings.
 pub(crate) const fn reason(id: u32) -> usize {
     1 + id as usize % (board::REASONS - 1)
 }

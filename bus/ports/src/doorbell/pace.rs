@@ -25,8 +25,8 @@ const HARD: u32 = 256;
 /// sleep and a wake.
 const MARGIN_NS: u64 = 100_000;
 
-/// How much earlier than needed a short sleep ends: waking takes time, most of all on a core that has
-/// halted.
+/// How much earlier than needed a short sleep ends: waking takes time, most of all on a core that
+/// has halted.
 const LEAD_NS: u64 = 130_000;
 
 /// A sleep shorter than this within a distance is not worth its two system calls.

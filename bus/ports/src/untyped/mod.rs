@@ -112,8 +112,8 @@ fn detail<T: TypeName>() -> TypeDetail {
 
 /// Where a payload is: behind its header of `size` bytes, at the next multiple of `align`.
 ///
-/// The transport would give it as bytes, but how many stands in shared memory, where others can write
-/// anything; so only addresses are taken from it.
+/// The transport would give it as bytes, but how many stands in shared memory, where others can
+/// write anything; so only addresses are taken from it.
 fn behind(header: NonNull<Header>, size: usize, align: usize) -> NonNull<u8> {
     let header = header.cast::<u8>();
     // SAFETY: header and payload are of one chunk, whose layout this is

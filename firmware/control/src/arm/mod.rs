@@ -1,4 +1,5 @@
-//! The arm: eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6, AMB-29..32).
+//! The arm: eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6,
+//! AMB-29..32).
 //!
 //! ```text
 //!   id   1 base   2+3 shoulder   4+5 elbow   6 wrist   7 wrist rotation   8 gripper
@@ -185,8 +186,8 @@ impl Arm {
         &self.config.profile
     }
 
-    /// Obeys another profile from now on. The caller has validated it. What moves goes on to where it was
-    /// sent; servos in service are told a new torque limit where they stand.
+    /// Obeys another profile from now on. The caller has validated it. What moves goes on to where
+    /// it was sent; servos in service are told a new torque limit where they stand.
     pub fn set_profile(&mut self, profile: ArmProfile) {
         self.torque_untold |= profile.torque_limit != self.config.profile.torque_limit;
         self.config.profile = profile;

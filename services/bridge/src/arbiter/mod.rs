@@ -250,7 +250,8 @@ impl Arbiter {
     }
 
     /// Lets time pass, once in each turn, after all that has come was handed in and before
-    /// [`Arbiter::poll`]: leases and the report's deadline end, and what the board's side waits for.
+    /// [`Arbiter::poll`]: leases and the report's deadline end, and what the board's side waits
+    /// for.
     pub fn advance(&mut self, now: Duration) {
         self.count_driven(now);
         self.watch_board(now);

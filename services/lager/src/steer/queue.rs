@@ -111,8 +111,8 @@ impl Operator {
         }
     }
 
-    /// Says one thing about the queue, once, since not all of them may be said twice, and waits until
-    /// logic shows the effect.
+    /// Says one thing about the queue, once, since not all of them may be said twice, and waits
+    /// until logic shows the effect.
     fn say_until(
         &self,
         kind: InputKind,

@@ -95,8 +95,8 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     }
 }
 
-/// A robot of this user's on this bus that is up, has a station of its own at the usual address, and
-/// drives in the same warehouse.
+/// A robot of this user's on this bus that is up, has a station of its own at the usual address,
+/// and drives in the same warehouse.
 fn neighbour(config: &Config) -> Result<Option<String>> {
     let bus = config.bus()?;
     let place = bus.place()?;

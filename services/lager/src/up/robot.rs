@@ -4,13 +4,14 @@
 //!            swept             joined the bus
 //!  attendant ------> the body ----------------> station, comm, bridge, logic
 //!     ^                                             │
-//!     +-- all ended, in order; what is left swept <-+ the bus is damaged (three times, then the end)
+//!     +-- all ended, in order; what is left swept <-+ the bus is damaged (at most three times)
 //! ```
 //! A service that ends or falls silent is restarted alone. The bus counts as damaged where that
 //! would not help: a process that hangs before its first sample, or whose memory was gone, has met
 //! shared files that its successor would meet too.
 //!
-//! Every wait here is one sleep that children, signals and the attendant end ([`Supervisor::wait`]).
+//! Every wait here is one sleep that children, signals and the attendant end
+//! ([`Supervisor::wait`]).
 
 use std::os::fd::{AsFd, OwnedFd};
 use std::process::Stdio;

@@ -21,7 +21,8 @@ use crate::arm::{ArmSeen, BASE, ELBOW, SHOULDER};
 const NEAR: i32 = 2;
 /// Steps for one joint after which something must be wrong with the arm.
 const MOST_STEPS: u16 = 400;
-/// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either side.
+/// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either
+/// side.
 const AIMS: [i16; 5] = [0, 21, -21, 42, -42];
 /// Where the claw is around goods that stand as they should, 250 mm ahead of the axle.
 const REACH_ELBOW: u16 = 488;

@@ -1,5 +1,5 @@
-//! Standing before a way and looking whether it is open, by distances that are younger than the last
-//! turn (L6).
+//! Standing before a way and looking whether it is open, by distances that are younger than the
+//! last turn (L6).
 //!
 //! ```text
 //!   none, or one from before the turn's end ---> stand and wait

@@ -52,9 +52,9 @@ pub(crate) enum Manoeuvre {
     Turn(Turn),
     /// It backs away from the cross bar, far enough to turn round.
     BackUp,
-    /// It backs up until the odometer reads so many mm: to the node that it has just left, as a turn
-    /// so near to it would end on the tape that crosses there; or away from what stands so close
-    /// behind the node that a corner of the body would touch it in the turn.
+    /// It backs up until the odometer reads so many mm: to the node that it has just left, as a
+    /// turn so near to it would end on the tape that crosses there; or away from what stands so
+    /// close behind the node that a corner of the body would touch it in the turn.
     Retreat(f32),
     /// It moves the arm.
     Arm(ArmSequence),

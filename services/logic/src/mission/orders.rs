@@ -1,4 +1,5 @@
-//! From an order to its delivery: what is taken on, what happens at the goods, and the way from there.
+//! From an order to its delivery: what is taken on, what happens at the goods, and the way from
+//! there.
 
 use lager_topics::{
     EventKind, Failure, FailureKind, Goal, Order, OrderQueue, Phase, Thought, ThoughtKind,
