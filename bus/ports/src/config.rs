@@ -69,7 +69,7 @@ impl BusConfig {
         }
         let mut config = Config::default();
         place.furnish(&mut config)?;
-        // Creating a service takes microseconds; who takes longer is dead.
+        // Creating a service takes microseconds; a process that takes longer is dead.
         config.global.creation_timeout = Duration::from_millis(500);
         // `ports` sweeps at `Bus::open` and whenever a limit is met; doing it again for each
         // service would only make opening slow.

@@ -20,7 +20,7 @@ use std::path::Path;
 /// Linux's number for the request; `libc` has none.
 const F_SETSIG: i32 = 10;
 
-/// Removes a file that nobody has open; says whether it did.
+/// Removes a file that no process has open; returns whether it did.
 pub(crate) fn remove_unused(path: &Path) -> bool {
     let Ok(file) = open(path) else {
         return false;
@@ -29,7 +29,7 @@ pub(crate) fn remove_unused(path: &Path) -> bool {
     lease(&file).is_ok() && std::fs::remove_file(path).is_ok()
 }
 
-/// Whether somebody has a file open; one that cannot be asked about counts as used.
+/// Whether a process has a file open. A file that cannot be asked about counts as used.
 pub(crate) fn is_used(path: &Path) -> bool {
     match open(path) {
         Ok(file) => lease(&file).is_err(),
@@ -37,7 +37,7 @@ pub(crate) fn is_used(path: &Path) -> bool {
     }
 }
 
-/// A segment that is being made may only be written, a finished description only be read.
+/// An unfinished segment can only be written, a finished description can only be read.
 fn open(path: &Path) -> Result<File, Error> {
     let how = |options: &mut OpenOptions| {
         // Never waits: for a lease of somebody else, or for a pipe's other end.
@@ -61,8 +61,8 @@ fn lease(file: &File) -> Result<(), Error> {
             _ => Ok(()),
         }
     };
-    // Who opens the file meanwhile makes the kernel send this instead of SIGIO, which would end the
-    // process; nobody minds this one.
+    // If a process opens the file meanwhile, the kernel sends this signal instead of SIGIO, which
+    // would end this process; this one is ignored.
     ask(F_SETSIG, libc::SIGURG)?;
     ask(libc::F_SETLEASE, libc::F_WRLCK)
 }

@@ -113,8 +113,8 @@ impl Lock {
         has_name(&self.file, &self.path)
     }
 
-    /// Names this process in the file again if somebody has written something else there: others
-    /// would find no robot. Where that fails the next call may do better.
+    /// Writes this process's id into the file again if somebody has overwritten it, because others
+    /// would find no robot. If that fails, the next call may succeed.
     pub fn renew(&self) {
         let mut there = [0; 16];
         let length = self.file.read_at(&mut there, 0).unwrap_or_default();

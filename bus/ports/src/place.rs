@@ -109,8 +109,8 @@ impl Place {
         &self.prefix
     }
 
-    /// A robot's folder, which is made if it is missing. Whoever opens a file in it hears why it
-    /// could not be made.
+    /// A robot's folder, which is made if it is missing. If it cannot be made, opening a file in it
+    /// says why.
     pub fn robot(&self, robot: &RobotName) -> PathBuf {
         let folder = self.folder_of(robot);
         let _ = make(&folder);
@@ -192,7 +192,7 @@ impl Place {
             return false;
         }
         let old = self.transport_folders();
-        // From now on everybody who comes goes to the next.
+        // From now on every new process joins the next generation.
         let _ = fs::create_dir(transport_folder(&self.folder, next(self.generation)));
         for segment in self.segments() {
             let _ = fs::remove_file(segment);
@@ -204,8 +204,8 @@ impl Place {
         true
     }
 
-    /// Removes the bus with all its files, whoever uses it: for who has made it for himself alone,
-    /// as a measurement does.
+    /// Removes the bus with all its files, even while it is used. For a process that has made the
+    /// bus for itself alone, as a measurement does.
     pub fn remove(&self) {
         for segment in self.segments() {
             let _ = fs::remove_file(segment);
@@ -218,13 +218,13 @@ impl Place {
         transport_folder(&self.folder, self.generation)
     }
 
-    /// Whether this is still the bus that whoever comes now finds.
+    /// Whether a new process would still find this bus.
     pub(crate) fn is_current(&self) -> bool {
         generation_in(&self.folder) == self.generation
     }
 
-    /// The transport's folders of all generations: whoever was on the bus before it was cleared may
-    /// have made one of an earlier one again.
+    /// The transport's folders of all generations: a process that joined the bus before it was
+    /// cleared may have made a folder of an earlier generation again.
     pub(crate) fn transport_folders(&self) -> Vec<PathBuf> {
         (0..GENERATIONS.len())
             .map(|generation| transport_folder(&self.folder, generation))
@@ -277,7 +277,7 @@ impl fmt::Display for OtherPlace {
     }
 }
 
-/// Where the robots of other users on this machine would be: for who finds none of his own.
+/// Where the robots of other users on this machine would be, for a user who finds no robot.
 pub fn other_places() -> Vec<OtherPlace> {
     let own = rustix::process::geteuid().as_raw();
     let beside = fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();

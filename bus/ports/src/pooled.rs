@@ -170,8 +170,8 @@ impl<T: fmt::Debug> fmt::Debug for Pooled<T> {
     }
 }
 
-/// iceoryx2's tests play dead processes with this: the last holder lets the value leave behind
-/// what a killed process would; another one just goes.
+/// iceoryx2's tests simulate dead processes with this: the last holder lets the value leave behind
+/// what a killed process would; any other holder just goes.
 impl<T: Abandonable> Abandonable for Pooled<T> {
     unsafe fn abandon_in_place(this: NonNull<Self>) {
         // SAFETY: the caller promises a valid `Pooled` that is its own.

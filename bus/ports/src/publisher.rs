@@ -53,8 +53,8 @@ impl<T: Topic> Publisher<T> {
         loan.send()
     }
 
-    /// Gives readers that have come since the last sample their history. Writers of states call
-    /// it regularly; it costs next to nothing when nobody has come.
+    /// Gives readers that have come since the last sample their history. Writers of states call it
+    /// regularly; it costs next to nothing when there are no new readers.
     pub fn tick(&self) {
         self.writer.tick();
     }
@@ -114,7 +114,7 @@ pub struct Loan<'publisher, T: Topic> {
 }
 
 impl<T: Topic> Loan<'_, T> {
-    /// Says from what the sample follows; unsaid it is [`Cause::OWN`].
+    /// Sets the cause of the sample; without this it is [`Cause::OWN`].
     pub fn cause(&mut self, cause: Cause) {
         self.cause = cause;
     }
@@ -127,8 +127,8 @@ impl<T: Topic> Loan<'_, T> {
         self.deliver(Clock::monotonic_ns(), Ring::Actors)
     }
 
-    /// Sends the sample and rings nobody: actors find it when they look the next time. For what
-    /// no actor has to act upon at once, so that nobody is woken in vain.
+    /// Sends the sample without ringing: actors find it when they next look. For samples that no
+    /// actor has to act upon at once, so that no process is woken in vain.
     ///
     /// # Errors
     /// As [`Loan::send`].

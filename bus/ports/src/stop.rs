@@ -23,8 +23,8 @@
 //! | 120 | | when the steering board reported last, 0 = never |
 //! | 128 | | the duties it reported: left in bits 0 to 7, right in 8 to 15 |
 //!
-//! (1) Of each board's 16 bits, bit 0 says whether it is up, and bits 8 to 15 are the version of its
-//! protocol.
+//! (1) Of each board's 16 bits, bit 0 says whether it is up, and bits 8 to 15 are the version of
+//! its protocol.
 //!
 //! Every entry is an unsigned number of 64 bits, every time in microseconds of `CLOCK_MONOTONIC`.
 //! The word:
@@ -109,7 +109,7 @@ impl Stop {
         self.0.get()
     }
 
-    /// Why; a word that nobody can have meant is damaged.
+    /// Why; a word that no process can have written counts as damaged.
     pub fn cause(self) -> StopCause {
         let code = self.field(CAUSE);
         self.is_sound()
@@ -196,7 +196,7 @@ impl StopError {
     }
 }
 
-/// What whoever stops does with the word. The bridge has a [`StopPage`].
+/// What a process that stops the robot does with the word. The bridge has a [`StopPage`].
 #[derive(Clone, Copy, Debug)]
 pub struct StopWord;
 
@@ -214,17 +214,17 @@ impl StopWord {
         loop {
             let (file, _) = open(path).map_err(fail)?;
             put(&file, at::WORD, stop.word()).map_err(fail)?;
-            // The word is what counts, and it stands. The bridge mends what this cannot.
+            // The word counts, and it is written. The bridge mends what this process cannot.
             let _ = mend(&file);
-            // A file that was removed between opening and writing holds the word for nobody.
+            // A file that was removed between opening and writing reaches no bridge.
             if file.metadata().map_err(fail)?.nlink() > 0 {
                 return Ok(stop);
             }
         }
     }
 
-    /// Removes the file unless a stop is set in it: for who takes the robot down, when no bridge
-    /// runs any more.
+    /// Removes the file unless a stop is set in it. For the process that takes the robot down, when
+    /// no bridge runs any more.
     pub fn tidy(path: &Path) {
         let Ok(file) = File::open(path) else {
             return;
@@ -242,8 +242,8 @@ impl StopWord {
         }
     }
 
-    /// What the file at `path` tells; `None` if there is none. It is read and not mapped, so a
-    /// file that is cut short at this moment is no danger.
+    /// The contents of the file at `path`; `None` if there is none. The file is read and not
+    /// mapped, so cutting it short at this moment does no harm.
     ///
     /// # Errors
     /// There is a file, and it cannot be read.

@@ -37,7 +37,8 @@ use iceoryx2_cal::named_concept::{
 use crate::lease;
 use crate::place::SHARED_MEMORY;
 
-/// Creating a segment takes microseconds; who lives and has not given it a size by then is stopped.
+/// Creating a segment takes microseconds; a creator that lives and has not set a size by then is
+/// stopped.
 const CREATION: Duration = Duration::from_millis(50);
 
 /// The version number that the transport puts before each value.
@@ -57,8 +58,8 @@ pub(crate) struct Builder<'builder, T: Debug + Send + Sync + ZeroCopySend> {
 }
 
 impl<T: Debug + Send + Sync + ZeroCopySend> Builder<'_, T> {
-    /// Returns when the segment can be opened, or is not there, which opening will say. One that a
-    /// dead process has not finished is removed.
+    /// Returns when the segment can be opened or is absent; opening then says which. A segment that
+    /// a dead process has not finished is removed.
     fn wait_for_size(&self) -> Result<(), DynamicStorageOpenError> {
         let file = self.config.path_for(&self.name).file_name().to_string();
         let segment = OsPath::new(SHARED_MEMORY).join(file);

@@ -124,10 +124,10 @@ impl fmt::Debug for Page {
     }
 }
 
-/// Reads until nobody has written meanwhile.
+/// Reads until no writer has written meanwhile.
 ///
-/// A writer killed in the middle leaves the sequence odd until its successor starts. Then this is,
-/// at worst, the time of one update with the moment of the next.
+/// A writer that is killed in the middle leaves the sequence odd until its successor starts. At
+/// worst the result then has the time of one update and the moment of the next.
 fn whole(sequence: &AtomicU64, mut read: impl FnMut() -> Told) -> Told {
     for _ in 0..LOOKS {
         let before = sequence.load(Ordering::Acquire);

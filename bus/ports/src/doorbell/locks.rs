@@ -34,9 +34,10 @@ pub(super) fn try_lock(file: &File, byte: u64, kind: Kind) -> Result<bool, Error
     }
 }
 
-/// Unlocks a byte; that it was not locked is in order.
+/// Unlocks a byte; a byte that was not locked is fine.
 pub(super) fn unlock(file: &File, byte: u64) {
-    // Unlocking fails only without memory for the kernel's list, and then closing does it.
+    // Unlocking fails only when the kernel has no memory for its list; closing the file then
+    // unlocks.
     let _ = command(file, libc::F_OFD_SETLK, byte, libc::F_UNLCK);
 }
 

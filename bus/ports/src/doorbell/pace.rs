@@ -17,19 +17,20 @@
 //!
 //! **Invariant:** pure; the clock is an argument, in nanoseconds, and the answer is a plan.
 
-/// The streak that earns looking, at least and at most; the longest streak that is counted.
+/// The streak of rings after which looking is allowed: the least and the most that is asked for,
+/// and the longest streak that is counted.
 const EASY: u32 = 4;
 const HARD: u32 = 256;
 
-/// Added to the learnt end: a ring is late more often than early, and one that is missed costs a
-/// sleep and a wake.
+/// Added to the learnt end of a look: a ring is late more often than early, and a missed ring costs
+/// a sleep and a wake.
 const MARGIN_NS: u64 = 100_000;
 
 /// How much earlier than needed a short sleep ends: waking takes time, most of all on a core that
 /// has halted.
 const LEAD_NS: u64 = 130_000;
 
-/// A sleep shorter than this within a distance is not worth its two system calls.
+/// Within a distance, a sleep shorter than this is not worth its two system calls.
 const SHORTEST_NAP_NS: u64 = 200_000;
 
 /// What to do until the next ring. Times are absolute.
@@ -66,7 +67,7 @@ impl Pace {
         }
     }
 
-    /// Whether looking is earned.
+    /// Whether the streak is long enough to look.
     pub(crate) fn is_quick(&self) -> bool {
         self.streak >= self.needed
     }
@@ -82,8 +83,8 @@ impl Pace {
         }
     }
 
-    /// It had rung before anybody had to wait: there is no distance to learn, but the next one is
-    /// counted from now.
+    /// It had rung before the waiter began to wait: there is no distance to learn, but the next one
+    /// is counted from now.
     pub(crate) fn touched(&mut self, now_ns: u64) {
         self.last_ns = Some(now_ns);
     }

@@ -44,7 +44,7 @@ impl StandardListeners {
     #[inline]
     pub(crate) fn notify(&self) {
         if self.service.dynamic_config().number_of_listeners() > 0 {
-            // One that has died or is full needs no notice.
+            // A listener that has died or is full needs no notice.
             let _ = self.notifier.notify();
         }
     }

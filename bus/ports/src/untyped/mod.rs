@@ -112,8 +112,8 @@ fn detail<T: TypeName>() -> TypeDetail {
 
 /// Where a payload is: behind its header of `size` bytes, at the next multiple of `align`.
 ///
-/// The transport would give it as bytes, but how many stands in shared memory, where others can
-/// write anything; so only addresses are taken from it.
+/// The transport would return it as a slice, but its length stands in shared memory, where others
+/// can write anything. So only the address is taken from it.
 fn behind(header: NonNull<Header>, size: usize, align: usize) -> NonNull<u8> {
     let header = header.cast::<u8>();
     // SAFETY: header and payload are of one chunk, whose layout this is
@@ -124,7 +124,7 @@ fn behind(header: NonNull<Header>, size: usize, align: usize) -> NonNull<u8> {
     }
 }
 
-/// Something of the transport's whose end is compiled in this crate, whoever drops it.
+/// A value of the transport whose drop code is compiled in this crate, wherever it is dropped.
 pub(crate) struct Here<T: Ends>(ManuallyDrop<T>);
 
 /// How a [`Here`] ends. Implemented for each type by [`ends_here!`], since a function for any type

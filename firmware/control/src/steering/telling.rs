@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   states of servos --> ends of commands --> answers to settings --> board status --> report
-//!   '------------------- as soon as the UART takes them ----------------------------'  when the
-//!                                                                                      UART is idle
+//!   '------------------- as soon as the UART takes them ----------------------------'  when it
+//!                                                                                      is idle
 //! ```
 //!
 //! A servo's state is sent before the end of the command that moved it, so a Pi that learns of the
