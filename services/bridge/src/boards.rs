@@ -48,8 +48,8 @@ impl Boards {
         }
     }
 
-    /// A board has come up on the port at `place`. A board found before on another port has
-    /// moved: the newest handshake is the truth.
+    /// A board has come up on the port at `place`. A board that was found on another port before
+    /// has moved: the newest handshake counts.
     pub(crate) fn up(&mut self, place: usize, baud: u32, board: &BoardUp) {
         let Some(index) = index(board.up.callsign) else {
             return;

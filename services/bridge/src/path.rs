@@ -86,7 +86,8 @@ impl PathMeter {
         self.since_start += 1;
     }
 
-    /// What has not been written by now is held back for a reason of its own.
+    /// An order that has not been written by now is held back for a reason of its own, and is not
+    /// measured.
     pub(crate) fn give_up(&mut self) {
         self.under_way = None;
     }

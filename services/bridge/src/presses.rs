@@ -5,7 +5,8 @@
 
 use lager_topics::Health;
 
-/// A press that is older than this has been given up by whoever pressed, in real ns.
+/// A press that is older than this no longer counts, in real ns: the person who pressed has given
+/// it up.
 const LONGEST_NS: u64 = 1_000_000_000;
 
 /// The presses taken last.

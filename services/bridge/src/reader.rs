@@ -145,8 +145,8 @@ impl<'a> Reader<'a> {
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut listener = Listener::new(self.place);
         let mut buffer = [0; 512];
-        // When all that had come by then was read: only as of such a moment a board is silent. A
-        // reader that was kept from running finds the bytes first and then the time.
+        // When everything that had come by then was read. A board counts as silent only as of such
+        // a moment: a reader that was kept from running finds the bytes first and then the time.
         let mut heard = self.clock.now();
         while !self.stopped() {
             let mut ring = false;
@@ -214,7 +214,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Hands over what must not be lost; waits while the main loop is behind.
+    /// Hands over an event that must not be lost; waits while the main loop is behind.
     fn hand(&mut self, event: FromReader) {
         let mut event = event;
         while let Err(refused) = self.events.enqueue(event) {

@@ -35,7 +35,7 @@ pub struct Blocks {
     list: heapless::Vec<Block, MAX_BLOCKS>,
     /// For each node the blocked headings, a bit each; both ends of a way have theirs.
     closed: [u8; MAX_SIDE * MAX_SIDE],
-    /// Counts changes, so that whoever has computed with these blocks knows when they are others.
+    /// Counts changes, so that a result computed with these blocks can be recognised as outdated.
     revision: u32,
 }
 
@@ -64,7 +64,7 @@ impl Blocks {
             return false;
         }
         if self.list.is_full() {
-            // What a person has closed stays closed as long as there is anything else to forget.
+            // A person's block is forgotten only if there is no other to forget.
             let sensed = |block: &Block| block.source == BlockSource::Sensor;
             let oldest = self.list.iter().position(sensed).unwrap_or(0);
             let oldest = self.list.remove(oldest);
@@ -114,7 +114,7 @@ impl Blocks {
             .max()
     }
 
-    /// As they are published, but for what only the floor and the mission know.
+    /// As they are published, except for what only the map and the mission know.
     pub fn to_payload(&self) -> BlockedWays {
         let mut ways = BlockedWays::default();
         for (place, block) in ways.ways.iter_mut().zip(&self.list) {

@@ -41,8 +41,8 @@ impl Holding {
         self.joint_off = None;
     }
 
-    /// Stands when the steering board has not reported for too long: every limit counts the
-    /// odometer's mm, and that stands still then. Whether that begins now.
+    /// Stands when the steering board has not reported for too long. Returns whether that begins
+    /// now.
     pub(crate) fn watch_board(&mut self, now: Duration, config: &LogicConfig) -> bool {
         let heard = *self.heard.get_or_insert(now);
         if self.unheard || now.saturating_sub(heard) <= config.unheard_board {

@@ -30,7 +30,7 @@ pub enum Verdict {
     Station,
     /// The node at the end of the edge.
     Node,
-    /// Nothing the map knows of.
+    /// Nothing that is on the map.
     Unexpected,
 }
 

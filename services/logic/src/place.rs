@@ -103,7 +103,7 @@ impl Doubt {
 }
 
 impl Place {
-    /// A place nobody doubts.
+    /// A place without a doubt.
     pub(crate) fn at(node: Node, heading: Heading) -> Self {
         Self {
             node,
@@ -138,8 +138,8 @@ impl Place {
             .retain(|quarters, node| map.neighbour(node, believed.turned(Spin::Right, quarters)));
     }
 
-    /// Asks a mark which of the possible places it fits, and believes one of them if the belief
-    /// itself, on `edge`, does not fit. Whether it believes another one now.
+    /// Compares a mark with each possible place, and believes another one if the belief itself, on
+    /// `edge`, does not fit. Returns whether it believes another one now.
     pub(crate) fn ask_mark(
         &mut self,
         map: &Map,
@@ -161,7 +161,7 @@ impl Place {
             (fits > Fit::No).then_some(node)
         });
         let (_, Some((quarters, node))) = best else {
-            // A mark that fits nobody is dirt.
+            // A mark that fits no possible place is dirt.
             if best.0 > Fit::No {
                 self.doubt = fitting;
             }

@@ -41,7 +41,7 @@ impl Queue {
         self.revision
     }
 
-    /// Whether an order with this number waits; 0 is nobody's.
+    /// Whether an order with this number waits; 0 is no order's number.
     pub fn has(&self, id: u32) -> bool {
         self.place(id).is_some()
     }
@@ -127,8 +127,8 @@ impl Queue {
         queue
     }
 
-    /// As a predecessor published them, who may have been killed before it told what it did with
-    /// them: `known` is the order that its status tells of. Any other one that was under way by
+    /// As a predecessor published them. It may have been killed before it published what it did
+    /// with them: `known` is the order that its status names. Any other order that was under way
     /// then waits again.
     pub fn from_payload(queue: &OrderQueue, known: Order) -> Self {
         let under_way = (queue.under_way != 0).then_some(Waiting {

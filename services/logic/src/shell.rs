@@ -70,8 +70,8 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
     Ok(())
 }
 
-/// What an earlier navigator has left. Whatever stands in the way of it, without it the robot may
-/// be anywhere.
+/// What an earlier navigator has left. If it cannot be read, for whatever reason, the robot may be
+/// anywhere.
 fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
     bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
         tracing::warn!("the earlier navigator's {} is lost: {error}", T::NAME);
@@ -173,8 +173,8 @@ impl Shell {
     /// One turn of the loop.
     fn turn(&mut self) {
         self.wait();
-        // First who may drive and in what world, then what people want, then what the robot
-        // senses: the line last, so that its decision knows all the rest.
+        // First who may drive and in what world, then what people want, then what the robot senses.
+        // The line comes last, so that its decision knows all the rest.
         let decisions = self.decisions;
         self.take_states();
         self.take_wishes();
@@ -274,8 +274,7 @@ impl Shell {
         }
     }
 
-    /// A sample that `receive` has brought, and what is to be said of everything that follows from
-    /// it.
+    /// A sample that `receive` has returned, and the cause for everything that follows from it.
     fn next<T: Topic>(
         &mut self,
         receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
@@ -380,7 +379,8 @@ impl Shell {
         self.check(sent);
     }
 
-    /// Samples missed of the topics on which each one counts; of the others only the last does.
+    /// Samples missed on the topics on which each sample counts; of the others only the last one
+    /// does.
     fn lost(&self) -> u64 {
         self.line.lost()
             + self.distance.lost()
@@ -395,7 +395,7 @@ impl Shell {
         }
     }
 
-    /// Says what goes wrong on the bus, but not for ever.
+    /// Logs faults of the bus, but not the same one for ever.
     fn complain(&mut self, error: &dyn std::error::Error) {
         self.complaints = self.complaints.wrapping_add(1);
         if self.complaints.is_power_of_two() {

@@ -49,10 +49,10 @@ pub fn done(turned_deg: f32, seen: LineState) -> Turned {
 
 /// Judges a turn that was cut short, once the robot stands and `seen` is under its sensors.
 ///
-/// Turning again from the new tape would lead past it to the next one, so the tape counts when
-/// it is in the middle or already on the far side. Where no tape is in sight the turn goes on,
-/// whatever dead reckoning says: after several interruptions it is the less reliable of the two,
-/// and a turn given again ends on tape, at the first quarter or at the second.
+/// To turn again from the new tape would lead past it to the next one, so the tape counts when it
+/// is in the middle or already on the far side. Where no tape is in sight the turn goes on,
+/// whatever dead reckoning says: after several interruptions dead reckoning is the less reliable of
+/// the two, and a turn that is given again ends on tape, at the first quarter or at the second.
 pub fn interrupted(turned_deg: f32, spin: Spin, seen: LineState) -> Turned {
     let beyond = match spin {
         Spin::Left => LineState::LeftOfLine,

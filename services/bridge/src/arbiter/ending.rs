@@ -52,10 +52,10 @@ impl Arbiter {
         self.revision = self.revision.wrapping_add(1);
     }
 
-    /// Ends what nobody had renewed by `at`.
+    /// Ends every order that was not renewed before `at`.
     pub(super) fn expire(&mut self, at: Duration) {
         if self.grant.is_some_and(|grant| grant.lease.is_over(at)) {
-            // What the operator moved, he moved by logic's leave.
+            // The operator moved the arm by logic's grant.
             self.grant = None;
             self.lapse();
         }
@@ -70,7 +70,7 @@ impl Arbiter {
         }
     }
 
-    /// Nobody has renewed the order in force.
+    /// The order in force was not renewed.
     fn lapse(&mut self) {
         if self
             .running

@@ -4,7 +4,7 @@
 
 use core::time::Duration;
 
-/// How long an order holds after its origin's last word, in robot time.
+/// How long an order holds after its origin's last renewal, in robot time.
 pub const LEASE: Duration = Duration::from_millis(120);
 
 /// How long an order in force still holds.

@@ -21,8 +21,8 @@ pub struct OrderKey {
 pub struct Ended {
     /// Which order.
     pub key: OrderKey,
-    /// How it ended; [`Finish::None`] for a setpoint that a newer order replaced, which is
-    /// nobody's news.
+    /// How it ended; [`Finish::None`] for a setpoint that a newer order replaced, whose end is
+    /// reported to no one.
     pub finish: Finish,
 }
 

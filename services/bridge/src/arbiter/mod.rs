@@ -70,11 +70,11 @@ use ledger::Ledger;
 pub use ledger::{Ended, OrderKey};
 pub use verdict::Verdict;
 
-/// How long the steering board may be unheard before nobody may move anything, in robot time.
+/// How long the steering board may be silent before no origin may move anything, in robot time.
 pub const REPORT_DEADLINE: Duration = Duration::from_millis(200);
 
-/// Within what time of being given a person's order is begun or never, in robot time: a process
-/// that was held up for longer must not move the robot when it goes on.
+/// The time within which a person's order must begin after it was given, in robot time; later it is
+/// refused. A process that was held up for longer must not move the robot when it goes on.
 pub const STALE: Duration = Duration::from_secs(1);
 
 /// How often the command in force is written again to a version-1 board, so that its age stays
@@ -151,10 +151,10 @@ pub struct Arbiter {
     reported: Option<Duration>,
     /// The board is up and has not reported in time.
     silent: bool,
-    /// What the board has against anybody's moving, when it was last looked at.
+    /// Why the board lets no origin move anything, when it was last looked at.
     objection: Refusal,
     arm: ArmGate,
-    /// Some earlier life of this link is known, so the board knows our last sequence byte.
+    /// An earlier life of this link is known, so the board knows our last sequence byte.
     acquainted: bool,
     /// A standby to be written before anything else.
     prelude: Option<SteerCommand>,
@@ -294,7 +294,7 @@ impl Arbiter {
         self.stopped
     }
 
-    /// Why nobody may move anything at present; of the board as of the last [`Arbiter::advance`].
+    /// Why no origin may move anything now; of the board as of the last [`Arbiter::advance`].
     pub fn blocked(&self) -> Refusal {
         if self.parked {
             Refusal::ShuttingDown
@@ -321,11 +321,11 @@ impl Arbiter {
         self.last
     }
 
-    /// Grows whenever something has changed that [`Arbiter::fill`] writes, lease excepted.
+    /// Grows whenever something has changed that [`Arbiter::fill`] writes, except for the lease.
     ///
-    /// Publish before writing to the wire when it has: then a bridge that is killed between the
-    /// two finds out from the board whether the order was carried out. Only where a setpoint has
-    /// replaced a setpoint and nothing else has changed, one write may come before.
+    /// Publish before writing to the wire when it has grown: then the successor of a bridge that is
+    /// killed between the two learns from the board whether the order was carried out. Only where a
+    /// setpoint has replaced a setpoint and nothing else has changed, one write may come before.
     pub fn revision(&self) -> u32 {
         self.revision
     }

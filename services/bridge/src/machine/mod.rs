@@ -61,7 +61,7 @@ const HEALTH_PERIOD: Duration = Duration::from_millis(100);
 /// How often a shutdown writes standby at least, if there is a board.
 const PARKING_WRITES: u32 = 3;
 
-/// More than one event can say.
+/// More news than one event can bring.
 const NEWS: usize = 8;
 
 /// What the core is told at start.
@@ -171,7 +171,7 @@ struct Told {
     state: u32,
     /// The order that ended last.
     end: Option<Ended>,
-    /// Who may drive, whether a stop is latched and why nobody may move.
+    /// Who may drive, whether a stop is latched, and why no origin may move.
     mover: Option<(Mode, bool, Refusal)>,
     /// The order in force was a setpoint.
     setpoint: bool,
@@ -180,10 +180,10 @@ struct Told {
 }
 
 impl BridgeCore {
-    /// A bridge that goes on where an earlier life of it has ended, if that was kept.
+    /// A bridge that goes on where an earlier one ended, if that bridge's state was kept.
     ///
-    /// A stop that was latched then is not taken up: the stop word decides, and whoever finds it
-    /// clear sets it.
+    /// A stop that was latched then is not taken over: the stop word decides, and the caller sets
+    /// it again if it is clear.
     pub fn new(options: CoreOptions, kept: Option<&Health>) -> Self {
         let mut arbiter = kept.map_or_else(Arbiter::new, Arbiter::resume);
         arbiter.resume_from_stop();
@@ -303,7 +303,7 @@ impl BridgeCore {
     /// What to do now; ask until there is nothing.
     pub fn next(&mut self, now: Moment) -> Option<Action> {
         loop {
-            // What one stage brings is done before the next.
+            // The actions of one stage are carried out before the next stage.
             if let Some(action) = self.at_once(now) {
                 return Some(action);
             }
@@ -497,7 +497,7 @@ impl BridgeCore {
         (arbiter.mode(), arbiter.is_stopped(), arbiter.blocked())
     }
 
-    /// Tells people; what does not fit they are not told.
+    /// Tells people; news that does not fit is dropped.
     fn say(&mut self, news: News) {
         let _ = self.due.news.push_back(news);
     }

@@ -121,7 +121,7 @@ impl Service<'_> {
         let Some(device) = &port.device else {
             return false;
         };
-        // A port that has gone is found out by its reader.
+        // The reader finds out that a port has gone.
         matches!(
             port.writer.write(device, packet),
             Ok(Sent::Whole | Sent::Partly)

@@ -63,8 +63,8 @@ static ELBOW_JOINT: Joint = Joint {
 };
 
 impl Joint {
-    /// The command that brings it nearer, `None` when it is there. A servo nobody has heard of yet
-    /// is not waited for: the first step makes it report.
+    /// The command that brings it nearer, `None` when it is there. A servo that has not reported
+    /// yet is not waited for: the first step makes it report.
     fn step_towards(&self, to: u16, arm: &ArmSeen) -> Option<ArmCommand> {
         let Some(position) = arm.position(self.servo) else {
             return Some(self.raise);

@@ -67,7 +67,7 @@ impl Mission {
         }
     }
 
-    /// Who waited at home for a way to an order, and has none left, waits for no way.
+    /// A robot that waited at home for a way to an order, and has no order left, waits no more.
     fn need_no_way(&mut self) {
         if self.phase == Phase::WaitingForOrder && self.queue.waiting().is_empty() {
             self.failure = Failure::default();

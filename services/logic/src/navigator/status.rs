@@ -62,7 +62,7 @@ impl Navigator {
         status
     }
 
-    /// What would end that it stands, if anything has to.
+    /// The remedy: what would make a standing robot go on, if a person has to act.
     fn remedy(&self) -> Remedy {
         let hold = self.steady.hold;
         match self.mission.failure.remedy.get() {
@@ -77,7 +77,7 @@ impl Navigator {
     /// Goes on from the last status of a navigator that was killed.
     ///
     /// The robot moved on until the lease of its order ended; that way is added. A status that
-    /// makes no sense (a foreign writer's) is as good as none: the robot may be anywhere.
+    /// makes no sense (a foreign writer's) counts as none: the robot may be anywhere.
     pub fn resume(
         config: LogicConfig,
         status: &NavigatorStatus,
