@@ -16,7 +16,7 @@ const FAMILY: &str = "lager-bench";
 /// Where they lie, beside the segments.
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A bus nobody else is on. Keep it until all processes on it have ended.
+/// A bus without other users. Keep it until all processes on it have ended.
 #[derive(Debug)]
 pub struct Domain {
     folder: PathBuf,

@@ -57,7 +57,7 @@ const SIGN: u64 = 1_000_000_000;
 /// How long a peer that answers it may be silent while something is carried out, and else.
 const SILENT_BY_HAND: u64 = 150_000_000;
 const SILENT: u64 = 5_000_000_000;
-/// When something is asked again that was answered with what cannot be.
+/// When a question is asked again after an impossible answer.
 const AGAIN: u64 = 200_000_000;
 /// When an order or a press is repeated that logic does not show.
 const REPEAT: u64 = 250_000_000;
@@ -126,7 +126,7 @@ pub struct Conversation {
 
 /// What happens to the connection.
 impl Conversation {
-    /// How long its thread may be kept from its work before what has come meanwhile is old.
+    /// How long its thread may be held up before the lines that have come meanwhile count as old.
     pub const LONGEST_PAUSE: Duration = Duration::from_millis(200);
 
     /// A conversation of the robot `name`; `kept` is the map that an earlier one has published.
@@ -357,7 +357,7 @@ impl Conversation {
         let mode_before = self.mode();
         self.health = Some(*health);
         if self.mode() != mode_before {
-            // What was begun in one mode has no meaning in the other.
+            // A command that was begun in one mode has no meaning in the other.
             self.driving.let_go();
             self.held.clear();
         }
@@ -560,7 +560,7 @@ impl Conversation {
         }
     }
 
-    /// Tells what cannot be done; whatever is wanted then is asked a little later.
+    /// Tells the peer what cannot be done; the question that follows is asked a little later.
     fn correct(&mut self, now: Moment, why: &str) {
         self.think(why);
         self.held.clear();

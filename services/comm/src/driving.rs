@@ -59,7 +59,7 @@ impl Driving {
             code: command.firmware().code(),
             ..SteeringOrder::default()
         };
-        // Standing needs nobody who renews it.
+        // Standing needs no renewal.
         self.running = (command != OperatorCommand::Stop).then_some(Running {
             command,
             order,

@@ -22,8 +22,8 @@ use crate::conversation::{Action, Conversation};
 use crate::link::{Link, News};
 use crate::moment::Moment;
 
-/// Longest wait for anything, in real time: most samples ring nobody here, so that the path has
-/// nobody more to wake.
+/// Longest wait for anything, in real time. Most samples do not ring comm, so that the path has no
+/// further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
 /// How often the map is offered to late joiners, in real time.
@@ -177,7 +177,7 @@ impl Shell {
                     self.conversation.connected(now);
                 }
                 News::Down(why) => {
-                    // What was said before the end is still heard, a stop above all.
+                    // Lines that came before the end are still carried out, a stop above all.
                     self.conversation.heard(now, &lines);
                     lines.clear();
                     tracing::info!("the external computer is away: {why}");
@@ -250,7 +250,7 @@ impl Shell {
         }
     }
 
-    /// Says what goes wrong on the bus, but not for ever.
+    /// Logs faults of the bus, but not the same one for ever.
     fn complain(&mut self, error: &dyn std::error::Error) {
         self.complaints = self.complaints.wrapping_add(1);
         if self.complaints.is_power_of_two() {

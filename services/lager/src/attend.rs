@@ -42,7 +42,7 @@ const PULSE: Duration = Duration::from_millis(200);
 const SWEEP: Duration = Duration::from_secs(1);
 /// How long the first word may take.
 const FIRST_WORD: Duration = Duration::from_secs(2);
-/// How long nothing but errors may come from the bus.
+/// How long the bus may return nothing but errors.
 const ERRORS: Duration = Duration::from_secs(2);
 
 /// Attends the supervisor `parent` until `shutdown`.
@@ -169,7 +169,7 @@ impl Attendant {
                 Request::HandOver(service) => {
                     self.keepers.owe(service);
                     self.hand_over()?;
-                    // What the dead one left is removed as soon as its last word is kept.
+                    // What the dead process left is removed as soon as its last value is kept.
                     self.sweep_due = Instant::now();
                 }
             }
@@ -248,7 +248,7 @@ impl Attendant {
         };
         let act = operator.step(self.clock.now(), self.narrator.seen());
         if self.told.as_ref() != Some(operator.script()) {
-            // Told before it is done: a successor must know of an order that was given.
+            // Report it before it is done: a successor must know of an order that was given.
             self.told = Some(operator.script().clone());
             self.line.send(&Word::Script(operator.script().clone()))?;
         }
@@ -330,7 +330,7 @@ struct Complaints {
     count: u32,
     last: String,
     heard: bool,
-    /// Since when every look has met one.
+    /// Since when every look has met an error.
     since: Option<Instant>,
 }
 

@@ -41,7 +41,7 @@ pub fn causes(config: &Config) -> Vec<String> {
         return causes;
     };
     let Ok(place) = bus.place() else {
-        // That error names folder and cause by itself.
+        // That error already names folder and cause.
         return causes;
     };
     let holders = place.up().remove(&bus.robot).unwrap_or_default();

@@ -302,7 +302,8 @@ fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
     };
     let mut removed = 0;
     if fix {
-        // What the dead have registered with the living is for somebody who joins the bus.
+        // What dead processes have registered with living ones is removed by a process that joins
+        // the bus.
         if count(NodeState::Alive)? > 0 && count(NodeState::Stale)? > 0 {
             sweep_beside(&bus)?;
         }

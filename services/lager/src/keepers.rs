@@ -51,7 +51,7 @@ impl Keepers {
         ]
     }
 
-    /// A service has ended: what it was doing is owed to its successor.
+    /// A service has ended: its state is to be handed to its successor.
     pub fn owe(&mut self, service: Service) {
         self.owed.retain(|owed| *owed != service);
         self.owed.push(service);
@@ -62,7 +62,7 @@ impl Keepers {
     pub fn hand_over(&mut self) -> Vec<Result<Service>> {
         let mut results = Vec::new();
         for service in core::mem::take(&mut self.owed) {
-            // Its last word may have come since the last look.
+            // Its last sample may have come since the last look.
             let served = match service {
                 Service::Bridge => hand_over(&mut self.bridge),
                 Service::Logic => {
@@ -91,7 +91,7 @@ fn remember<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
 }
 
 fn hand_over<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
-    // A value that was kept before is better than none.
+    // An earlier value is better than none.
     let remembered = remember(keeper);
     let name = T::NAME;
     let served = keeper

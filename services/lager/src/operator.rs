@@ -51,7 +51,7 @@ pub enum Act {
     Order(Order),
 }
 
-/// A mission and how far it has come: all that whoever takes the script over needs.
+/// A mission and its progress: all that a process needs which takes the script over.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Script {
     /// The products to fetch, in this order.
@@ -65,7 +65,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// A mission that nobody has begun.
+    /// A mission that has not been begun.
     pub fn new(mission: Vec<i32>) -> Self {
         Self {
             mission,
@@ -125,8 +125,8 @@ enum Step {
 }
 
 impl ScriptedOperator {
-    /// A script that has its mission fetched, from where it stands. Ids start at `first_id`, which
-    /// is beyond those of whoever had the script before.
+    /// A script that fetches the rest of its mission. Ids start at `first_id`, which is beyond
+    /// those of the process that had the script before.
     pub fn new(script: Script, first_id: u32) -> Self {
         let step = match (script.outcome(), script.order) {
             (Some(Ok(())), _) => Step::Finished,

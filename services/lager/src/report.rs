@@ -45,7 +45,8 @@ pub struct Note {
 }
 
 impl Narrator {
-    /// Subscribes to everything it tells of. One that joins late takes what it sees first for told.
+    /// Subscribes to everything that it reports. If it joins late, what it sees first counts as
+    /// reported.
     pub fn new(bus: &Bus, joins_late: bool) -> Result<Self> {
         Ok(Self {
             line: bus.subscriber()?,

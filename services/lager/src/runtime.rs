@@ -66,8 +66,8 @@ impl RuntimeFolder {
         Ok(bus.place()?.folder_of(&bus.robot).join(WAREHOUSE))
     }
 
-    /// The page for an emulated body's time. One that a killed robot has left is gone, so that
-    /// nobody takes it for the new one.
+    /// The page for an emulated body's time. A page that a killed robot has left is removed, so
+    /// that no process takes it for the new one.
     pub fn fresh_clock(&self) -> Result<PathBuf> {
         let path = self.path.join(CLOCK);
         match fs::remove_file(&path) {
@@ -102,7 +102,8 @@ impl RuntimeFolder {
         let whole = || -> Result<()> {
             let new = self.path.join("lager.toml.new");
             fs::write(&new, toml::to_string(config)?)?;
-            // Whoever reads it at this moment reads all of the old one or all of the new one.
+            // A process that reads it at this moment reads all of the old one or all of the new
+            // one.
             Ok(fs::rename(&new, &path)?)
         };
         whole().with_context(|| format!("cannot write {}", path.display()))?;

@@ -72,8 +72,7 @@ impl Operator {
         Ok(operator)
     }
 
-    /// `lager drive`: gives the order and renews it until it is done, `seconds` have passed or
-    /// Ctrl-C; then the robot stands, because nobody renews it any more.
+    /// Ctrl-C; then the robot stands, because its order is no longer renewed.
     pub fn drive(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let health = self.health()?;
         if health.mode.get() != Some(Mode::Manual) {
@@ -291,7 +290,8 @@ impl Operator {
         let give_up = Instant::now() + PATIENCE;
         let mut renewed = clock.now();
         while end.is_none_or(|end| clock.now() < end) {
-            // Stopped and continued, or kept from its core: what it held is over.
+            // This process was stopped and continued, or kept from its core: the order that it
+            // renewed is over.
             let pause = clock.now().saturating_sub(renewed);
             if pause >= LEASE {
                 bail!(
@@ -301,7 +301,7 @@ impl Operator {
             }
             renewed = clock.now();
             self.hands.steer(order)?;
-            // Whoever lets go by Ctrl-C has done what he wanted.
+            // A user who lets go by Ctrl-C has done what he wanted.
             if self.patience.pause(clock.real(RENEW)).is_err() {
                 break;
             }

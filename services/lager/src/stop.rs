@@ -17,7 +17,7 @@ use crate::config::{Body, Config};
 /// How long the robot may take to stand, in real time.
 const PATIENCE: Duration = Duration::from_millis(2_500);
 
-/// How long a bridge is waited for that nobody knows of.
+/// How long to wait for a bridge that has not been seen yet.
 const SHORT: Duration = Duration::from_millis(300);
 
 /// How often the answer is looked at.
@@ -113,7 +113,7 @@ enum Verdict {
     Stands(String),
     /// Not yet, and why.
     NotYet(String),
-    /// Nobody will ever know that they do.
+    /// It cannot be known whether they do.
     Never(String),
 }
 

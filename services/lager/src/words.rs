@@ -143,7 +143,7 @@ impl Line {
     /// The attendant's end.
     ///
     /// # Errors
-    /// Standard output is no such socket: nobody started this process as an attendant.
+    /// Standard output is no such socket: no supervisor started this process.
     pub fn to_supervisor() -> Result<Self> {
         let end = std::io::stdout().as_fd().try_clone_to_owned()?;
         rustix::net::sockopt::socket_type(&end)?;

@@ -18,7 +18,7 @@ const MOST_UNREAD: usize = 64 * 1024;
 /// waits for it.
 const SLOWEST: Duration = Duration::from_secs(5);
 
-/// How long somebody may be connected without having said a line.
+/// How long a peer may be connected without having sent a line.
 const SILENT: Duration = Duration::from_secs(10);
 
 /// Bytes that are read at a time. What a peer sends beyond them waits for its next turn, so that

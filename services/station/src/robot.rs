@@ -67,7 +67,7 @@ pub enum CommandRefused {
         "the robot takes no commands now; it does when it is switched to manual or stands at goods"
     )]
     NotAsked,
-    /// It is slower than whoever gives them.
+    /// It is slower than the person who gives them.
     #[error(
         "{} commands wait already; wait until the robot has taken some, or stop it",
         Robot::MOST_COMMANDS

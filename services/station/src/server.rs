@@ -418,7 +418,7 @@ fn listen_for_gag(path: &Path) -> Result<UnixListener, ServerError> {
         fs::remove_file(path).map_err(failed)?;
     }
     let listener = UnixListener::bind(path).map_err(failed)?;
-    // Whoever was quicker than this is refused for his user when he is let in.
+    // A process of another user that connected first is refused when it is let in.
     fs::set_permissions(path, fs::Permissions::from_mode(0o600)).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     Ok(listener)

@@ -279,7 +279,7 @@ impl Station {
         self.seat_gag();
     }
 
-    /// Somebody has said a line, or what cannot be one.
+    /// A peer has sent a line, or bytes that cannot be one.
     pub fn heard(&mut self, peer: Peer, line: Result<&str, LineError>) {
         let line = match line {
             Ok(line) => line,
@@ -369,7 +369,7 @@ impl Station {
             .expect("there are more names than connections")
     }
 
-    /// Makes room for a robot where robots are remembered for nothing.
+    /// Makes room for a robot by forgetting one of which nothing needs to be remembered.
     fn forget_robots(&mut self) {
         if self.robots.len() >= Self::MOST_ROBOTS {
             let links = &self.links;
@@ -398,7 +398,7 @@ impl Station {
         if let Some(name) = name
             && let Some(robot) = self.robots.get_mut(&name)
         {
-            // What the robot asks no more is passed over.
+            // An answer to a question that the robot no longer asks is ignored.
             let line = robot.given(answer).ok();
             self.say(&name, line);
             self.ask_gag(&name);

@@ -42,7 +42,7 @@ impl Ends {
         }
     }
 
-    /// A command has ended. While nobody listens the oldest gives way.
+    /// A command has ended. If no Pi listens, the oldest end is dropped.
     pub(crate) fn push(&mut self, finish: Finish) {
         if self.waiting.is_full() {
             self.waiting.pop_front();

@@ -61,7 +61,7 @@ const PARKING: Duration = Duration::from_millis(200);
 pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), PortError> {
     let kept = if config.resume {
         bus.kept::<LinkHealth>(RESUME_WAIT).unwrap_or_else(|error| {
-            // A stop file that cannot be read is lost, and then the robot starts stopped.
+            // State that cannot be read counts as lost, and the robot then starts stopped.
             tracing::error!("{error}");
             None
         })

@@ -82,7 +82,7 @@ impl Ears {
         }
     }
 
-    /// Looks at both clocks; who has been silent for too long is told once.
+    /// Looks at both clocks. A service that has been silent for too long is reported once.
     pub fn look(&mut self, real: Duration, robot: Duration) -> Vec<Silence> {
         let (real_before, robot_before) =
             self.looked.replace((real, robot)).unwrap_or((real, robot));

@@ -30,7 +30,7 @@ const ONCE_LOST: [u64; 13] = [
 enum Trouble {
     /// Of 1000 bytes to the Pi so many arrive wrong.
     ToPi(u64),
-    /// So many bytes that nobody sent reach the board each millisecond.
+    /// This many bytes of noise reach the board each millisecond.
     ToBoard(u64),
     /// Both at once.
     Both(u64, u64),

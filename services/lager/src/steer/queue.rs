@@ -19,7 +19,7 @@ const GLANCE: Duration = Duration::from_millis(50);
 impl Operator {
     /// `lager fetch`: ordered until logic shows that it took the order.
     pub fn fetch(&mut self, product: i32) -> Result<String> {
-        // It would wait, and the robot would drive off when somebody else changes the mode.
+        // The order would wait, and the robot would drive off when somebody else changes the mode.
         if self.health()?.mode.get() != Some(Mode::Autonomous) {
             bail!(
                 "the robot is in manual mode and fetches nothing; `lager mode autonomous` changes that, and `lager queue add` orders for later"
@@ -111,7 +111,7 @@ impl Operator {
         }
     }
 
-    /// Says one thing about the queue, once, since not all of them may be said twice, and waits
+    /// Gives one command about the queue, once, since not all of them may be repeated, and waits
     /// until logic shows the effect.
     fn say_until(
         &self,

@@ -26,7 +26,7 @@ use crate::config::{Config, StationSection};
 use crate::runtime::RuntimeFolder;
 use crate::station;
 
-/// What was chosen, and what there is to tell of it.
+/// The choice, and what to tell people about it.
 #[derive(Debug)]
 pub struct External {
     /// Where a station of this robot's own listens.
@@ -75,7 +75,7 @@ pub fn choose(config: &mut Config) -> Result<External> {
     })
 }
 
-/// Nobody can be talked to.
+/// There is no external computer.
 fn none(config: &mut Config, why: &anyhow::Error) -> External {
     config.station.wanted = false;
     External {
