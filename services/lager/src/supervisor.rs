@@ -281,7 +281,7 @@ impl Supervisor {
 }
 
 impl Drop for Supervisor {
-    /// After an end in order there are none left.
+    /// Kills the children that are left; after an end in order there are none.
     fn drop(&mut self) {
         self.kill_all();
     }
