@@ -1,5 +1,6 @@
-//! Nothing comes back by itself, and nobody drives unseen: frozen processes, requests that come too
-//! late, a cable whose half towards the bridge is cut, and one that is noisy in each turn.
+//! Nothing comes back by itself, and no order moves the robot unseen: frozen processes, requests
+//! that come too late, a cable whose half towards the bridge is cut, and a cable that is noisy in
+//! each turn.
 
 use std::time::Duration;
 

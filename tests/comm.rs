@@ -1,5 +1,5 @@
-//! The robot and the external computer as processes. Whoever plays the one or the other here shares
-//! no code with them: he speaks from the grammar alone.
+//! The robot and the external computer as processes. The test plays either side and shares no code
+//! with them: it follows the grammar alone.
 
 use std::fs;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};

@@ -1,6 +1,5 @@
-//! What `lager up` survives of what happens to the bus: it is damaged, emptied, cut off or silent
-//! while the robot runs. The robot comes up again by itself, or ends with a sentence, and Ctrl-C
-//! always ends it.
+//! What `lager up` survives: the bus is damaged, emptied, cut off or silent while the robot runs.
+//! The robot comes up again by itself, or ends with a sentence, and Ctrl-C always ends it.
 
 use std::fs::{self, File};
 use std::path::PathBuf;

@@ -21,8 +21,8 @@ use lager_topics::Stamp;
 /// restarted ones, and the longest silent is forgotten first.
 const REMEMBERED: usize = 128;
 
-/// The shortest time between two samples of a writer that is believed; the fastest writer seen
-/// takes a multiple of it.
+/// The shortest time in which a writer can publish one sample after another, in ns; the fastest
+/// writer seen takes a multiple of it.
 const SHORTEST_NS: u64 = 20;
 
 /// How far a stamp may be ahead of its reader's clock before it is ignored. All processes of a

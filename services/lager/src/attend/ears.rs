@@ -10,7 +10,7 @@
 //! By the robot's clock, since services publish by that: while an emulated body's clock stands
 //! still, or crawls, they have nothing to publish. Comm and station are not listened for, because
 //! they publish nothing that says they live. An emulator that has not published anything yet is
-//! judged by the real clock alone, because the robot's clock is its own.
+//! judged by the real clock alone, because the robot's clock comes from the emulator.
 
 use std::time::Duration;
 
