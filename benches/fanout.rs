@@ -1,6 +1,6 @@
-//! `latency/fanout/<n>/<contender>`: publishing 64 bytes to n subscribers on another core, our typed
-//! ports and bare iceoryx2. criterion measures one after the other, so compare what
-//! `lager bench fanout` prints, where they take turns.
+//! `latency/fanout/<n>/<contender>`: publishing 64 bytes to n subscribers on another core, our
+//! typed ports and bare iceoryx2. criterion measures one after the other, so compare what `lager
+//! bench fanout` prints, where they take turns.
 
 use std::time::Duration;
 

@@ -1,10 +1,11 @@
-//! Everything a running robot shares is spoilt under it: it is up again or has ended with a reason,
-//! no tool hangs, nothing is left, and the motors do not run on. `tests/soak attack` tries every kind
-//! of file in every way, a full memory and a full disk, and kills observers by the thousand; here a
-//! part of it runs.
+//! Every shared file of a running robot is damaged. The robot must run again or end with a reason,
+//! no tool may hang, nothing may be left behind, and the motors must not run on. `tests/soak
+//! attack` tries every kind of file in every way, a full memory and a full disk, and kills
+//! observers by the thousand; here a part of it runs.
 //!
 //! The boards are a process on a bus of their own, as real ones would be, behind a cable that knows
-//! when the bridge last spoke; so what the motors do is seen whatever becomes of the robot's bus.
+//! when the bridge last sent something. So the test sees what the motors do, whatever happens to
+//! the robot's bus.
 
 use std::fs::{self, OpenOptions, Permissions};
 use std::os::unix::fs::{FileExt, PermissionsExt};

@@ -1,5 +1,6 @@
-//! Nothing comes back by itself, and nobody drives unseen: frozen processes, requests that come too
-//! late, a cable whose half towards the bridge is cut, and one that is noisy in each turn.
+//! Nothing comes back by itself, and no order moves the robot unseen: frozen processes, requests
+//! that come too late, a cable whose half towards the bridge is cut, and a cable that is noisy in
+//! each turn.
 
 use std::time::Duration;
 
@@ -44,8 +45,8 @@ impl Watch {
         Some(truth.left_duty != 0 || truth.right_duty != 0)
     }
 
-    /// Whether an order of a person that was first given after `began` is in force, if the board has
-    /// news. An order's id is the milliseconds of the moment when it was first given.
+    /// Whether an order of a person that was first given after `began` is in force, if the board
+    /// has news. An order's id is the milliseconds of the moment when it was first given.
     fn obeys(&mut self, began: u64) -> Option<bool> {
         let report = self.steering.latest().expect("readable")?;
         let by_person = report.current_origin == Origin::Operator;
@@ -207,7 +208,8 @@ fn a_robot_whose_steering_board_is_not_heard_stands_and_goes_on_by_a_new_order_o
     domain.assert_clean();
 }
 
-/// Boards as a process, a cable at the steering board, and the configuration of who is wired to them.
+/// Boards as a process, a cable at the steering board, and the configuration of who is wired to
+/// them.
 fn boards_at_a_cable(domain: &Domain) -> (Running, Cable, String) {
     let file = |name: &str| domain.folder().join(name);
     let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);

@@ -7,10 +7,10 @@ use serde_json::Value;
 
 #[test]
 fn a_mission_is_delivered_and_told_in_one_json_line() {
-    // Other work on the machine may keep a reader from its core for longer than its queue holds, and
-    // that is a loss. Of three missions one must be without, unless another machine on the same
-    // processor took a second of it. Faster than real time a shorter stall is enough, and losses are
-    // only told.
+    // Other work on the machine may keep a reader from its core for longer than its queue holds,
+    // and that is a loss. Of three missions one must be without, unless another machine on the same
+    // processor took a second of it. Faster than real time a shorter stall is enough, and losses
+    // are only told.
     let stolen_before = stolen_centiseconds();
     let lost: Vec<u64> = (0..3)
         .map(|_| mission_at("1"))
@@ -24,8 +24,8 @@ fn a_mission_is_delivered_and_told_in_one_json_line() {
     mission_at("2");
 }
 
-/// For how long other machines have had this one's processors, in hundredths of a second: `steal` of
-/// proc(5).
+/// For how long other machines have had this one's processors, in hundredths of a second: `steal`
+/// of proc(5).
 fn stolen_centiseconds() -> u64 {
     let stat = std::fs::read_to_string("/proc/stat").expect("Linux has it");
     let steal = stat

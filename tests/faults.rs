@@ -1,5 +1,8 @@
 //! What the robot survives: every service killed with -9 in the middle of a mission, and the
 //! supervisor itself. `tests/soak` runs the same with more kills.
+//!
+//! The bounds of 200 ms and of one second are held in virtual time by the tests of the boards and
+//! of the simulator. In real time only `tests/soak` asserts them, which wants a machine of its own.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

@@ -1,10 +1,10 @@
 //! The guard notices: with a deliberate slow-down in what it measures it fails and names the right
 //! figure.
 //!
-//! What is measured here is measured by `benches/guard` as people run it. A slow-down adds to what is
-//! measured at all times, so a test that wants the guard to fail cannot be disturbed by whatever else
-//! the machine does; that unchanged code keeps its limits is for `.ci/run` to show, which runs the
-//! guard itself with the same build.
+//! What is measured here is measured by `benches/guard` as people run it. A slow-down adds to what
+//! is measured at all times, so a test that wants the guard to fail cannot be disturbed by whatever
+//! else the machine does; that unchanged code keeps its limits is for `.ci/run` to show, which runs
+//! the guard itself with the same build.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -130,8 +130,9 @@ impl Domain {
         self.lager(args).output().expect("lager starts")
     }
 
-    /// Runs `lager` with an order that it renews until it is carried out. One that was not renewed in
-    /// time, because others kept this process from its core, is given anew, as `lager` says to do.
+    /// Runs `lager` with an order that it renews until it is carried out. One that was not renewed
+    /// in time, because others kept this process from its core, is given anew, as `lager` says to
+    /// do.
     ///
     /// # Panics
     /// When it cannot be started, or is held up for ever.

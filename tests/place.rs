@@ -106,7 +106,8 @@ fn a_second_bridge_is_refused_with_the_first_ones_process() {
     assert_eq!(up.wait(), Some(0));
 }
 
-/// `lager` with `args`, killed at its `when`th `ftruncate`: what it was making stays without a size.
+/// `lager` with `args`, killed at its `when`th `ftruncate`: what it was making stays without a
+/// size.
 fn killed_half_way(domain: &Domain, when: u32, args: &[&str]) -> Output {
     let whole = domain.lager(args);
     let mut strace = Command::new("strace");

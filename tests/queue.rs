@@ -1,4 +1,5 @@
-//! The orders that wait, as people see and change them, and over the death of who keeps them.
+//! The waiting orders, as people see and change them, and after a kill of the service that keeps
+//! them.
 
 use std::process::Output;
 

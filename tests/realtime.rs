@@ -1,5 +1,5 @@
-//! Real time as the kernel sees it: what `/proc` says of the services that `up` starts, of their
-//! successors after `kill -9`, and what people are told who lack the rights.
+//! Real time as the kernel sees it: what `/proc` says of the services that `up` starts and of their
+//! successors after `kill -9`, and what users without the rights are told.
 //!
 //! Run by somebody who may not do the first, it checks that he is refused with a sentence.
 

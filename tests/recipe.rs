@@ -1,4 +1,4 @@
-//! The recipe of the boards' images on a machine that lacks what it needs: it says so and installs nothing.
+//! `firmware/avr/build` on a machine that lacks what it needs: it says so and installs nothing.
 
 use std::fs;
 use std::os::unix::fs::symlink;

@@ -1,6 +1,6 @@
-//! `lager stop` when the bus cannot help: every place on it taken, the bridge frozen, the bus's
+//! `lager stop` when the bus cannot help: every place on it is taken, the bridge frozen, the bus's
 //! files gone, the disk full, everything killed. Real processes, and a robot that drives at full
-//! speed behind two ptys, as real boards are: it starts stopped and in manual mode.
+//! speed behind two ptys. As with real boards it starts stopped and in manual mode.
 
 use std::fs;
 use std::path::PathBuf;

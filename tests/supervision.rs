@@ -1,6 +1,5 @@
-//! What `lager up` survives of what happens to the bus: it is damaged, emptied, cut off or silent
-//! while the robot runs. The robot comes up again by itself, or ends with a sentence, and Ctrl-C
-//! always ends it.
+//! What `lager up` survives: the bus is damaged, emptied, cut off or silent while the robot runs.
+//! The robot comes up again by itself, or ends with a sentence, and Ctrl-C always ends it.
 
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -74,7 +73,8 @@ fn kill(process: u32, signal: Signal) {
     kill_process(pid(process), signal).expect("a living process");
 }
 
-/// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it is.
+/// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it
+/// is.
 fn assert_only_a_stop_is_left(domain: &Domain) {
     let mut left = domain.leftovers();
     left.retain(|file| !file.ends_with("/r1/stop"));

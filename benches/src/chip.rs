@@ -1,8 +1,8 @@
 //! What the boards' images do, in cycles: the emulator's `--trace`, run as a process and read.
 //!
-//! Apart from the other scenarios, because nothing is timed here: chips' cycles are exact and the
-//! same on every machine, but for the real-time factor. The emulator is an executable of its own,
-//! as simavr's licence wants it.
+//! Apart from the other scenarios, because nothing is timed here: cycles are exact and the same on
+//! every machine, except for the real-time factor. The guard holds each figure to 5 %. The emulator
+//! runs as a process of its own, because simavr's licence stays in `firmware/emulator`.
 
 use core::fmt;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
-//! A bus of its own for each measurement, removed at the end whoever died meanwhile.
+//! A separate bus for each measurement, which is removed at the end even if processes on it have
+//! died.
 //!
-//! Nothing of it can be seen from a robot's bus, and no robot is disturbed.
+//! A robot's bus shows nothing of it, and no robot is disturbed.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -15,7 +16,7 @@ const FAMILY: &str = "lager-bench";
 /// Where they lie, beside the segments.
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A bus nobody else is on. Keep it until all processes on it have ended.
+/// A bus without other users. Keep it until all processes on it have ended.
 #[derive(Debug)]
 pub struct Domain {
     folder: PathBuf,

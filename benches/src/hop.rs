@@ -7,10 +7,11 @@
 //!   caught ─ receive <────── the same back ──────── send         one way = (caught - thrown) / 2
 //! ```
 //!
-//! Both ends are the same contender and wait the same way, but for `adaptive`: of two cores only one
-//! is ever given to adaptive spinning, so there the second process adapts and the first one spins.
-//! Then the way to the second is timed alone, its own and that of what it is compared with (both ends
-//! read the same clock, CLOCK_MONOTONIC); a half of both ways would hide half of what holds up one.
+//! Both ends are the same contender and wait the same way, except for `adaptive`: of two cores only
+//! one is ever given to adaptive spinning, so there the second process adapts and the first one
+//! spins. Then only the way to the second process is timed, for the contender and for its baseline
+//! (both ends read the same clock, CLOCK_MONOTONIC); half a round trip would hide half of a delay
+//! at one end.
 //!
 //! Every contender plays short rounds in turn with all the others, with ports of its own for each
 //! round.

@@ -1,14 +1,14 @@
-//! What is measured, each beside its baseline in the same run.
+//! The project's measurements, each beside its baseline in the same run.
 //!
 //! A scenario (`hop`, `path`, `fanout`) starts the processes it needs, measures every candidate and
-//! every baseline in turn, and returns a [`Report`] that prints as a table and serialises as JSON;
-//! [`chip`] counts cycles of the boards' images instead, which are exact and have no baseline.
-//! The criterion targets beside this library and `lager bench` are two ways to run the same code.
+//! every baseline in turn, and returns a [`Report`], which prints as a table and serialises as
+//! JSON. [`chip`] counts cycles of the boards' images instead; these are exact and have no
+//! baseline. The criterion targets beside this library and `lager bench` both run this code.
 //!
-//! Absolute times mean little on a shared machine, so candidates and baselines take turns within
-//! one run and a report states ratios of one run. Nothing here asserts a time; the guard does.
+//! Absolute times mean little on a shared machine. So candidates and baselines take turns within
+//! one run, and a report states ratios of one run. Nothing here asserts a time; the guard does.
 //!
-//! **Invariant:** whoever measures waits for nothing without a limit, and leaves nothing behind.
+//! **Invariant:** every wait of a measurement has a limit, and nothing is left behind when it ends.
 
 mod ball;
 mod baseline;

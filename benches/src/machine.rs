@@ -1,7 +1,7 @@
 //! The machine: what it is, its cores, and the processes that keep cores from halting.
 //!
-//! Apart, because every scenario binds its processes and says on what it ran. It never changes
-//! anything for other processes.
+//! It is apart because every scenario binds its processes to cores and says on what machine it ran.
+//! It never changes anything for other processes.
 
 use core::marker::PhantomData;
 

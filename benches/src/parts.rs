@@ -269,8 +269,8 @@ impl Part {
 
 impl Drop for Part {
     fn drop(&mut self) {
-        // Linux waits, without giving its core away, for whoever reads in /proc of a process that it
-        // takes down: a process of real time that keeps a less urgent one from that core would
+        // Linux waits, without giving its core away, for whoever reads in /proc of a process that
+        // it takes down: a process of real time that keeps a less urgent one from that core would
         // never end.
         let _ = schedule(libc::SCHED_OTHER, 0);
         // It may have ended already, which is as good.

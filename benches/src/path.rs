@@ -5,16 +5,16 @@
 //!                                            -> bridge's main loop -> pty -> read | t1
 //! ```
 //!
-//! Bridge and logic are the real services in processes of their own ([`robot`]); the floor is the
-//! same chain of the barest primitives ([`floor`]). Frames come at 1 kHz and each one must be
-//! answered, or the measurement ends with an error. Chains take turns within each run, and those
-//! that wait for their turn stand still (SIGSTOP).
+//! Bridge and logic are the real services in processes of their own ([`robot`]). The floor is the
+//! same chain made of bare system calls ([`floor`]). Frames come at 1 kHz and each of them must be
+//! answered, or the measurement ends with an error. The chains take turns within each run; those
+//! that wait for their turn are stopped (SIGSTOP).
 //!
 //! | `what` | row | compared with |
 //! |---|---|---|
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
-//! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; services and boards SCHED_FIFO |
+//! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
 //! | `path-stages` | each stage of `lager/block`, as the robot itself publishes it | |
 //!
 //! An observer is a process of its own on a node of its own, subscribed to `sensor/line` and

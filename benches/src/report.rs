@@ -194,8 +194,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// The comparison of the row with that label and mode with the one called `to`, both of the same
-    /// `what` and regime. Labels other than `lager` are unique there, so `to` names one row.
+    /// The comparison of the row with that label and mode with the one called `to`, both of the
+    /// same `what` and regime. Labels other than `lager` are unique there, so `to` names one row.
     #[must_use]
     pub fn ratio(
         &self,

@@ -7,12 +7,12 @@
 //!   t1                                 the actor wakes, everybody drains
 //! ```
 //!
-//! Timed is `t1 - t0`, what the writer is kept from its work: the typed ports publish and ring;
-//! bare iceoryx2 publishes the same and notifies a listener of each reader (`event`).
+//! Timed is `t1 - t0`, for which the writer is kept from its work. The typed ports publish and
+//! ring; bare iceoryx2 publishes the same and notifies a listener for each reader (`event`).
 //!
-//! The ringing alone is what it costs more to publish on a topic with an actor than on one with as
-//! many readers but no actor, measured in pairs (`lager/ring`); it compares with iceoryx2 notifying
-//! without publishing anything (`notify`).
+//! The cost of the ring alone is the difference between publishing on a topic with an actor and
+//! publishing on one with as many readers but no actor, measured in pairs (`lager/ring`). It
+//! compares with iceoryx2 notifying without publishing anything (`notify`).
 
 mod audience;
 mod ringer;

@@ -1,8 +1,8 @@
 //! Memory and descriptors that the processes of a measurement share without a name, so that
 //! nothing is left when they end, however they end.
 //!
-//! The director makes them and its players inherit them by number. For baselines and for starting
-//! together; the bus itself is not in here.
+//! The director makes them and its players inherit them by number. They serve the baselines and a
+//! common start; the bus does not use them.
 
 use core::fmt;
 use core::marker::PhantomData;

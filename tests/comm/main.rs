@@ -1,5 +1,5 @@
-//! The robot and the external computer as processes. Whoever plays the one or the other here shares
-//! no code with them: he speaks from the grammar alone.
+//! The robot and the external computer as processes. The test plays either side and shares no code
+//! with them: it follows the grammar alone.
 
 mod extended;
 mod scene;
@@ -52,7 +52,8 @@ fn a_comm_that_is_killed_makes_the_robot_stand_and_its_successor_asks_again() {
 #[test]
 fn a_stop_is_confirmed_and_stays() {
     let mut scene = Scene::new();
-    // A machine that is held up loses the link, which makes the robot stand as well; then once more.
+    // A machine that is held up loses the link, which makes the robot stand as well; then once
+    // more.
     let (mut robot, stopped) = loop {
         let mut robot = scene.drive(true);
         robot.says("stop 7");

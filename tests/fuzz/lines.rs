@@ -5,6 +5,10 @@
 //! ```
 //!
 //! What it finds goes to the first folder; what is worth keeping, to the second one.
+//!
+//! It is a workspace of its own, because only a nightly compiler builds it. The corpus and the laws
+//! belong to the ordinary tests of `lager-lines`, which mutate the corpus deterministically: ten
+//! thousand times, or as often as `tests/soak lines` says.
 
 #![no_main]
 

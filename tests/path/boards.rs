@@ -18,8 +18,8 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 /// Longest silence within a packet. A pseudo terminal hands bytes over when the scheduler lets it.
 const GAP_US: u32 = 50_000;
 
-/// Boards speak at least this often: a link that is silent for a second is down, and nobody drives a
-/// board that has not reported for 200 ms.
+/// Boards speak at least this often: a link that is silent for a second is down, and nobody drives
+/// a board that has not reported for 200 ms.
 const SPEAK_EVERY: Duration = Duration::from_millis(100);
 
 struct Line {

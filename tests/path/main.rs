@@ -2,8 +2,8 @@
 //! their own under `strace`: what each hop asks of the kernel, what the stamps tell, and what
 //! `latency/path` counts.
 //!
-//! The navigator gives a new order for each frame here: it takes line frames for old at once, so a
-//! distance frame after a line frame halts the robot, and the next line frame sets it going.
+//! Here the navigator gives a new order for each frame: it takes line frames for old at once, so a
+//! distance frame after a line frame halts the robot, and the next line frame starts it.
 
 mod boards;
 mod robot;

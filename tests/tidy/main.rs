@@ -95,7 +95,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// The crates that may name iceoryx2's ports and services: the one that opens the robot's bus, and
-/// the one that measures it beside bare iceoryx2, which nobody else could say the cost of.
+/// the one that measures it beside bare iceoryx2.
 const OPEN_ICEORYX2: &[&str] = &["lager-ports", "lager-benches"];
 
 /// The circles of imports that are still to be mended.

@@ -1,9 +1,9 @@
 //! Bare iceoryx2, as its own examples use it: its stock `ipc` service, its ports, nothing between.
 //!
 //! Three kinds of line differ in what they carry besides the ball: the same header as the typed
-//! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and iceoryx2's
-//! own defaults. A receiver looks without pause, or sleeps on an iceoryx2 event that the sender
-//! notifies after publishing.
+//! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and
+//! iceoryx2's own defaults. A receiver looks without pause, or sleeps on an iceoryx2 event that the
+//! sender notifies after publishing.
 
 use core::fmt::Debug;
 use core::time::Duration;

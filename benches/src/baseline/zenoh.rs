@@ -7,12 +7,12 @@
 //!
 //! A receiver is woken twice: the kernel wakes a thread of Zenoh's, which hands the ball to the
 //! player through the channel that is Zenoh's default. Sending is the player's own thread's work
-//! down to the socket. All of Zenoh's threads stay on the core of the player they belong to, because
-//! the player is bound to it before there are any.
+//! down to the socket. All of Zenoh's threads stay on the core of the player they belong to,
+//! because the player is bound to it before there are any.
 //!
-//! Nobody is looked for and nothing is announced: the second player is told the socket of the first,
-//! and neither listens anywhere else. Zenoh's shared memory has no part in it, because Zenoh itself
-//! uses it only for samples of some thousand bytes.
+//! Nobody is looked for and nothing is announced: the second player is told the socket of the
+//! first, and neither listens anywhere else. Zenoh's shared memory has no part in it, because Zenoh
+//! itself uses it only for samples of some thousand bytes.
 
 use core::fmt::Display;
 use std::path::Path;

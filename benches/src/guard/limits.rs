@@ -1,5 +1,5 @@
-//! The limits as they stand in `benches/limits.toml`, read strictly: a limit that was mistyped would
-//! guard nothing. Nothing is measured or judged here.
+//! The limits as they stand in `benches/limits.toml`, read strictly: a limit that was mistyped
+//! would guard nothing. Nothing is measured or judged here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Has the scenarios measure what the limits are about, and again where a limit is broken.
+//! Measures the figures that have limits, and measures again where a limit is broken.
 //!
 //! **Why again, and why the lower ratio counts:** other work on the machine comes and goes. What it
 //! adds to one side of a ratio it does not add to the code, so a ratio that was low once is one the

@@ -6,9 +6,9 @@
 //!       ends, reading thread           middle                   ends, main thread
 //! ```
 //!
-//! As many processes, threads, wake-ups and bytes as the robot has, in the same places and on the
-//! same cores; no packets, no decision, no bus. What a robot takes longer than this is its
-//! software's.
+//! It has as many processes, threads, wake-ups and bytes as the robot, in the same places and on
+//! the same cores, but no packets, no decision and no bus. The time that a robot takes beyond this
+//! is its software's.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::os::fd::{OwnedFd, RawFd};

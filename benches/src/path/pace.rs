@@ -1,8 +1,8 @@
 //! When frames are sent, and one turn of a chain.
 //!
-//! Frames come at 1 kHz and always at the same phase of the millisecond, away from the kernel's
-//! timer tick, which stands on whole milliseconds: a chain that happened to run into the tick would
-//! look slower than one that did not.
+//! Frames come at 1 kHz, always at the same phase of the millisecond and away from the kernel's
+//! timer tick, which comes on whole milliseconds. A chain that happened to meet the tick would look
+//! slower than one that did not.
 
 use lager_ports::Clock;
 use lager_topics::PathLatency;

@@ -121,7 +121,7 @@ fn logic(stage: &mut Stage) -> Result<(), BenchError> {
     lager_logic::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running logic"))
 }
 
-/// An observer: looks ten times a second, reads all that has come, and is woken by nobody.
+/// An observer: reads ten times a second all that has come, and is never woken.
 fn observer(stage: &mut Stage) -> Result<(), BenchError> {
     let Some(script) = stage.hear::<Script>()? else {
         return Ok(());

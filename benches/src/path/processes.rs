@@ -111,8 +111,8 @@ fn processor_ns(part: &Part) -> u64 {
         .sum()
 }
 
-/// Whether a thread of it is ready to run. Asked of a process that should have answered long ago: one
-/// that waits for a wake-up sleeps.
+/// Whether a thread of it is ready to run. Asked of a process that should have answered long ago:
+/// one that waits for a wake-up sleeps.
 fn wants_to_run(part: &Part) -> bool {
     let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", part.pid())) else {
         return false;

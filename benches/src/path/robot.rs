@@ -12,8 +12,9 @@
 //! by turns. A command answers a frame if it is the one that frame asks for and its seq is new;
 //! repetitions of the command in force carry the old one. On a machine that keeps logic from
 //! running for half a millisecond, logic may go blind right after it saw, and the bridge then
-//! writes the later of both orders alone: such a frame is put aside, and counted. The steering board reports that its
-//! wheels stand, so the robot drives towards its goods for as long as it is measured.
+//! writes the later of both orders alone: such a frame is put aside, and counted. The steering
+//! board reports that its wheels stand, so the robot drives towards its goods for as long as it is
+//! measured.
 
 mod chain;
 

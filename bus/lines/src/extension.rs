@@ -5,17 +5,17 @@
 //!
 //! The robot's first line is `lager 1 <name>`, with the highest version that it speaks and its
 //! name. It does not wait for an answer but goes on with `sidelength`. A station that speaks the
-//! extension answers `lager 1 <name>`; from then on both use the lower of the two versions. To any
-//! other peer the robot never says another line of it, and what such a peer says to the first line
-//! is passed over.
+//! extension answers `lager 1 <name>`, and from then on both use the lower of the two versions. To
+//! any other peer the robot never sends another line of the extension, and it ignores what such a
+//! peer answers to the first line.
 //!
-//! A robot may repeat its first line at any time, and such a station answers it each time: so each
-//! side knows that the other is there. A robot that is driven by hand does so every 50 ms, and
-//! stands if nothing at all has come from the station for 150 ms.
+//! A robot may repeat its first line at any time, and a station answers it each time, so each side
+//! knows that the other is there. A robot that is driven by hand repeats it every 50 ms, and stops
+//! when nothing at all has come from the station for 150 ms.
 //!
-//! The document's questions and answers go on between the lines below, which are asynchronous in
-//! both directions: nobody waits for a line before he sends his own. The first word tells what a
-//! line is.
+//! The document's questions and answers go on between the lines below. These are asynchronous in
+//! both directions: neither side waits for a line before it sends its own. The first word tells the
+//! kind of a line.
 //!
 //! # Station to robot
 //!

@@ -24,9 +24,9 @@
 //! ```
 //!
 //! - The document spells the list of products `prodlis` and must have meant `prodlist`; both are
-//!   read, and an answer repeats the spelling that was asked (AMB-40). Its number says how many products
-//!   follow, which may be 0 (AMB-41). All stand in one line, so that up to [`MAX_LINE`] bytes of
-//!   them can be listed, some sixty products.
+//!   read, and an answer repeats the spelling that was asked (AMB-40). Its number says how many
+//!   products follow, which may be 0 (AMB-41). All stand in one line, so that up to [`MAX_LINE`]
+//!   bytes of them can be listed, some sixty products.
 //! - `karta` and `sidelength` are answered once the user has filled them in, `fetchprod`, `armcomm`
 //!   and `styrcomm` once he has chosen (AMB-42, AMB-43): an answer may take as long as it likes,
 //!   and what needs no answer may be sent meanwhile.

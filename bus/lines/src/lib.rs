@@ -24,12 +24,12 @@
 //!
 //! # Reading and writing
 //!
-//! A value is written by its `Display`, which is without the line's end; [`to_line`] adds that and
-//! refuses what is too long. It is read by `read`, which never panics and allocates no more than
-//! the line is long. For every value `x` that can be written `read(to_line(x)) == x`.
+//! A value is written by its `Display`, without the line's end; [`to_line`] adds the end and
+//! refuses a line that is too long. A value is read by `read`, which never panics and allocates no
+//! more than the line's length. For every value `x` that can be written, `read(to_line(x)) == x`.
 //!
-//! Nothing here does input or output, reads a clock or knows a topic; a `Direction` here and a
-//! heading on the bus are joined by who uses both.
+//! Nothing here does input or output, reads a clock or knows a topic. A service that uses both
+//! converts between a `Direction` here and a heading on the bus.
 
 #![forbid(unsafe_code)]
 

@@ -12,10 +12,10 @@
 //!            └──────────────────────────────────────────────────────┘
 //! ```
 //!
-//! A line ends with LF or CR LF. One that is longer than [`MAX_LINE`] bytes is refused once, as
-//! soon as that is certain, and passed over to its end; the line behind it is whole again. A
-//! line that has no end yet is never given: what a peer was cut off in was not said. Memory is
-//! bounded by one line.
+//! A line ends with LF or CR LF. A line that is longer than [`MAX_LINE`] bytes is refused once, as
+//! soon as that is certain, and skipped to its end; the next line is read as usual. A line without
+//! its end is never returned, because the peer may have been cut off in it. Memory is bounded by
+//! one line.
 //!
 //! ```
 //! use lager_lines::splitter::{LineError, LineSplitter};

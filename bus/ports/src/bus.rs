@@ -67,7 +67,7 @@ impl Bus {
         mend::unfinished(&place);
         let node = make_node(&transport, &place, &config.robot, role)?;
         mend::protect(&place);
-        // What cannot be listed now is swept the next time.
+        // What cannot be listed now is left to the next sweep.
         let _ = sweep::dead_nodes(&transport);
         doorbell::sweep_all(&place);
         place.sweep_locks();
@@ -107,8 +107,9 @@ impl Bus {
         self.shared.role
     }
 
-    /// Removes what killed processes left behind; returns how many of them there were. If
-    /// another process is sweeping at the same moment it is waited for, at most 100 ms each.
+    /// Removes what killed processes left behind, and returns how many processes there were. If
+    /// another process is sweeping at the same moment, this waits for it, at most 100 ms for each
+    /// dead process.
     ///
     /// Samples a killed writer has sent stay with subscribers that have received from it before,
     /// until they are drained; a keeper should still drain first ([`Keeper::remember`]).
@@ -118,8 +119,8 @@ impl Bus {
         sweep::dead_nodes(&self.shared.config).unwrap_or_default()
     }
 
-    /// Whether others can still find this process on the bus; not if somebody has removed the bus's
-    /// files, or the bus was cleared.
+    /// Whether others can still find this process on the bus. They cannot after the bus was
+    /// cleared, or after its files were removed.
     pub fn is_listed(&self) -> bool {
         self.shared.place.is_current() && sweep::is_listed(&self.shared.config, &self.shared.node)
     }
@@ -140,7 +141,8 @@ impl Bus {
         Subscriber::new(self)
     }
 
-    /// What wakes this process when a topic it acts on has news; to be used in this thread.
+    /// A waiter, which wakes this process when a topic that it acts on has samples; to be used in
+    /// this thread.
     ///
     /// # Errors
     /// The role acts on nothing, or there are no resources.
@@ -172,14 +174,14 @@ impl Bus {
         Keeper::new(self)
     }
 
-    /// The last value of a topic this process writes itself, from before its restart; waits for
-    /// it at most `timeout` of real time. `None`: the topic can be read, and nobody kept anything.
+    /// The last value, from before this process's restart, of a topic that it writes itself. Waits
+    /// at most `timeout` of real time. `None`: the topic can be read, and no value was kept.
     ///
     /// Call it before making the topic's publisher.
     ///
     /// # Errors
-    /// It is not known whether there is one, because it cannot be read; what passes by itself was
-    /// waited for. Whoever would go on from that value must not take this for a first start.
+    /// The topic cannot be read, so it is not known whether a value was kept; faults that pass were
+    /// waited for. A process that must resume from that value must not take this for a first start.
     pub fn kept<T: Topic>(&self, timeout: Duration) -> Result<Option<T::Payload>, KeptError> {
         kept::kept::<T>(self, timeout)
     }
@@ -260,7 +262,7 @@ fn make_node(
         })
 }
 
-/// iceoryx2 reports what `ports` handles itself, so it speaks only when asked for by name.
+/// Silences iceoryx2 unless the log filter names it: it reports faults that `ports` handles itself.
 fn log_level() -> LogLevel {
     // The target under which iceoryx2 hands its messages to `tracing`.
     const TARGET: &str = "iceoryx2_bb_loggers::tracing";

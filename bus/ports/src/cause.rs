@@ -1,8 +1,13 @@
 //! Why a sample is published: what a writer says of it, and what a reader hands on.
 //!
-//! Apart from publisher and subscriber because it is the one way from the one to the other: the
-//! times of a chain of samples are carried by this type alone, so no writer can forget a stage or
-//! make one up. It never reads the clock.
+//! Whatever a service publishes because of a sample gets that sample's [`Cause`]. So the stamp of a
+//! steering command tells when the frame's bytes were read, when the frame was published, when
+//! logic received it and when logic published the command. The bridge adds its own receipt and its
+//! write, and publishes the distribution of each stage once a second on `latency/path`.
+//!
+//! It is apart from publisher and subscriber because it is the only way from one to the other: a
+//! chain's times are carried by this type alone, so no writer can leave out a stage or make one up.
+//! It never reads the clock.
 
 use lager_topics::{Stamp, Topic};
 

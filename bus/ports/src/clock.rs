@@ -1,9 +1,8 @@
 //! The one clock of a process.
 //!
-//! Robot time is `CLOCK_MONOTONIC` times the speed of the body, so that leases, time-outs and a
-//! simulated body agree at any speed and between processes. An emulated body cannot promise a
-//! speed: it publishes its time, and the clock follows it ([`page`]). Stamps stay in real
-//! nanoseconds.
+//! Robot time is `CLOCK_MONOTONIC` times the speed of the body, so leases, time-outs and a
+//! simulated body agree at any speed and in all processes. An emulated body cannot promise a speed:
+//! it publishes its time, and the clock follows it ([`page`]). Stamps are in real nanoseconds.
 
 mod page;
 
@@ -106,7 +105,7 @@ impl Clock {
 
     fn follow(&self, page: &Page, speed: f64, monotonic_ns: u64) -> Duration {
         let page = page.read();
-        // Since the last update nothing is known to have passed.
+        // No chip time is known to have passed since the last update.
         let ago = page.real_ns.saturating_sub(monotonic_ns);
         let rate = match page.rate {
             0 => speed,
@@ -190,7 +189,7 @@ mod tests {
         let at = |ago: u64| clock.at(real - ago * MILLISECOND);
         assert_eq!(at(0), Duration::from_millis(100));
         assert_eq!(at(20), Duration::from_millis(90));
-        // A rate that is not known yet is the full speed: a lease rather ends early.
+        // An unknown rate counts as full speed, so a lease may end early but never late.
         writer.set(5, 0);
         assert_eq!(at(20), Duration::from_millis(20));
         assert_eq!(at(1_000), Duration::ZERO);

@@ -266,7 +266,7 @@ pub enum ReceiveError {
 /// Why a request was not answered.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
-    /// Nobody answers such requests.
+    /// No process answers such requests.
     #[error("{actor} is not running, so nobody answers `{request}`; start it and try again")]
     NoServer {
         /// The request.

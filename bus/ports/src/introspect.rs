@@ -22,7 +22,7 @@ use crate::untyped::Kind;
 /// How a topic in use compares with this build's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// Nobody uses it.
+    /// No process uses it.
     Unused,
     /// As in the table.
     Ours,

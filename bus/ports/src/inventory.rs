@@ -1,18 +1,18 @@
-//! Whether what living processes have of a bus can still be found by those who come.
+//! Whether new processes can still find the shared files that running processes use.
 //!
-//! A file that is removed stays with whoever has it mapped: the robot drives on, nothing fails, and
-//! nobody new can see it, stop it with a tool, or take over from a service that ends. So whoever
-//! attends a robot looks at what its processes have mapped (`/proc/PID/maps`), and at the files
-//! that describe it. Nothing is opened and nothing waited for.
+//! A file that is removed stays with every process that has it mapped. The robot drives on and
+//! nothing fails, but no new process can see it, stop it with a tool, or take over from a service
+//! that ends. So once a second the attendant looks at what the robot's processes have mapped
+//! (`/proc/PID/maps`) and at the files that describe it. It opens nothing and waits for nothing.
 //!
 //! | file | is missed when |
 //! |---|---|
 //! | a service's list of ends (`.dynamic`), a board of bells, a clock | it is mapped and removed |
 //! | the samples of a port (`.data`) | likewise, while the port has its tag |
-//! | what a service is (`.service`) | its list of ends is mapped, and no description has its number |
+//! | what a service is (`.service`) | its list of ends is mapped, but has no description |
 //!
-//! A newcomer that finds no description makes another one, with a number of its own. Ports come and
-//! go at any moment, so only what two looks in a row miss is missed.
+//! A new process that finds no description makes another one, with another number. Ports come and
+//! go at any moment, so a file counts as missing only when two looks in a row miss it.
 
 use std::collections::BTreeSet;
 use std::fs::{self, DirEntry};
@@ -23,15 +23,16 @@ use crate::place::{Place, SHARED_MEMORY};
 /// How the kernel marks a mapping whose file was removed.
 const REMOVED: &str = " (deleted)";
 
-/// What was missed when somebody looked last.
+/// What the last look missed.
 #[derive(Debug, Default)]
 pub struct Inventory {
     missed: BTreeSet<PathBuf>,
 }
 
 impl Inventory {
-    /// Looks at what `processes` have of the bus at `place`; returns a file that was missed, or whose
-    /// description was, at the look before, too. A process that has ended has nothing.
+    /// Looks at what `processes` have mapped of the bus at `place`. Returns a file that is missing,
+    /// or whose description is, if the look before missed it too. A process that has ended has
+    /// nothing mapped.
     pub fn look(&mut self, place: &Place, processes: &[u32]) -> Option<PathBuf> {
         let (ports, services) = (ports(place), services(place));
         let mapped = processes.iter().flat_map(|pid| mapped(*pid));
@@ -75,7 +76,7 @@ fn is_missed(
 ) -> bool {
     let Mapped { path, removed } = file;
     if path.starts_with(place.folder()) {
-        // The stop word is watched by who obeys it.
+        // The bridge watches the stop word itself.
         return *removed && (path.ends_with("bells") || path.ends_with("clock"));
     }
     let name = path.strip_prefix(SHARED_MEMORY).ok().and_then(Path::to_str);
@@ -116,7 +117,8 @@ fn services(place: &Place) -> BTreeSet<u128> {
         .collect()
 }
 
-/// The number of the service that a description is of, as the name of its list of ends has it.
+/// The number of the service that a description belongs to; the name of the service's list of ends
+/// contains it.
 fn number_in(description: &str) -> Option<u128> {
     let value = |key: &str| {
         let mut lines = description.lines();

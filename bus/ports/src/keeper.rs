@@ -1,8 +1,9 @@
 //! Keeping a service's last value for its successor.
 //!
-//! A killed publisher takes its history with it. The supervisor holds a [`Keeper`] for each state
-//! a service resumes from: it remembers the last value, and when the service has died it hands
-//! the value over, with history, so that the successor reads it with [`crate::Bus::kept`].
+//! A killed publisher takes its history with it. So the attendant holds a [`Keeper`] for each state
+//! that a service resumes from. The keeper remembers the last value, and when the service has died
+//! it publishes the value with history, so that the successor can read it with
+//! [`crate::Bus::kept`].
 //!
 //! ```text
 //! supervisor, every tick:   remember(), which tries again what a hand_over() could not; sweep
@@ -62,8 +63,8 @@ impl<T: Topic> Keeper<T> {
         Ok(drained?)
     }
 
-    /// Publishes the kept value with its original times, for the successor to find at its start.
-    /// Without a kept value it does nothing; again and again it only serves late joiners.
+    /// Publishes the kept value with its original times, so that the successor finds it at its
+    /// start. It does nothing without a kept value. Further calls only serve late joiners.
     ///
     /// # Errors
     /// No publisher could be made, or it could not send; [`Keeper::remember`] tries again.
@@ -81,7 +82,7 @@ impl<T: Topic> Keeper<T> {
             let stamp = *sample.stamp();
             let now_ns = Clock::monotonic_ns();
             if !self.is_own(&stamp) && self.newest.takes(stamp.publish_time_ns, now_ns) {
-                // The dead one's last word, found late, is what is to be handed over.
+                // The last sample of the dead writer, found late, is the value to hand over.
                 let is_late = self.kept.as_ref().is_some_and(|(_, kept)| {
                     (kept.writer, kept.epoch) == (stamp.writer, stamp.epoch)
                 });
@@ -109,7 +110,7 @@ impl<T: Topic> Keeper<T> {
         self.kept.as_ref().map(|(payload, stamp)| (payload, stamp))
     }
 
-    /// Whether a value is handed over and nobody has taken the topic up yet.
+    /// Whether a value is handed over and no successor has taken the topic up yet.
     pub fn is_standing_in(&self) -> bool {
         self.stand_in.is_some()
     }

@@ -31,7 +31,7 @@ pub enum KeptError {
 }
 
 impl From<KeptError> for PortError {
-    /// For whoever cannot begin without that value.
+    /// For a process that cannot begin without that value.
     fn from(error: KeptError) -> Self {
         match error {
             KeptError::Port(error) => error,
@@ -43,8 +43,8 @@ impl From<KeptError> for PortError {
     }
 }
 
-/// How often a topic that cannot be read is opened anew before that is called lasting. A killed
-/// writer is out of the way after the first sweep.
+/// How often a topic that cannot be read is opened again before the fault counts as lasting. The
+/// first sweep removes a killed writer.
 const ATTEMPTS: u32 = 5;
 
 /// Pause between attempts, in real time.

@@ -1,10 +1,10 @@
-//! Whether anybody at all has a file open: the kernel's word for it.
+//! Whether any process has a file open: the kernel answers that with a write lease.
 //!
-//! A write lease is granted on a file that nobody else has open or mapped, in whatever process,
-//! container or namespace; as long as it lasts whoever opens the file waits. So what is done under
-//! a lease is done to a file without users, and needs no guess from ages or process ids. Every file
-//! of the transport is open in the process that uses it for as long as it does, also while it is
-//! being made: what can be leased has been left behind.
+//! The kernel grants a write lease on a file only if no other process has it open or mapped, in any
+//! container or namespace; while the lease lasts, a process that opens the file waits. So a file
+//! under a lease has no users, and nothing needs to be guessed from ages or process ids. Every file
+//! of the transport is open in its process for as long as the process uses it, also while it makes
+//! the file: a file that can be leased has been left behind.
 
 #![allow(
     unsafe_code,
@@ -20,7 +20,7 @@ use std::path::Path;
 /// Linux's number for the request; `libc` has none.
 const F_SETSIG: i32 = 10;
 
-/// Removes a file that nobody has open; says whether it did.
+/// Removes a file that no process has open; returns whether it did.
 pub(crate) fn remove_unused(path: &Path) -> bool {
     let Ok(file) = open(path) else {
         return false;
@@ -29,7 +29,7 @@ pub(crate) fn remove_unused(path: &Path) -> bool {
     lease(&file).is_ok() && std::fs::remove_file(path).is_ok()
 }
 
-/// Whether somebody has a file open; one that cannot be asked about counts as used.
+/// Whether a process has a file open. A file that cannot be asked about counts as used.
 pub(crate) fn is_used(path: &Path) -> bool {
     match open(path) {
         Ok(file) => lease(&file).is_err(),
@@ -37,7 +37,7 @@ pub(crate) fn is_used(path: &Path) -> bool {
     }
 }
 
-/// A segment that is being made may only be written, a finished description only be read.
+/// An unfinished segment can only be written, a finished description can only be read.
 fn open(path: &Path) -> Result<File, Error> {
     let how = |options: &mut OpenOptions| {
         // Never waits: for a lease of somebody else, or for a pipe's other end.
@@ -61,8 +61,8 @@ fn lease(file: &File) -> Result<(), Error> {
             _ => Ok(()),
         }
     };
-    // Who opens the file meanwhile makes the kernel send this instead of SIGIO, which would end the
-    // process; nobody minds this one.
+    // If a process opens the file meanwhile, the kernel sends this signal instead of SIGIO, which
+    // would end this process; this one is ignored.
     ask(F_SETSIG, libc::SIGURG)?;
     ask(libc::F_SETLEASE, libc::F_WRLCK)
 }

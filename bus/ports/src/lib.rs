@@ -1,6 +1,8 @@
-//! Typed publishers, subscribers and waiting: the only crate that opens iceoryx2.
+//! Typed publishers and subscribers, waiting and requests over shared memory. Only this crate opens
+//! iceoryx2.
 //!
-//! A process opens one [`Bus`] and makes its ports from it, each in the thread that uses it:
+//! A process opens one [`Bus`] and makes its ports from it. A port stays in the thread that makes
+//! it:
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -27,13 +29,14 @@
 //! # }
 //! ```
 //!
-//! * Streams overwrite: a reader that falls behind loses the oldest samples, never blocks the
-//!   writer, and [`Subscriber::lost`] says exactly how many it missed.
-//! * Services that act on a topic are woken through their [`Waiter`]; observers poll.
-//! * A killed process is swept at the next [`Bus::open`] and by [`Bus::sweep`].
+//! * Streams overwrite. A subscriber that falls behind loses the oldest samples and never blocks
+//!   the publisher; [`Subscriber::lost`] says exactly how many samples it missed.
+//! * A service that acts on a topic is woken through its [`Waiter`]. Observers are never woken;
+//!   they poll.
+//! * What a killed process left behind is removed at the next [`Bus::open`] and by [`Bus::sweep`].
 //!
-//! **Invariant:** no type of iceoryx2 is in the public interface; nothing here decides anything
-//! about the robot; sending and receiving do not allocate after start-up.
+//! **Invariant:** the public interface shows no type of iceoryx2. This crate decides nothing about
+//! the robot. After start-up, sending and receiving allocate nothing.
 
 mod bus;
 mod cause;

@@ -1,9 +1,10 @@
 //! Locks of processes: who is the bridge of a robot, and who its supervisor.
 //!
-//! A lock is an `flock` on a file in the robot's folder, which the kernel drops with the process,
-//! however it ends. The lock decides, not that the file is there and not its age; the process id in
-//! the file is only for messages. Who ends in order removes the file while it still holds the lock,
-//! so whoever has got one makes sure that it still has its name.
+//! There is one lock for each service of a robot and one for its supervisor. A lock is an `flock`
+//! on a file in the robot's folder. The kernel drops it when the process ends, however it ends.
+//! Only the lock decides: not whether the file is there, nor its age, nor the process id in it,
+//! which is for messages. A process that ends in order removes the file while it still holds the
+//! lock, so a process that gets a lock checks that the file still has its name.
 
 use core::time::Duration;
 use std::fs::{self, File, OpenOptions};
@@ -112,8 +113,8 @@ impl Lock {
         has_name(&self.file, &self.path)
     }
 
-    /// Names this process in the file again if somebody has written something else there: others
-    /// would find no robot. Where that fails the next call may do better.
+    /// Writes this process's id into the file again if somebody has overwritten it, because others
+    /// would find no robot. If that fails, the next call may succeed.
     pub fn renew(&self) {
         let mut there = [0; 16];
         let length = self.file.read_at(&mut there, 0).unwrap_or_default();

@@ -1,16 +1,17 @@
-//! Mending a bus by its files alone: nothing is mapped, opened as a service or waited for, so it
-//! works when nothing answers and whatever the files hold.
+//! Mends a bus by its files alone. It maps nothing, opens nothing as a service and waits for
+//! nothing, so it works when no process answers, and whatever the files hold.
 //!
 //! | what | when it goes |
 //! |---|---|
-//! | a segment that was never finished: empty, or not readable yet | at every look, if nobody has it open |
-//! | a service's description that was never finished | likewise |
+//! | an unfinished segment: empty, or not readable yet | at every look, if no process has it open |
+//! | an unfinished description of a service | likewise |
 //! | a node's folder without the node | likewise, if it is older than a creation takes |
-//! | any segment, description or socket; a node's files; bells, locks, what `up` kept | in [`mend`], if nobody has it open |
+//! | any segment, description or socket | in [`mend`], if no process has it open |
+//! | a node's files; bells, locks, what `up` kept | likewise |
 //!
-//! That nobody has a file open is the kernel's word ([`lease`]), so the files of living
-//! processes are left alone, also of those that are stopped, or are just making them. What a dead
-//! process has registered with living ones is for the ordinary sweep ([`sweep`](crate::sweep)).
+//! The kernel says whether a process has a file open ([`lease`]). So the files of living processes
+//! are left alone, also of processes that are stopped or are just making them. What a dead process
+//! has registered with living ones is removed by the ordinary sweep ([`sweep`](crate::sweep)).
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
@@ -27,8 +28,8 @@ use crate::place::{Place, user_name};
 /// A creator makes a node's folder and opens a file in it at once.
 const CREATION: Duration = Duration::from_secs(2);
 
-/// What the segment ends with that every process of the bus opens to get its number. The transport
-/// lets every user write to it.
+/// The end of the name of the segment that every process of the bus opens to get its number. The
+/// transport lets every user write to it.
 const COUNTER: &str = ".global_mgmt";
 
 /// All that is in it: the transport's version, and the number.
@@ -56,11 +57,12 @@ const RUNTIME: [&str; 10] = [
 pub struct Mended {
     /// How many files it has removed.
     pub removed: usize,
-    /// What is damaged and still in use: empty, or another user's. Whoever uses it must end first.
+    /// Damaged files that are still in use: empty, or another user's. The processes that use them
+    /// must end first.
     pub damaged: Vec<PathBuf>,
 }
 
-/// Removes all files of a bus that nobody uses.
+/// Removes all files of a bus that no process uses.
 ///
 /// # Errors
 /// The folder cannot be used, or belongs to another user.
@@ -105,7 +107,7 @@ pub fn damaged(config: &crate::BusConfig) -> Result<Vec<PathBuf>, OpenError> {
     Ok(segments(&place).filter(|path| is_damaged(path)).collect())
 }
 
-/// Removes what was never finished and has nobody left to finish it; returns how much it was.
+/// Removes what was never finished and whose creator is gone; returns how much it was.
 pub(crate) fn unfinished(place: &Place) -> usize {
     let bad_counter = |path: &Path| is_counter(path) && !is_sound_counter(path);
     let segments = segments(place)
@@ -124,7 +126,8 @@ pub(crate) fn unfinished(place: &Place) -> usize {
     segments + descriptions + nodes
 }
 
-/// Refuses a bus on which another user has put a segment: whoever opens it is in his hands.
+/// Refuses a bus on which another user has put a segment: that user could control every process
+/// that opens it.
 pub(crate) fn refuse_foreign(place: &Place) -> Result<(), OpenError> {
     match foreign(place) {
         Some((path, uid)) => Err(OpenError::ForeignSegment {
@@ -136,8 +139,8 @@ pub(crate) fn refuse_foreign(place: &Place) -> Result<(), OpenError> {
     }
 }
 
-/// Keeps other users from the segment that the transport would let them empty. Nobody but this one
-/// needs it, as all of a bus belongs to one user.
+/// Keeps other users from emptying the segment that the transport lets them write to. Only this
+/// user needs it, because all of a bus belongs to one user.
 pub(crate) fn protect(place: &Place) {
     for path in segments(place).filter(|path| is_counter(path)) {
         if mode(&path).is_some_and(|mode| mode & 0o077 != 0) {
@@ -213,11 +216,11 @@ fn is_sound_counter(path: &Path) -> bool {
     sized && fs::read(path).is_ok_and(|bytes| bytes.first_chunk() == Some(&VERSION.to_ne_bytes()))
 }
 
-/// Removes a description or a socket that nobody uses.
+/// Removes a description or a socket that no process uses.
 fn remove_left(path: &Path) -> bool {
     let kind = fs::symlink_metadata(path).map(|found| found.file_type());
     if kind.is_ok_and(|kind| kind.is_socket()) {
-        // Nobody's socket refuses.
+        // A socket without a process refuses the connection.
         let asked = UnixDatagram::unbound().and_then(|socket| socket.connect(path));
         let refused = std::io::ErrorKind::ConnectionRefused;
         return asked.is_err_and(|error| error.kind() == refused) && fs::remove_file(path).is_ok();
@@ -225,15 +228,15 @@ fn remove_left(path: &Path) -> bool {
     lease::remove_unused(path)
 }
 
-/// Removes what killed processes have left in a robot's folder, and the folder if nothing is in it
-/// any more. The stop word is nobody's to remove.
+/// Removes what killed processes have left in a robot's folder, and the folder if it is then empty.
+/// The stop word is never removed.
 fn tidy(place: &Place, robot: &RobotName) -> usize {
     let folder = place.folder_of(robot);
     let before = files(&folder).count();
     let locks = files(&folder).filter(|path| path.extension().is_some_and(|end| end == "lock"));
     locks.for_each(|path| lock::sweep(&path));
     lease::remove_unused(&folder.join("bells"));
-    // While this has the name nobody can start.
+    // While this process holds the name, no supervisor can start.
     if let Ok(_name) = place.lock_name(robot) {
         for name in RUNTIME {
             let _ = fs::remove_file(folder.join(name));
@@ -280,8 +283,8 @@ fn nodes(place: &Place) -> Vec<Node> {
 }
 
 impl Node {
-    /// Whether its process is gone, when nobody has any file of it open: who makes it has one open
-    /// at once, and an empty folder may be a moment old.
+    /// Whether its process is gone, where no process has a file of the node open. A process that
+    /// makes a node opens a file at once, but an empty folder may be a moment old.
     fn is_left(&self) -> bool {
         if !self.monitors.is_empty() || files(&self.folder).next().is_some() {
             return true;

@@ -1,7 +1,6 @@
 //! Names: of robots, of nodes, of services.
 //!
-//! A node is called `lager/<robot>/<role>/<pid>`, a service `lager/<robot>/<topic>`, a port
-//! `<role>/<pid>`. Everything tools know about who is who comes from these names.
+//! Tools know which process is which only by these names.
 
 use std::fmt;
 use std::str::FromStr;

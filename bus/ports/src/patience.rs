@@ -1,4 +1,4 @@
-//! Patience with processes that come, go and die while something is opened.
+//! How long opening waits for processes that come, go or die meanwhile.
 
 use core::time::Duration;
 use std::ffi::OsStr;
@@ -21,7 +21,7 @@ pub(crate) enum Fault {
     Lasting(PortError),
 }
 
-/// How long passing faults are borne, in real time; longer than any creation takes.
+/// How long passing faults are retried, in real time; longer than any creation takes.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Tries until it works, a fault lasts, or patience ends. Sweeps between attempts.
@@ -75,10 +75,10 @@ fn given_up(topic: &str, detail: String) -> PortError {
 /// Removes the descriptions of services whose creator was killed before it had finished them;
 /// returns how many there were.
 ///
-/// The transport's own sweep takes such a service for none at all and leaves the file, and every
-/// later process would wait for its completion in vain. Nobody can have opened it: until it is
-/// finished it is writable, and that is how it is told from a finished one. Finishing takes
-/// microseconds, so one that is older than patience has nobody left to finish it.
+/// The transport's own sweep ignores such a service and leaves the file, and every later process
+/// would wait in vain for its completion. No process can have opened it: until it is finished it is
+/// writable, which tells it from a finished one. Finishing takes microseconds, so if it is older
+/// than our patience its creator is gone.
 fn remove_unfinished(config: &Config) -> usize {
     use std::os::unix::fs::PermissionsExt;
 

@@ -1,4 +1,4 @@
-//! Where a bus lives: one folder of its user, and nothing of it anywhere else but in `/dev/shm`.
+//! Where a bus lives: in one folder of its user, and in `/dev/shm`.
 //!
 //! ```text
 //!     <folder>/              0700, owned by the user who runs the robots
@@ -12,13 +12,15 @@
 //!             gag, warehouse.toml, warehouse.toml.queue                its station's
 //!     /dev/shm/lager_<8 hex>_…      the transport's segments; the number is made from the folder
 //! ```
-//! A bus that was damaged and cleared gets a new generation of names. An observer of the old one may
-//! live on, and what it removes at its end it removes by name.
+//!
+//! A bus that was damaged and cleared gets new names for its files (a new generation), because an
+//! observer of the old bus may still live, and removes files by name when it ends.
 //!
 //! The folder is `/run/lager` where that belongs to this user, as for a system service, else
-//! `/dev/shm/lager-<uid>`: nothing that tidies up `/tmp`, no other session of the user and no
-//! stranger can part what belongs together. One that others may enter, or that is a link, is
-//! refused, so nobody can put files in its place.
+//! `/dev/shm/lager-<uid>`. Nothing that tidies up `/tmp` and no other session of the user can
+//! remove a part of it. A folder that others may enter, or that is a link, is refused, so nobody
+//! else can put files there. Whoever takes a robot's name meets the robot that has it, and a sweep
+//! removes only files of this user's bus.
 
 use std::fmt;
 use std::fs::{self, DirBuilder};
@@ -53,7 +55,8 @@ const BELOW_FOLDER: usize = 1 + TRANSPORT.len() + 2 + 1 + 39 + 6;
 /// `lager_`, eight digits, the generation, `_`.
 const PREFIX_LENGTH: usize = 16;
 
-/// A bus's generations: the first, and after it one for each letter and digit but 0, again and again.
+/// A bus's generations: the first, and after it one for each letter and digit but 0, again and
+/// again.
 const GENERATIONS: &[u8] = b"0123456789abcdefghijklmnopqrstuvwxyz";
 
 /// The longest folder, in bytes.
@@ -106,8 +109,8 @@ impl Place {
         &self.prefix
     }
 
-    /// A robot's folder, which is made if it is missing. Whoever opens a file in it hears why it
-    /// could not be made.
+    /// A robot's folder, which is made if it is missing. If it cannot be made, opening a file in it
+    /// says why.
     pub fn robot(&self, robot: &RobotName) -> PathBuf {
         let folder = self.folder_of(robot);
         let _ = make(&folder);
@@ -182,14 +185,14 @@ impl Place {
     }
 
     /// Removes everything of a damaged bus but the robots' folders, and begins its next generation,
-    /// so that `robot`, none of whose services runs, can be started on a new one. Observers lose it.
-    /// Where another robot is up nothing is removed; says whether it was.
+    /// so that `robot`, none of whose services runs, can be started on a new one. Observers lose
+    /// it. Where another robot is up nothing is removed; says whether it was.
     pub fn clear(&self, robot: &RobotName) -> bool {
         if self.up().keys().any(|other| other != robot) {
             return false;
         }
         let old = self.transport_folders();
-        // From now on everybody who comes goes to the next.
+        // From now on every new process joins the next generation.
         let _ = fs::create_dir(transport_folder(&self.folder, next(self.generation)));
         for segment in self.segments() {
             let _ = fs::remove_file(segment);
@@ -201,8 +204,8 @@ impl Place {
         true
     }
 
-    /// Removes the bus with all its files, whoever uses it: for who has made it for himself alone,
-    /// as a measurement does.
+    /// Removes the bus with all its files, even while it is used. For a process that has made the
+    /// bus for itself alone, as a measurement does.
     pub fn remove(&self) {
         for segment in self.segments() {
             let _ = fs::remove_file(segment);
@@ -215,13 +218,13 @@ impl Place {
         transport_folder(&self.folder, self.generation)
     }
 
-    /// Whether this is still the bus that whoever comes now finds.
+    /// Whether a new process would still find this bus.
     pub(crate) fn is_current(&self) -> bool {
         generation_in(&self.folder) == self.generation
     }
 
-    /// The transport's folders of all generations: whoever was on the bus before it was cleared may
-    /// have made one of an earlier one again.
+    /// The transport's folders of all generations: a process that joined the bus before it was
+    /// cleared may have made a folder of an earlier generation again.
     pub(crate) fn transport_folders(&self) -> Vec<PathBuf> {
         (0..GENERATIONS.len())
             .map(|generation| transport_folder(&self.folder, generation))
@@ -274,7 +277,7 @@ impl fmt::Display for OtherPlace {
     }
 }
 
-/// Where the robots of other users on this machine would be: for who finds none of his own.
+/// Where the robots of other users on this machine would be, for a user who finds no robot.
 pub fn other_places() -> Vec<OtherPlace> {
     let own = rustix::process::geteuid().as_raw();
     let beside = fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();

@@ -11,9 +11,10 @@
 //!                  spare blocks of the thread, at most SPARES
 //! ```
 //!
-//! The list is full before it is first used, and a value that does not fit into a block, or finds
-//! the list empty, is allocated as ever. So a thread allocates nothing as long as at most `SPARES`
-//! small values live in it at a time. iceoryx2's larger values are made once per port.
+//! The list is filled before it is first used. A value that does not fit into a block, or that
+//! finds the list empty, is allocated as usual. So a thread allocates nothing as long as at most
+//! `SPARES` small values live in it at a time. iceoryx2's larger values are made once for each
+//! port.
 //!
 //! **Invariants**, on which the unsafe code rests:
 //! 1. `place` points to an initialised [`Counted`] for as long as it has holders, and `holders`
@@ -169,8 +170,8 @@ impl<T: fmt::Debug> fmt::Debug for Pooled<T> {
     }
 }
 
-/// iceoryx2's tests play dead processes with this: the last holder lets the value leave behind
-/// what a killed process would; another one just goes.
+/// iceoryx2's tests simulate dead processes with this: the last holder lets the value leave behind
+/// what a killed process would; any other holder just goes.
 impl<T: Abandonable> Abandonable for Pooled<T> {
     unsafe fn abandon_in_place(this: NonNull<Self>) {
         // SAFETY: the caller promises a valid `Pooled` that is its own.

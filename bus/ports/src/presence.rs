@@ -1,8 +1,9 @@
-//! Who is up, told without the bus: by the locks that a robot's processes hold in its folder.
+//! Which processes of a robot run. It asks the locks that they hold in the robot's folder, and not
+//! the bus.
 //!
-//! It opens nothing of the transport, so it answers where the bus does not. No lock is taken, or a
-//! process that starts at this moment would be refused: a lock's file names its last owner, and
-//! whoever still has it open still has the lock.
+//! It opens nothing of the transport, so it answers where the bus does not. It takes no lock,
+//! because a process that starts at this moment would then be refused: a lock's file names its last
+//! owner, and an owner that still has the file open still has the lock.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,11 @@
 //! The writing end of a topic.
+//!
+//! What a publish costs: for each sample iceoryx2 visits every place for a subscriber of the topic
+//! three times, whether it is taken or not, and the topics of the path have 74 places. That is most
+//! of the 5 000 instructions of `publish/to-1`, and most of what waking a reader on the same core
+//! costs beside the futex. The cost is instructions, not cache misses: boxing what stands in the
+//! places, so that the places lie side by side, was measured and changes nothing (1.65 and 1.67 us
+//! a hop).
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -46,8 +53,8 @@ impl<T: Topic> Publisher<T> {
         loan.send()
     }
 
-    /// Gives readers that have come since the last sample their history. Writers of states call
-    /// it regularly; it costs next to nothing when nobody has come.
+    /// Gives readers that have come since the last sample their history. Writers of states call it
+    /// regularly; it costs next to nothing when there are no new readers.
     pub fn tick(&self) {
         self.writer.tick();
     }
@@ -107,7 +114,7 @@ pub struct Loan<'publisher, T: Topic> {
 }
 
 impl<T: Topic> Loan<'_, T> {
-    /// Says from what the sample follows; unsaid it is [`Cause::OWN`].
+    /// Sets the cause of the sample; without this it is [`Cause::OWN`].
     pub fn cause(&mut self, cause: Cause) {
         self.cause = cause;
     }
@@ -120,8 +127,8 @@ impl<T: Topic> Loan<'_, T> {
         self.deliver(Clock::monotonic_ns(), Ring::Actors)
     }
 
-    /// Sends the sample and rings nobody: actors find it when they look the next time. For what
-    /// no actor has to act upon at once, so that nobody is woken in vain.
+    /// Sends the sample without ringing: actors find it when they next look. For samples that no
+    /// actor has to act upon at once, so that no process is woken in vain.
     ///
     /// # Errors
     /// As [`Loan::send`].

@@ -1,7 +1,8 @@
-//! Asking and answering: for what must be confirmed, such as a change of mode.
+//! Requests and replies, for what must be confirmed, such as a change of mode.
 //!
-//! Both sides may be killed and restarted at any time. A question is put again to an answering
-//! process that appears while its asker waits, and is forgotten when its asker gives up.
+//! Both sides may be killed and restarted at any time. If an answering process appears while the
+//! asker waits, the question is sent to it again. When the asker gives up, the question is
+//! forgotten.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -35,11 +36,11 @@ impl<R: Request> Client<R> {
     /// Asks and waits for the answer, at most `timeout` of real time. The question carries that
     /// deadline: an actor that finds it later must not act on it any more.
     ///
-    /// A question that was put to a process which then died is put again to its successor, if
-    /// that appears in time; so a request must be harmless when carried out twice.
+    /// If the answering process dies, its successor is asked again, if it appears in time. So a
+    /// request must be harmless when it is carried out twice.
     ///
     /// # Errors
-    /// Nobody answers such requests, or not in time.
+    /// No process answers such requests, or none answers in time.
     pub fn call(&self, mut request: Ask<R>, timeout: Duration) -> Result<Answer<R>, CallError> {
         let start = Instant::now();
         let lifetime_ms = u32::try_from(timeout.as_millis()).unwrap_or(u32::MAX);

@@ -1,4 +1,8 @@
 //! Opening services: names, limits, the layout check, and what each refusal means.
+//!
+//! A topic admits 64 observers, twice its actors and 8 further subscribers
+//! ([`Qos::max_subscribers`]). So keepers and restarted services get a place even when observers
+//! have taken all of theirs; the 65th observer is counted and refused.
 
 use iceoryx2::node::Node;
 use iceoryx2::prelude::{AttributeVerifier, SemanticString, ServiceName};

@@ -1,4 +1,4 @@
-//! What this process or this machine has run out of: asked when something failed and the
+//! What this process or this machine has run out of. It is asked when something failed and the
 //! transport does not say why.
 
 use core::fmt;
@@ -8,7 +8,8 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::place::SHARED_MEMORY;
 
-/// A process that has at most so many files left cannot open a port: one takes up to as many.
+/// A process that can open at most this many more files cannot open a port: a port may take as
+/// many.
 const FILES_LEFT: u64 = 8;
 /// A segment of a topic needs up to so much, in bytes.
 const SEGMENT: u64 = 1024 * 1024;

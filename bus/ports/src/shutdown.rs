@@ -14,12 +14,12 @@ pub struct Shutdown {
 }
 
 impl Shutdown {
-    /// Nobody wishes to stop yet.
+    /// No stop is wished for yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Wishes to stop, and wakes whoever waits. Not for signal handlers: those set
+    /// Wishes to stop, and wakes the waiters. Not for signal handlers: those set
     /// [`Shutdown::flag`].
     pub fn request(&self) {
         self.requested.store(true, Ordering::SeqCst);
@@ -41,7 +41,7 @@ impl Shutdown {
         }
     }
 
-    /// The bare flag; a signal handler may set it. Whoever waits then sees it at its time-out.
+    /// The bare flag; a signal handler may set it. A waiter sees it at its next time-out.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.requested)
     }

@@ -1,11 +1,11 @@
 //! The stop word: how anybody of the robot's user stops it, without the bus.
 //!
 //! It is apart because it must work when nothing else does: when every place on the bus is taken,
-//! when its files are gone, when the bridge is frozen. Whoever stops writes eight bytes into a
-//! file with one `pwrite` and has mapped nothing, so nothing that happens to the file can hurt
-//! him. The bridge has the file's page in its memory and looks at the word before each packet that
-//! it writes ([`StopPage`]). The file outlives every process; only a resume, which the bridge
-//! carries out, clears the word.
+//! when its files are gone, when the bridge is frozen. A process that stops the robot writes eight
+//! bytes into a file with one `pwrite`. It maps nothing, so no damage to the file can end it. The
+//! bridge has the file's page in its memory and looks at the word before each packet that it writes
+//! ([`StopPage`]). The file outlives every process. Only a resume, which the bridge carries out
+//! with a compare-and-swap, clears the word.
 //!
 //! The file `stop` in the robot's folder, mode 0600, 4096 bytes, in the machine's byte order:
 //!
@@ -19,9 +19,12 @@
 //! | 88 | | when |
 //! | 96 | | the word after which the steering board reported wheels at rest |
 //! | 104 | | when |
-//! | 112 | | the boards: sensor in bits 0 to 15, steering in 16 to 31; of each bit 0 = up, from bit 8 on the version of its protocol |
+//! | 112 | | the boards: sensor in bits 0 to 15, steering in 16 to 31 (1) |
 //! | 120 | | when the steering board reported last, 0 = never |
 //! | 128 | | the duties it reported: left in bits 0 to 7, right in 8 to 15 |
+//!
+//! (1) Of each board's 16 bits, bit 0 says whether it is up, and bits 8 to 15 are the version of
+//! its protocol.
 //!
 //! Every entry is an unsigned number of 64 bits, every time in microseconds of `CLOCK_MONOTONIC`.
 //! The word:
@@ -106,7 +109,7 @@ impl Stop {
         self.0.get()
     }
 
-    /// Why; a word that nobody can have meant is damaged.
+    /// Why; a word that no process can have written counts as damaged.
     pub fn cause(self) -> StopCause {
         let code = self.field(CAUSE);
         self.is_sound()
@@ -193,7 +196,7 @@ impl StopError {
     }
 }
 
-/// What whoever stops does with the word. The bridge has a [`StopPage`].
+/// What a process that stops the robot does with the word. The bridge has a [`StopPage`].
 #[derive(Clone, Copy, Debug)]
 pub struct StopWord;
 
@@ -211,17 +214,17 @@ impl StopWord {
         loop {
             let (file, _) = open(path).map_err(fail)?;
             put(&file, at::WORD, stop.word()).map_err(fail)?;
-            // The word is what counts, and it stands. The bridge mends what this cannot.
+            // The word counts, and it is written. The bridge mends what this process cannot.
             let _ = mend(&file);
-            // A file that was removed between opening and writing holds the word for nobody.
+            // A file that was removed between opening and writing reaches no bridge.
             if file.metadata().map_err(fail)?.nlink() > 0 {
                 return Ok(stop);
             }
         }
     }
 
-    /// Removes the file unless a stop is set in it: for who takes the robot down, when no bridge
-    /// runs any more.
+    /// Removes the file unless a stop is set in it. For the process that takes the robot down, when
+    /// no bridge runs any more.
     pub fn tidy(path: &Path) {
         let Ok(file) = File::open(path) else {
             return;
@@ -239,8 +242,8 @@ impl StopWord {
         }
     }
 
-    /// What the file at `path` tells; `None` if there is none. It is read and not mapped, so a
-    /// file that is cut short at this moment is no danger.
+    /// The contents of the file at `path`; `None` if there is none. The file is read and not
+    /// mapped, so cutting it short at this moment does no harm.
     ///
     /// # Errors
     /// There is a file, and it cannot be read.

@@ -1,14 +1,15 @@
 //! A segment of the transport that can be opened without waiting for ever.
 //!
-//! iceoryx2's storage in POSIX shared memory waits for the creator of a segment that has no size
-//! yet, however long that takes: a process killed between `shm_open` and `ftruncate` leaves one that
-//! nobody could open, and whoever may write to a segment can make it one. It also maps what is too
-//! short for its value, and the first look at that ends the process. Here both are looked at before:
-//! what a dead creator has left is removed, a living one is waited for as long as any creation takes,
-//! and what is too short is refused.
+//! iceoryx2's storage in POSIX shared memory waits without limit for the creator of a segment that
+//! has no size yet. A process that was killed between `shm_open` and `ftruncate` leaves such a
+//! segment, and so can any process that may write to it; nobody could open it again. iceoryx2 also
+//! maps a segment that is too short for its value, and the first access then ends the process.
 //!
-//! **Invariant:** everything else is the transport's own storage; names, hashes, sizes and modes are
-//! the same, so stock processes meet ours.
+//! This storage checks both first. It removes what a dead creator has left, waits for a living
+//! creator as long as any creation takes, and refuses a segment that is too short.
+//!
+//! **Invariant:** all else is the transport's own storage. Names, hashes, sizes and modes are the
+//! same, so stock processes and ours share segments.
 
 use core::fmt::Debug;
 use core::mem::MaybeUninit;
@@ -36,7 +37,8 @@ use iceoryx2_cal::named_concept::{
 use crate::lease;
 use crate::place::SHARED_MEMORY;
 
-/// Creating a segment takes microseconds; who lives and has not given it a size by then is stopped.
+/// Creating a segment takes microseconds; a creator that lives and has not set a size by then is
+/// stopped.
 const CREATION: Duration = Duration::from_millis(50);
 
 /// The version number that the transport puts before each value.
@@ -56,8 +58,8 @@ pub(crate) struct Builder<'builder, T: Debug + Send + Sync + ZeroCopySend> {
 }
 
 impl<T: Debug + Send + Sync + ZeroCopySend> Builder<'_, T> {
-    /// Returns when the segment can be opened, or is not there, which opening will say. One that a
-    /// dead process has not finished is removed.
+    /// Returns when the segment can be opened or is absent; opening then says which. A segment that
+    /// a dead process has not finished is removed.
     fn wait_for_size(&self) -> Result<(), DynamicStorageOpenError> {
         let file = self.config.path_for(&self.name).file_name().to_string();
         let segment = OsPath::new(SHARED_MEMORY).join(file);

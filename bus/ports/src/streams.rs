@@ -1,13 +1,17 @@
-//! What a reader believes of stamps: exact loss accounting, and which of two samples is newer.
+//! How a reader judges stamps: exact loss accounting, and which of two samples is newer.
 //!
-//! A stream is one publisher's life, `(writer, epoch)`, numbered from 0 without gaps. Pure, so
-//! that the laws can be tested without a bus:
+//! A stream is one life of a publisher, `(writer, epoch)`, numbered from 0 without gaps. This file
+//! is pure, so that its laws can be tested without a bus:
 //!
-//! * **received + lost = sent**, for every stream that began after its reader, whatever was
-//!   overwritten, once its last sample has been received.
-//! * **A stamp may be a lie**, by a damaged or foreign writer. So a gap counts only if it could
-//!   have been sent since the stream was last heard, a later lower number shows that a gap was
-//!   none, and a sample from the future is not newer than the present ([`Newest`]).
+//! - **received + lost = sent**, once a stream's last sample has been received, for every stream
+//!   that began after its reader attached. Of a stream that was there before, the reader counts
+//!   from the first sample that it receives: of those overwritten earlier it does not know how many
+//!   were sent after it attached.
+//! - **A stamp may be false**, if its writer is damaged or foreign. So a gap counts only if that
+//!   many samples could have been sent since the stream was last heard; a later, lower number shows
+//!   that there was no gap; and a sample from the future is not newer than the present
+//!   ([`Newest`]).
+//! - **A restart is not a loss.** A restarted writer has a new epoch and numbers from 0 again.
 
 use core::ops::Range;
 
@@ -17,12 +21,12 @@ use lager_topics::Stamp;
 /// restarted ones, and the longest silent is forgotten first.
 const REMEMBERED: usize = 128;
 
-/// No writer publishes samples faster than one in so many nanoseconds; the fastest seen takes
-/// a multiple of it.
+/// The shortest time in which a writer can publish one sample after another, in ns; the fastest
+/// writer seen takes a multiple of it.
 const SHORTEST_NS: u64 = 20;
 
-/// How far ahead of its reader's clock a stamp may be before it is passed over: all processes of
-/// a machine read the same clock, so nothing true is.
+/// How far a stamp may be ahead of its reader's clock before it is ignored. All processes of a
+/// machine read the same clock, so no true stamp is ahead.
 const AHEAD_NS: u64 = 1_000_000_000;
 
 struct Stream {
@@ -31,7 +35,7 @@ struct Stream {
     next: u64,
     /// The numbers counted as missed by the last sample.
     gap: Range<u64>,
-    /// A moment after which the rest of the stream was sent.
+    /// The stream's later samples were sent after this moment.
     heard_ns: u64,
 }
 
@@ -84,8 +88,8 @@ impl Streams {
         if stamp.sequence > sendable(stamp.epoch, now_ns) {
             return;
         }
-        // A stream older than this reader begins with whatever it hears first; a younger one has
-        // been missed from its first sample on.
+        // A stream that is older than this reader begins with the first sample received. Of a
+        // younger stream everything before that sample was missed.
         let is_younger = stamp.epoch > self.attached_ns;
         if is_younger {
             self.lost = self.lost.saturating_add(stamp.sequence);
@@ -120,8 +124,8 @@ impl Streams {
 }
 
 impl Stream {
-    /// Goes on with a number that is not the next one. Returns how many losses counted before were
-    /// none after all, and how many are to be counted now.
+    /// Takes up a number that is not the next one. Returns how many losses that were counted before
+    /// are withdrawn, and how many are new.
     fn jump(&mut self, stamp: &Stamp, now_ns: u64) -> (u64, u64) {
         let mut withdrawn = 0;
         if stamp.sequence < self.next {
@@ -129,7 +133,7 @@ impl Stream {
                 // It was there before: a repetition.
                 return (0, 0);
             }
-            // Numbers only grow: the one behind the gap was not this writer's.
+            // Numbers only grow, so the sample behind the gap was not this writer's.
             withdrawn = self.gap.end - self.gap.start;
             self.next = self.gap.start;
             self.gap = 0..0;
@@ -151,8 +155,8 @@ fn sendable(since_ns: u64, now_ns: u64) -> u64 {
     now_ns.saturating_sub(since_ns) / SHORTEST_NS
 }
 
-/// When the newest sample of a state was published that a reader has taken. Several writers'
-/// samples come in no order, and a keeper's may be older than one seen.
+/// When the newest sample of a state that a reader has taken was published. Samples of several
+/// writers come in no order, and a keeper's may be older than one seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Newest {
     publish_ns: u64,
@@ -164,7 +168,8 @@ impl Newest {
         if publish_ns < self.publish_ns || publish_ns > now_ns.saturating_add(AHEAD_NS) {
             return false;
         }
-        // A little ahead it counts as published now, so that it silences nobody.
+        // A stamp that is a little ahead counts as published now, so that it does not hide later
+        // samples.
         self.publish_ns = publish_ns.min(now_ns);
         true
     }

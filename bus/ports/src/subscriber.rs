@@ -46,8 +46,8 @@ impl<T: Topic> Subscriber<T> {
         Ok(self.reader.latest()?.map(Sample::of))
     }
 
-    /// Writers that could not be connected to, now or earlier: killed ones, or this process has
-    /// no resources left to do so. What they publish does not come.
+    /// Writers that this reader could not connect to, now or earlier: they were killed, or this
+    /// process has no resources left. Their samples do not arrive.
     pub fn unreached(&self) -> u32 {
         self.reader.unreached()
     }
@@ -56,7 +56,7 @@ impl<T: Topic> Subscriber<T> {
     /// younger than this subscriber also what came before the first sample received. Known up to
     /// the last sample received. A restarted writer is no loss.
     ///
-    /// A writer that came and went while nothing was received is not known.
+    /// A writer that came and went while nothing was received is not counted.
     pub fn lost(&self) -> u64 {
         self.reader.streams().lost()
     }
@@ -97,13 +97,13 @@ impl<T: Topic> Sample<T> {
         }
     }
 
-    /// When, why, by whom and as which one it was published.
+    /// The stamp: when, why and by whom it was published, and its number.
     pub fn stamp(&self) -> &Stamp {
         self.taken.stamp()
     }
 
-    /// This sample as the reason for others, received now: call it right after receiving. It
-    /// reads the clock, so whoever only looks at samples should not ask for it.
+    /// This sample as the cause of others, received now. Call it right after receiving. It reads
+    /// the clock, so do not call it for samples that are only looked at.
     pub fn cause(&self) -> Cause {
         Cause::sample::<T>(self.stamp(), Clock::monotonic_ns())
     }

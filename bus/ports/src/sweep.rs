@@ -1,9 +1,11 @@
 //! Removing what killed processes left behind.
 //!
-//! The transport does nearly all of it. It does not reckon with a process that is killed while it
-//! writes a tag of its node, which its list then leaves out, so that the node's folder cannot be
-//! removed; nor with one that is killed while it takes its node down: a node whose details are gone
-//! is looked for on another bus. Either would stay for ever.
+//! The transport does nearly all of it, but leaves two kinds of node for ever. It cannot remove a
+//! node that was killed while it wrote one of its tags, because its list leaves that tag out and
+//! the node's folder is then never empty. And it cannot remove a node that was killed while it took
+//! itself down, because it looks for a node without details on another bus. So this module removes
+//! the files of the first before the transport's sweep, and those of the second in its place; only
+//! then is the node's name free again.
 
 use std::fs::{self, DirEntry};
 use std::os::unix::fs::PermissionsExt;
@@ -19,7 +21,7 @@ use crate::transport::Ipc;
 /// How long a sweep waits for another one that has the same dead process in hand.
 const OTHERS_SWEEP: Duration = Duration::from_millis(100);
 
-/// What a tag that is being written may be used for, until it is whole (iceoryx2-cal's
+/// The mode of a tag file while it is being written (iceoryx2-cal's
 /// `static_storage::file::INIT_PERMISSIONS`).
 const BEING_WRITTEN: u32 = 0o600;
 
@@ -35,8 +37,8 @@ pub(crate) fn dead_nodes(config: &Config) -> Result<usize, NodeListFailure> {
     Ok(removed)
 }
 
-/// Whether the files by which others find this node are there. A tag of a port brings its folder
-/// back, its details only come with itself.
+/// Whether the files by which others find this node are there. Writing the tag of a port makes the
+/// folder again, but the details are only written with the node.
 pub(crate) fn is_listed(config: &Config, node: &Node<Ipc>) -> bool {
     let beside = PathBuf::from(config.global.node_dir().to_string());
     let details = format!("{}node.details", config.global.prefix);
@@ -49,7 +51,7 @@ pub(crate) fn is_listed(config: &Config, node: &Node<Ipc>) -> bool {
 fn remove(config: &Config, dead: DeadNodeView<Ipc>) -> bool {
     let files = Files::of(config, &dead);
     if dead.details().is_none() {
-        // Its ports went before its details.
+        // A node removes its ports before its details.
         return files.remove();
     }
     files.remove_half_written_tags();

@@ -1,11 +1,13 @@
 //! The service type with which `ports` opens iceoryx2.
 //!
-//! It is iceoryx2's `ipc::Service` in all but two things: what a port or a loan shares with its
-//! handles lives in a [`Pooled`] instead of an `Rc`, so that loaning does not go to the heap; and
-//! segments are opened as a [`Storage`], which does not wait for ever for one that was never finished.
-//! Everything that another process can see, which is files, names, hashes, layouts and locks, is
-//! taken from `ipc::Service` itself. So stock processes, tools and bindings of the same version
-//! meet ours as they meet each other (tests/bus/interop.rs).
+//! It is iceoryx2's `ipc::Service` in all but two things. What a port or a loan shares with its
+//! handles lives in a [`Pooled`] instead of an `Rc`, so that loaning does not allocate: iceoryx2's
+//! own `loan` allocates one small cell each time, and `tests/allocation.rs` counts 0 allocations a
+//! frame over bridge and logic together. And segments are opened as a [`Storage`], which does not
+//! wait for ever for a segment that was never finished. Everything that another process can see
+//! (files, names, hashes, layouts and locks) is taken from `ipc::Service` itself. So stock
+//! processes, tools and bindings of the same version can publish to our ports and subscribe from
+//! them (tests/bus/interop.rs).
 //!
 //! **Invariant:** `ipc::Service` is named here only; like its ports, ours stay in their thread.
 

@@ -1,4 +1,14 @@
 //! How a service that acts on topics waits for them.
+//!
+//! A wake is a hint. It says which topics were rung for, and the service drains those. At every
+//! sixteenth wake and at every time-out it drains all its topics. The services' time-outs are at
+//! most 20 ms, so in silence all topics are drained at least every 20 ms.
+//!
+//! A waiter that looks without pause yields its core every 4 us. The ring may depend on a thread
+//! that waits for that core, such as the kernel thread that delivers a serial port's bytes; without
+//! the yield that thread waited 2 ms and more. On a machine where this happened every look was in
+//! vain, so waiters stopped looking and adaptive waiting gained nothing: 0.96 to 1.06 of blocking,
+//! also with the code of 2026-11-21. With the yield it is 0.68 to 0.87 there.
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
@@ -69,37 +79,34 @@ impl FromStr for Policy {
     }
 }
 
-/// Why a wait ended. Either way, drain what [`Waiter::has`] says yes to: a ring may stand for many
-/// samples, and a sample may have come without one.
+/// Why a wait ended. In both cases drain the topics for which [`Waiter::has`] is true: one ring may
+/// stand for many samples, and a sample may have come without one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wake {
     /// Somebody rang.
     Rung,
-    /// Nobody did.
+    /// The time-out came first.
     TimedOut,
 }
 
-/// Looks between two of the clock: reading it costs as much as some looks.
+/// Looks at the word between two readings of the clock, which costs as much as several looks.
 const LOOKS: u32 = 64;
 
-/// How long to look before letting others run that wait for this core, in ns. Whatever brings the
-/// ring may be one of them: a writer, or a kernel thread that hands on a serial port's bytes. The
-/// kernel would let it wait for the rest of the looker's time, 2 ms and more.
+/// How long to look before yielding the core, in ns. The head of this file says why.
 const GIVE_WAY_NS: u64 = 4_000;
 
-/// Of so many wakes one is taken to be for everything: samples may come without a ring, from writers
-/// that know of none.
+/// One wake in so many drains everything: samples may come without a ring, from writers that know
+/// of none.
 const WAKES: u32 = 16;
 
-/// What a service that acts on topics waits on: one for all of them. It stays in the thread that
-/// made it.
+/// Waits for all topics that a service acts on. It stays in the thread that made it.
 pub struct Waiter {
     bell: Bell,
     policy: Policy,
     role: Role,
     adaptive: RefCell<Adaptive>,
     sleeps: Cell<u64>,
-    /// The last wait ended for everything there is.
+    /// Everything is to be drained after the last wait.
     everything: Cell<bool>,
     wakes: Cell<u32>,
 }
@@ -123,8 +130,9 @@ impl Waiter {
         }
         let longest_spin = match policy {
             Policy::Adaptive { longest_spin } => {
-                // The kernel may end a thread's sleeps 50 us late; a nap that ends before the next
-                // ring is due must not. If it cannot be set, more naps end by the ring.
+                // By default the kernel may end a thread's sleeps 50 us late, which is too late for
+                // a nap that must end before the next ring is due. If the slack cannot be set, a
+                // ring ends more of the naps.
                 let _ = set_current_timer_slack(NonZeroU64::new(1));
                 longest_spin
             }
@@ -155,9 +163,9 @@ impl Waiter {
         if rung { Wake::Rung } else { Wake::TimedOut }
     }
 
-    /// Whether the topic has to be drained after a [`Waiter::wait`]: somebody has rung for it since this
-    /// was last asked, or the wait was for everything, as it is without a ring, and now and then
-    /// besides.
+    /// Whether the topic has to be drained after a [`Waiter::wait`]: it was rung since this was
+    /// last asked, or everything is to be drained, as after a time-out and now and then after a
+    /// ring.
     #[inline]
     pub fn has<T: Topic>(&self) -> bool {
         self.rung_for(doorbell::reason(T::ID))
@@ -176,22 +184,23 @@ impl Waiter {
     }
 
     fn rung_for(&self, reason: usize) -> bool {
-        // Taken in any case: what is drained now needs no second look.
+        // Clear the reason in any case: what is drained now needs no second look.
         self.bell.rung_for(reason) || self.everything.get()
     }
 
-    /// Waits until `look` finds something, at most `timeout` of real time, and returns that. A
-    /// ring for which it finds nothing also ends the wait, with `None`.
+    /// Waits until `look` finds something, at most `timeout` of real time, and returns that. A ring
+    /// for which `look` finds nothing also ends the wait, with `None`.
     ///
-    /// For a thread that reads one topic: it is the faster way where the waiter spins, because the
-    /// sample itself is looked for and not the ring that follows it. `look` should be short, such
-    /// as one [`crate::Subscriber::receive`].
+    /// For a thread that reads one topic. This is faster where the waiter spins, because it looks
+    /// for the sample itself and not for the ring that follows. `look` should be short, such as one
+    /// [`crate::Subscriber::receive`].
     pub fn wait_for<R>(&self, timeout: Duration, mut look: impl FnMut() -> Option<R>) -> Option<R> {
         let mut found = None;
         let mut looks = 0_u32;
         self.wait_while_not(timeout, || {
             found = look();
-            // The bell now and then only: a ringer would have to fetch its line back each time.
+            // Look at the bell only now and then: each look makes the next ringer fetch its cache
+            // line again.
             let hears = looks.is_multiple_of(LOOKS);
             looks = looks.wrapping_add(1);
             found.is_some() || (hears && self.bell.rung())
@@ -200,12 +209,13 @@ impl Waiter {
         found.or_else(look)
     }
 
-    /// How many times it has gone to sleep: each is a system call, and one for who wakes it.
+    /// How many times it has gone to sleep: each costs one system call here, and one for the
+    /// process that wakes it.
     pub fn sleeps(&self) -> u64 {
         self.sleeps.get()
     }
 
-    /// What wakes this waiter from other threads of the process.
+    /// A [`Ringer`] that wakes this waiter from other threads of the process.
     ///
     /// # Errors
     /// None at present.

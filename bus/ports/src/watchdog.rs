@@ -1,10 +1,10 @@
 //! A watch over calls into the bus, which may never return.
 //!
-//! The transport waits without a time-out for a shared-memory segment to get its size; a process
-//! that is killed or frozen in between leaves one that never does, and whoever opens it hangs.
-//! Services have a supervisor for that. A tool has this: a thread of its own, which touches
+//! The transport waits without a time-out for a shared-memory segment to get its size. A process
+//! that is killed or frozen in between leaves a segment that never does, and a process that opens
+//! it hangs. Services have a supervisor for that; a tool has this watchdog. Its own thread touches
 //! nothing of the bus, counts how long a call takes and says when it has taken too long. It also
-//! sees to it that one wish to stop is enough, whatever the tool's other threads are in.
+//! makes one wish to stop enough, whatever the tool's other threads are doing.
 //!
 //! ```text
 //!            enter                        limit is over
@@ -23,8 +23,9 @@ use crate::shutdown::Shutdown;
 
 /// How often the watch looks.
 const TICK: Duration = Duration::from_millis(10);
-/// A longer pause between two looks counts as this one: the whole process did not run meanwhile,
-/// because it was frozen or kept from its core, and so was the call that is watched.
+/// A longer pause between two looks counts only as this long: the whole process did not run
+/// meanwhile, because it was frozen or kept from its core, and so the watched call did not run
+/// either.
 const LONGEST_TICK: Duration = Duration::from_millis(100);
 /// How long an orderly end may take after it was wished for.
 const GRACE: Duration = Duration::from_millis(500);
@@ -47,7 +48,7 @@ pub struct Watchdog {
     now: Arc<Mutex<Now>>,
 }
 
-/// What the watched threads are at.
+/// What the watched threads are doing.
 #[derive(Clone, Copy, Debug, Default)]
 struct Now {
     /// How many calls there have been.
@@ -57,8 +58,8 @@ struct Now {
 }
 
 impl Watchdog {
-    /// Watches from now on. `give_up` runs once, in the watch's thread, and is to end the
-    /// process: what hangs cannot be called back.
+    /// Watches from now on. `give_up` runs once, in the watch's thread, and must end the process,
+    /// because a call that hangs cannot be cancelled.
     ///
     /// # Errors
     /// The system has no thread for it.

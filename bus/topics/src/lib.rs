@@ -1,8 +1,8 @@
 //! Every topic of the bus in one table, with the layout of its samples.
 //!
-//! Apart from `lager-ports`, so that a tool that only reads recordings knows the
-//! layouts without the transport. This crate never opens the bus, never reads a
-//! clock and has no behaviour beyond naming, converting and describing data.
+//! It is apart from `lager-ports`, so that a tool that only reads recordings can use the layouts
+//! without the transport. This crate never opens the bus and never reads a clock; it only names,
+//! converts and describes data.
 //!
 //! * [`table`] lists the topics: name, payload, quality of service, actors.
 //! * [`payloads`] holds the sample layouts, one file per family of topics.

@@ -1,7 +1,7 @@
 //! Enums inside samples: a byte that may hold any value, with the enum as its meaning.
 //!
-//! A Rust enum in shared memory would make a foreign writer's mistake undefined behaviour in
-//! the reader. A [`Tag`] is read as `Option`, and an unknown code stays visible as a number.
+//! A Rust enum in shared memory would turn a mistake of a foreign writer into undefined behaviour
+//! in the reader. A [`Tag`] is read as an `Option`, and an unknown code stays visible as a number.
 
 use core::fmt;
 use core::marker::PhantomData;

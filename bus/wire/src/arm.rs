@@ -9,11 +9,12 @@
 //!   | <------- reply, check value in force -------- |
 //! ```
 //!
-//! A profile is obeyed as a whole: half of a new one beside half of the old one may allow what
-//! neither does. The carry pose stays on the Pi, where whoever turns the wheels needs it.
+//! A board obeys a profile as a whole, because half of a new one beside half of the old one may
+//! allow what neither of them does. The carry pose stays on the Pi, where the code that turns the
+//! wheels needs it.
 //!
-//! The type stands here because configuration, bridge, board and simulator must mean the same by
-//! it, the rules it has to keep included.
+//! The type stands here because configuration, bridge, board and simulator must agree on it and on
+//! the rules that it has to keep.
 
 mod rules;
 

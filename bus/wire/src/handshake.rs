@@ -8,7 +8,7 @@
 //! payload 4 to 7   0
 //! ```
 //!
-//! It is apart because the link machines decide what a handshake means; here it is only bytes.
+//! It only reads and writes bytes. The link machines decide what a handshake means.
 
 use crate::bytes::{Bytes, Fault, unused_from};
 use crate::coded::coded;

@@ -1,4 +1,5 @@
-//! What the sensor board tells the Pi: line state, raw line bits, distance (U5, U13, AMB-11, AMB-13).
+//! What the sensor board tells the Pi: line state, raw line bits, distance (U5, U13, AMB-11,
+//! AMB-13).
 
 use core::fmt;
 

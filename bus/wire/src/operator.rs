@@ -1,7 +1,7 @@
 //! The operator's commands, and the one table that turns them into the board's (AMB-1, AMB-2).
 //!
-//! They are apart because both lists use the codes 1 to 11 for different things. Whatever comes
-//! from a person passes this table; quarter turns and the delivery drop are not on it.
+//! They are apart because both lists use the codes 1 to 11 for different things. Every command from
+//! a person passes this table; quarter turns and the delivery drop are not in it.
 
 use crate::command::{ArmCommand, Command, WheelCommand};
 

@@ -7,7 +7,7 @@
 //!             original    code  left right  flags error (drops)  servo battery
 //! ```
 //!
-//! The complements are there so that noise cannot move the robot even where a CRC fits by chance.
+//! The complements make sure that noise cannot move the robot even where a CRC fits by chance.
 
 use crate::bytes::{Bytes, Fault, PAYLOAD_LENGTH, unused_from};
 use crate::command::Command;

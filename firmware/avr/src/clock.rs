@@ -95,14 +95,16 @@ pub fn sleep_until(due_us: u32) {
             unsafe { interrupt::enable() };
             return;
         }
-        // SAFETY: the instruction after `sei` is carried out before any interrupt, so an event between
-        // the look above and `sleep` ends the sleep. No lock is held. `nop` leaves an interrupt that was
-        // waiting one more instruction before the next `cli`: simavr wants it, the chip does not.
+        // SAFETY: the instruction after `sei` is carried out before any interrupt, so an event
+        // between the look above and `sleep` ends the sleep. No lock is held. `nop` leaves an
+        // interrupt that was waiting one more instruction before the next `cli`: simavr wants it,
+        // the chip does not.
         unsafe { core::arch::asm!("sei", "sleep", "nop") };
     }
 }
 
-/// Lets compare B interrupt, from the time just set on and not for one that has passed. Interrupts are off.
+/// Lets compare B interrupt, from the time just set on and not for one that has passed. Interrupts
+/// are off.
 #[inline(always)]
 pub fn arm_compare_b() {
     put(timer1().tifr1(), OCF_B);

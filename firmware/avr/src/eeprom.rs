@@ -16,7 +16,8 @@ pub fn read(address: u8) -> u8 {
     get(eeprom.eedr())
 }
 
-/// Begins to write a byte, which takes 3.4 ms; `false`, and nothing happens, while another is being written.
+/// Begins to write a byte, which takes 3.4 ms; `false`, and nothing happens, while another is being
+/// written.
 pub fn write(address: u8, value: u8) -> bool {
     let eeprom = eeprom();
     if get(eeprom.eecr()) & EEPE != 0 {

@@ -1,4 +1,5 @@
-//! What the two boards' programs share: the clock, the UART to the Pi, EEPROM, reset and watchdog, sleep.
+//! What the programs of both boards share: the clock, the UART to the Pi, EEPROM, reset and
+//! watchdog, sleep.
 //!
 //! ```text
 //!   lager-control   decides                     tested on the host
@@ -7,8 +8,8 @@
 //!   this library      clock, UART 0, reset
 //! ```
 //!
-//! These crates only move bits: whatever decides lives in `lager-control` and below, where the host tests
-//! it. Interrupts never nest and share data through [`shared::Shared`] alone.
+//! These crates only move bits. All decisions are in `lager-control` and below, where the host
+//! tests them. Interrupts never nest and share data through [`shared::Shared`] alone.
 
 #![no_std]
 #![feature(abi_avr_interrupt, asm_experimental_arch)]

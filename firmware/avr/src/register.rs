@@ -13,9 +13,10 @@ macro_rules! peripherals {
             #[inline(always)]
             #[must_use]
             pub fn $name() -> chip::$block {
-                // SAFETY: handing out a peripheral twice is unsound only if both holders rely on being
-                // alone. Nobody here does: each peripheral belongs to one module, which guards what it
-                // shares with its interrupts, and ports are changed bit by bit in one instruction.
+                // SAFETY: handing out a peripheral twice is unsound only if both holders rely on
+                // being alone. Nobody here does: each peripheral belongs to one module, which
+                // guards what it shares with its interrupts, and ports are changed bit by bit in
+                // one instruction.
                 unsafe { chip::$block::steal() }
             }
         )*

@@ -1,7 +1,8 @@
 //! Data that an interrupt and the main loop share.
 //!
-//! The chip has one core and its interrupts do not nest, so whoever has interrupts off is alone. Locks are
-//! held for a few cycles: the servos' UART must be served within 20 us. Queues need none.
+//! The chip has one core and its interrupts do not nest, so code that runs with interrupts off is
+//! alone. Locks are held for a few cycles, because the servos' UART must be served within 20 us.
+//! Queues need no lock.
 
 use avr_device::interrupt::{self, Mutex};
 use core::cell::UnsafeCell;
@@ -16,13 +17,13 @@ impl<T: Send> Shared<T> {
         Self(Mutex::new(UnsafeCell::new(value)))
     }
 
-    /// Uses the value, alone. `action` may not use the same value through this again; those here call a
-    /// method or two of the value itself.
+    /// Uses the value, alone. `action` may not use the same value through this again; those here
+    /// call a method or two of the value itself.
     #[inline(always)]
     pub fn with<R>(&self, action: impl FnOnce(&mut T) -> R) -> R {
         interrupt::free(|alone| {
-            // SAFETY: interrupts are off and there is one core, so no other use is under way, and by the
-            // rule above `action` does not begin one.
+            // SAFETY: interrupts are off and there is one core, so no other use is under way, and
+            // by the rule above `action` does not begin one.
             action(unsafe { &mut *self.0.borrow(alone).get() })
         })
     }
@@ -40,8 +41,8 @@ impl<T: Send> Shared<T> {
     }
 }
 
-/// A byte that an interrupt and the main loop share: the chip reads and writes it in one instruction, so no
-/// lock is needed.
+/// A byte that an interrupt and the main loop share: the chip reads and writes it in one
+/// instruction, so no lock is needed.
 pub struct SharedByte(UnsafeCell<u8>);
 
 // SAFETY: every access is one instruction, and there is one core.
@@ -68,17 +69,18 @@ impl SharedByte {
     }
 }
 
-/// A queue with one end in an interrupt and the other in the main loop. `N` is a power of two; it holds one
-/// less.
+/// A queue with one end in an interrupt and the other in the main loop. `N` is a power of two; it
+/// holds one less.
 ///
 /// ```text
 ///   taken: the next to read --.        .-- added: the next place to write
 ///   slots  . . . . . . . . . . x x x x . . . .
 /// ```
 ///
-/// Each end writes its own index only and after the slot, so neither locks the other out. The interrupts are
-/// what this is made for: bytes for indices, no division and few registers to save are a third of the cycles
-/// that `heapless::spsc` and `heapless::Deque` take, and a byte from a servo must be fetched within 160.
+/// Each end writes its own index only and after the slot, so neither locks the other out. The
+/// interrupts are what this is made for: bytes for indices, no division and few registers to save
+/// are a third of the cycles that `heapless::spsc` and `heapless::Deque` take, and a byte from a
+/// servo must be fetched within 160.
 pub struct Ring<T, const N: usize> {
     slots: UnsafeCell<[T; N]>,
     added: SharedByte,
@@ -111,7 +113,8 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         if next == self.taken.get() {
             return;
         }
-        // SAFETY: the index is below N, and the other end does not read this slot before `added` passes it.
+        // SAFETY: the index is below N, and the other end does not read this slot before `added`
+        // passes it.
         unsafe {
             self.slots
                 .get()
@@ -129,7 +132,8 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         if taken == self.added.get() {
             return None;
         }
-        // SAFETY: the index is below N, and the other end does not write this slot before `taken` passes it.
+        // SAFETY: the index is below N, and the other end does not write this slot before `taken`
+        // passes it.
         let element = unsafe {
             self.slots
                 .get()
@@ -157,8 +161,8 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     }
 }
 
-/// Room for a value that is made at start and lives as long as the program: in RAM that the linker counts,
-/// and not on the stack.
+/// Room for a value that is made at start and lives as long as the program: in RAM that the linker
+/// counts, and not on the stack.
 pub struct Place<T>(UnsafeCell<MaybeUninit<T>>);
 
 // SAFETY: the one use, `fill`, hands the content over to one caller.

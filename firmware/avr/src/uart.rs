@@ -1,7 +1,8 @@
-//! UART 0, the line to the Pi: both directions by interrupt, so that everything else goes on meanwhile (S4).
+//! UART 0, the line to the Pi: both directions by interrupt, so that everything else goes on
+//! meanwhile (S4).
 //!
 //! ```text
-//!   RXC  --> RECEIVED --> read()          a byte that finds the queue full is lost; its packet's check tells
+//!   RXC  --> RECEIVED --> read()          a byte is lost when the queue is full; the check tells
 //!   write() --> TO_SEND --> UDRE          all of a packet or nothing
 //!   TXC  --> idle                         the last stop bit has left
 //! ```
@@ -85,7 +86,8 @@ mod handlers {
         let uart = usart0();
         if let Some(byte) = TO_SEND.pop() {
             put(uart.udr0(), byte);
-            // A late byte may have let the transmitter run empty: the mark of the end is not this one's.
+            // A late byte may have let the transmitter run empty: the mark of the end is not this
+            // one's.
             put(uart.ucsr0a(), TXC);
         }
         if TO_SEND.is_empty() {

@@ -9,8 +9,8 @@
 //!            at the rest again
 //! ```
 //!
-//! Because only one byte is dropped at a time, a good packet behind noise, or hidden inside a rejected one,
-//! is found as long as its bytes came.
+//! Because only one byte is dropped at a time, a good packet behind noise, or hidden inside a
+//! rejected one, is found as long as its bytes came.
 
 use crate::{BROADCAST_ID, ErrorBits, HEADER, Instruction, MAX_FRAME, OVERHEAD, checksum};
 
@@ -99,8 +99,8 @@ impl<const N: usize> Decoder<N> {
 
     /// Takes the next byte from the wire; a packet comes out with its last byte.
     ///
-    /// When a rejected packet had swallowed several good ones, this byte brings the first of them and
-    /// [`Decoder::pending`] the rest.
+    /// When a rejected packet had swallowed several good ones, this byte brings the first of them
+    /// and [`Decoder::pending`] the rest.
     pub fn push(&mut self, byte: u8) -> Option<Packet<'_>> {
         self.forget_released();
         if usize::from(self.used) == N {

@@ -1,6 +1,7 @@
 //! The error byte of a status packet: which troubles the servo reports.
 
-/// Error bits of a status packet, the same bits as in the registers `ALARM_LED` and `ALARM_SHUTDOWN`.
+/// Error bits of a status packet, the same bits as in the registers `ALARM_LED` and
+/// `ALARM_SHUTDOWN`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct ErrorBits(pub u8);
 

@@ -137,7 +137,8 @@ impl Frame {
     }
 }
 
-/// A packet under construction. It goes on counting when the buffer is full, so that the error can tell.
+/// A packet under construction. It goes on counting when the buffer is full, so that the error can
+/// tell.
 ///
 /// Built in place: the chip takes 500 cycles to move one, and the wheels wait meanwhile.
 struct Builder {

@@ -1,7 +1,7 @@
 //! What a servo can be asked to do (A4).
 
-/// An instruction code. The last four names are in the original's listing but not in today's manual of the
-/// servo; they can be decoded and are never sent by this robot (AMB-33).
+/// An instruction code. The last four names are in the original's listing but not in today's manual
+/// of the servo; they can be decoded and are never sent by this robot (AMB-33).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Instruction {

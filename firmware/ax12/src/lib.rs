@@ -1,4 +1,5 @@
-//! Dynamixel protocol 1.0, as the AX-12 servos of the arm speak it at 1 Mbit/s on one half-duplex wire.
+//! Dynamixel protocol 1.0, as the AX-12 servos of the arm speak it at 1 Mbit/s on one half-duplex
+//! wire.
 //!
 //! ```text
 //! instruction:  FF FF | id | length | instruction | parameter 1..N | checksum
@@ -8,12 +9,12 @@
 //! checksum = !(id + length + instruction|error + parameters), low eight bits
 //! ```
 //!
-//! The codec stands apart from the arm's control because both ends of the wire need it: the steering board
-//! asks, the servo models of the plant answer. It never touches a port, never waits, never allocates and
-//! never decides what a servo should do.
+//! The codec stands apart from the arm's control because both ends of the wire need it: the
+//! steering board asks, the servo models of the plant answer. It never touches a port, never waits,
+//! never allocates and never decides what a servo should do.
 //!
-//! A packet is written with [`Frame`] and read back, byte by byte, with [`Decoder`]. The two packet kinds
-//! share one shape, so only the reader's place on the wire says which of them a packet is.
+//! A packet is written with [`Frame`] and read back, byte by byte, with [`Decoder`]. The two packet
+//! kinds share one shape, so only the reader's place on the wire says which of them a packet is.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -42,7 +43,8 @@ pub const MAX_ID: u8 = 0xFD;
 /// Length of a status packet without parameters (A5, `DEFAULT_RETURN_PACKET_SIZE`).
 pub const SHORT_STATUS_LENGTH: usize = 6;
 
-/// Longest packet this crate writes: a SYNC_WRITE of position, speed and torque limit to eight servos.
+/// Longest packet this crate writes: a SYNC_WRITE of position, speed and torque limit to eight
+/// servos.
 pub const MAX_FRAME: usize = 64;
 
 /// Bytes of a packet that are not parameters: header, id, length, instruction or error, checksum.

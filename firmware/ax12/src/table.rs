@@ -1,9 +1,9 @@
-//! The servo's control table: the address of every register the original lists (A3) and the shape of the
-//! values this robot uses.
+//! The servo's control table: the address of every register the original lists (A3) and the shape
+//! of the values this robot uses.
 //!
-//! Values of two bytes lie low byte first at the address named `_L`. Registers 0..=23 are kept without
-//! power, from [`TORQUE_ENABLE`] on they are lost. Addresses 10, 19..=23 and 45 are not in today's manual:
-//! their names are kept, they are never written (AMB-33).
+//! Values of two bytes lie low byte first at the address named `_L`. Registers 0..=23 are kept
+//! without power, from [`TORQUE_ENABLE`] on they are lost. Addresses 10, 19..=23 and 45 are not in
+//! today's manual: their names are kept, they are never written (AMB-33).
 
 #![allow(missing_docs)] // The names are the table's own.
 
@@ -76,7 +76,8 @@ pub const BAUD_1_MBIT: u8 = 1;
 /// Value of [`MODEL_NUMBER_L`] of an AX-12.
 pub const MODEL_AX12: u16 = 12;
 
-/// Decodes a present speed or load: ten bits of size, bit 10 set = clockwise, which is negative here.
+/// Decodes a present speed or load: ten bits of size, bit 10 set = clockwise, which is negative
+/// here.
 ///
 /// The result is in -1023..=1023.
 #[must_use]

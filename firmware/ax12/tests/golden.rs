@@ -1,4 +1,5 @@
-//! Published packets, encoded and decoded byte for byte. If a test here fails, do not change the test.
+//! Published packets, encoded and decoded byte for byte. If a test here fails, do not change the
+//! test.
 
 mod vectors;
 

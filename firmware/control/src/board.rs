@@ -1,7 +1,8 @@
 //! What a board must offer to the code that decides.
 //!
-//! The traits stand apart so that decisions never name a pin (O7). Implementations move bits and bytes and
-//! decide nothing. No call waits for anything from outside; reading a sensor takes as long as its conversion.
+//! The traits stand apart so that decisions never name a pin (O7). Implementations move bits and
+//! bytes and decide nothing. No call waits for anything from outside; reading a sensor takes as
+//! long as its conversion.
 
 use lager_wire::ResetCause;
 
@@ -28,26 +29,26 @@ pub trait Board {
     /// Tells the watchdog that the loop is alive.
     fn kick_watchdog(&mut self);
 
-    /// A byte of the EEPROM, 0..[`EEPROM_LENGTH`]; 255 where nothing was ever written. Asked for before the
-    /// first write only.
+    /// A byte of the EEPROM, 0..[`EEPROM_LENGTH`]; 255 where nothing was ever written. Asked for
+    /// before the first write only.
     fn eeprom_read(&self, address: u8) -> u8;
 
-    /// Begins to write a byte of the EEPROM, which keeps it without power; `false`, and nothing happens,
-    /// while the one before is being written (some milliseconds).
+    /// Begins to write a byte of the EEPROM, which keeps it without power; `false`, and nothing
+    /// happens, while the one before is being written (some milliseconds).
     fn eeprom_write(&mut self, address: u8, value: u8) -> bool;
 }
 
 /// The sensor board: line sensors, IR ranger, the sending end of ExDe.
 pub trait SensorBoard: Board {
-    /// One line sensor, 0 = leftmost ..= 10 = rightmost; a high value is tape (S6). They are read in order,
-    /// so a board may prepare the next one.
+    /// One line sensor, 0 = leftmost ..= 10 = rightmost; a high value is tape (S6). They are read
+    /// in order, so a board may prepare the next one.
     fn read_line_sensor(&mut self, channel: u8) -> u8;
 
     /// The IR ranger, 0..=1023 for 0..5 V.
     fn read_ir(&mut self) -> u16;
 
-    /// Begins to send a word to the steering board; it goes on beside everything else. `false`, and nothing
-    /// happens, while another is under way or nobody has answered yet.
+    /// Begins to send a word to the steering board; it goes on beside everything else. `false`, and
+    /// nothing happens, while another is under way or nobody has answered yet.
     fn exde_send(&mut self, word: u16) -> bool;
 
     /// Whether bits of a word are still to be sent.
@@ -62,7 +63,8 @@ pub trait SteeringBoard: Board {
     /// The oldest word received and not yet read, and when its last bit came.
     fn exde_word(&mut self) -> Option<(u16, u32)>;
 
-    /// Whether some bits of a word have come and others are still to come; never where words come whole.
+    /// Whether some bits of a word have come and others are still to come; never where words come
+    /// whole.
     fn exde_is_receiving(&self) -> bool {
         false
     }
@@ -70,7 +72,8 @@ pub trait SteeringBoard: Board {
     /// Words lost to missing pulses, and disturbing pulses; stays at 255.
     fn exde_errors(&self) -> u8;
 
-    /// Queues bytes to the servos, all or none; whether they were queued. The board mutes the echo (AMB-26).
+    /// Queues bytes to the servos, all or none; whether they were queued. The board mutes the echo
+    /// (AMB-26).
     fn servo_write(&mut self, bytes: &[u8]) -> bool;
 
     /// The oldest byte a servo sent and not yet read.
@@ -80,8 +83,8 @@ pub trait SteeringBoard: Board {
     fn battery_decivolts(&mut self) -> u8;
 }
 
-/// What one motor driver is to do. Forward is the robot's, not the driver's: the drivers are mirrored, and
-/// which level of a DIR pin that means is the board's knowledge (W2).
+/// What one motor driver is to do. Forward is the robot's, not the driver's: the drivers are
+/// mirrored, and which level of a DIR pin that means is the board's knowledge (W2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct Motor {
     /// Duty, 0..=255 of full.

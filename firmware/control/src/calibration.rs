@@ -1,5 +1,5 @@
-//! Calibrating the line sensors (E9): the operator moves the array over floor and tape for a while, and the
-//! threshold of every channel becomes the middle of what it saw.
+//! Calibrating the line sensors (E9): the operator moves the array over floor and tape for a while,
+//! and the threshold of every channel becomes the middle of what it saw.
 //!
 //! ```text
 //!   idle -- start --> watching -- time is up --> thresholds, idle

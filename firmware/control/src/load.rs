@@ -27,8 +27,8 @@ impl Load {
         self.longest_us = self.longest_us.max(pass_us);
     }
 
-    /// Load in percent and the longest pass in 0.1 ms, both since the last call. Everything waits for it, so
-    /// it makes do with short numbers: the chip divides long ones in 400 cycles each.
+    /// Load in percent and the longest pass in 0.1 ms, both since the last call. Everything waits
+    /// for it, so it makes do with short numbers: the chip divides long ones in 400 cycles each.
     pub(crate) fn report(&mut self, now_us: u32) -> (u8, u8) {
         let mut span = now_us.wrapping_sub(self.since_us).max(1);
         let mut busy = self.busy_us.min(span);

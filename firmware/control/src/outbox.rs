@@ -1,7 +1,7 @@
 //! Packets that are encoded and wait for room in the UART's queue.
 //!
-//! An encoded packet has its number, so it may not be thrown away when the UART is full: the Pi would count
-//! it as lost. It waits here, in order.
+//! An encoded packet already has its number. If it were dropped when the UART is full, the Pi would
+//! count it as lost, so it waits here, in order.
 
 use heapless::Deque;
 use lager_wire::PACKET_LENGTH;
@@ -29,8 +29,8 @@ impl Outbox {
         self.packets.is_empty()
     }
 
-    /// Hands a packet to the UART, or puts it behind the others that wait for room there. The callers make at
-    /// most four at a time and only into an empty box.
+    /// Hands a packet to the UART, or puts it behind the others that wait for room there. The
+    /// callers make at most four at a time and only into an empty box.
     pub(crate) fn send(&mut self, board: &mut impl Board, packet: [u8; PACKET_LENGTH]) {
         if self.packets.is_empty() && board.uart_write(&packet) {
             return;

@@ -1,12 +1,14 @@
 //! The line regulator: PD on integers (W3).
 //!
-//! `u = Kp * e + Kd * (e(t) - e(t - 10 ms))`, in duty steps, positive = turn right. P acts on every word
-//! from the sensor board; D is a difference over ten milliseconds however often words come, so that the
-//! gains mean the same at every baud rate. Words that come at another pace are scaled to it.
+//! `u = Kp * e + Kd * (e(t) - e(t - 10 ms))`, in duty steps, positive = turn right. P acts on every
+//! word from the sensor board; D is a difference over ten milliseconds however often words come, so
+//! that the gains mean the same at every baud rate. Words that come at another pace are scaled to
+//! it.
 //!
-//! Where the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the sign
-//! of `e`. A robot whose motors need much duty for little speed gets round the tightest bend by it;
-//! without, the error stands at its end there, and the least disturbance more loses the line.
+//! Where the line is under the outer sensors, P counts once more: `u += Kp * (|e| - 5)` with the
+//! sign of `e`. This brings a robot whose motors need much duty for little speed round the tightest
+//! bend. Without it the error stays at its limit there, and the least further disturbance loses the
+//! line.
 //!
 //! ```text
 //!   samples:   ...  e3   e2   e1   e(now)
@@ -39,7 +41,8 @@ const OUTER: i8 = 5;
 const SPAN_US: u32 = 10_000;
 /// The least age of the sample D is taken against.
 const LEAST_AGE_US: u32 = 7_500;
-/// Samples closer together than this are not all remembered, so that four always reach back far enough.
+/// Samples closer together than this are not all remembered, so that four always reach back far
+/// enough.
 const SPACING_US: u32 = 2_400;
 /// A pause after which older samples tell nothing.
 const STALE_US: u32 = 50_000;

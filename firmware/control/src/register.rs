@@ -7,10 +7,11 @@
 //!      '-- differs from copy: sets the flag-'
 //! ```
 //!
-//! Nothing from outside acts directly: reception only writes the command register, the loop takes it over
-//! where it suits. The number of a command says what a repetition means: the same command with the same
-//! number only renews the age, anything else is to be executed. A command that differs in its code alone is
-//! executed too, so that a Pi that starts its numbers afresh can always stop the robot.
+//! Nothing from outside acts directly: reception only writes the command register, and the loop
+//! takes the command over when it is ready. The number of a command tells a repetition from a new
+//! command: the same command with the same number only renews the age, anything else is executed. A
+//! command that differs only in its code is executed too, so that a Pi that starts its numbers
+//! afresh can always stop the robot.
 
 use lager_wire::SteerCommand;
 

@@ -16,8 +16,8 @@ impl Replies {
         }
     }
 
-    /// Puts an answer behind the others. The latest matter: when there is no room the oldest gives way, and
-    /// whoever asked asks again.
+    /// Puts an answer behind the others. The latest matter: when there is no room the oldest gives
+    /// way, and whoever asked asks again.
     pub(crate) fn push(&mut self, reply: SettingReply) {
         if self.waiting.is_full() {
             self.waiting.pop_front();

@@ -8,8 +8,8 @@ const BROWN_OUT: u8 = 1 << 2;
 const WATCHDOG: u8 = 1 << 3;
 const JTAG: u8 = 1 << 4;
 
-/// The cause that the ATmega's reset flags (`MCUSR`) tell. `panicked` is the mark that a panic leaves in
-/// RAM before it lets the watchdog reset the board; after power-on RAM tells nothing.
+/// The cause that the ATmega's reset flags (`MCUSR`) tell. `panicked` is the mark that a panic
+/// leaves in RAM before it lets the watchdog reset the board; after power-on RAM tells nothing.
 ///
 /// Flags gather until the program clears them; the strongest cause counts.
 #[must_use]

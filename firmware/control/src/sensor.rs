@@ -1,4 +1,5 @@
-//! The sensor board: line and distance in, packets to the Pi and words to the steering board out (S1-S10).
+//! The sensor board: line and distance in, packets to the Pi and words to the steering board out
+//! (S1-S10).
 //!
 //! ```text
 //!   every 5 ms, and not before everything of the last pass has left (S10):
@@ -9,11 +10,13 @@
 //!                                             or, when due, an answer to a setting, board status
 //! ```
 //!
-//! The rarer things take the place of a distance: a pass that told more would be longer, and the wheels
-//! would wait for the next word.
+//! The rarer things take the place of a distance, twice a second for the board status. That departs
+//! from the document's FlipFlop, which takes strict turns. But a pass that sends two things is
+//! longer, and delays the next word to the wheels by 0.3 ms.
 //!
-//! The two handshakes do not wait for each other: without the steering board the Pi is served, without the
-//! Pi the steering board is. Packets and words leave by interrupt beside everything else (S4).
+//! The two handshakes do not wait for each other: without the steering board the Pi is served,
+//! without the Pi the steering board is. Packets and words leave by interrupt beside everything
+//! else (S4).
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
@@ -39,8 +42,8 @@ pub struct SensorConfig {
     pub loop_period_us: u32,
     /// The IR ranger's model.
     pub ir_model: IrModel,
-    /// From this reading of each line sensor on there is tape, leftmost first; in force until a calibration,
-    /// which is kept in EEPROM.
+    /// From this reading of each line sensor on there is tape, leftmost first; in force until a
+    /// calibration, which is kept in EEPROM.
     pub thresholds: [u8; CHANNELS],
     /// From one board status to the next, in microseconds.
     pub status_period_us: u32,
@@ -51,8 +54,8 @@ pub struct SensorConfig {
 }
 
 impl SensorConfig {
-    /// What the chip runs: pass after pass, as fast as packets and words leave at 500 000 Bd. The simulator's
-    /// robot takes ten times as long, which is enough to drive by and costs a tenth.
+    /// What the chip runs: pass after pass, as fast as packets and words leave at 500 000 Bd. The
+    /// simulator's robot takes ten times as long, which is enough to drive by and costs a tenth.
     pub const FAST: Self = Self {
         loop_period_us: 500,
         ..Self::USUAL
@@ -131,8 +134,8 @@ impl SensorUnit {
         }
     }
 
-    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which the next
-    /// step is wanted at the latest. Any input wants one at once.
+    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which
+    /// the next step is wanted at the latest. Any input wants one at once.
     pub fn step<B: SensorBoard>(&mut self, board: &mut B) -> u32 {
         let now_us = board.now_us();
         board.kick_watchdog();
@@ -211,8 +214,8 @@ impl SensorUnit {
     fn pass<B: SensorBoard>(&mut self, board: &mut B, now_us: u32) {
         self.note_pass(now_us);
         let bits = self.read_line(board);
-        // The wheels wait for the word, so it leaves before anything else is thought about. Nobody to send to
-        // yet is no failure: the next pass has a newer word.
+        // The wheels wait for the word, so it leaves before anything else is thought about. Nobody
+        // to send to yet is no failure: the next pass has a newer word.
         let _ = board.exde_send(bits.0);
         let reading = self.reader.read(bits, now_us);
         self.finish_calibration(now_us);
@@ -259,8 +262,8 @@ impl SensorUnit {
         LineBits::new(bits)
     }
 
-    /// The second answer to a calibration tells how many channels have a new threshold; anything but all
-    /// of them is out of range.
+    /// The second answer to a calibration tells how many channels have a new threshold; anything
+    /// but all of them is out of range.
     fn finish_calibration(&mut self, now_us: u32) {
         let Some(calibrated) = self.calibration.finish(now_us) else {
             return;

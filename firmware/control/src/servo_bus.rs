@@ -9,8 +9,8 @@
 //!    '-- Answer::None <-- second time out
 //! ```
 //!
-//! One wire carries both directions (A1), so nothing is sent while an answer may come. Bytes that arrive
-//! unasked, answers of other servos and answers with a wrong checksum are no answers.
+//! One wire carries both directions (A1), so nothing is sent while an answer may come. Bytes that
+//! arrive unasked, answers of other servos and answers with a wrong checksum are no answers.
 
 use heapless::Vec;
 use lager_ax12::{ErrorBits, Frame, StatusDecoder, table};
@@ -21,7 +21,8 @@ use crate::time::reached;
 /// How often a question is put before the servo counts as not answering.
 const ATTEMPTS: u8 = 2;
 
-/// The most bytes of an answer that one poll takes in, so that the wheels do not wait for a whole one.
+/// The most bytes of an answer that one poll takes in, so that the wheels do not wait for a whole
+/// one.
 const MOST_BYTES: u8 = 4;
 
 /// Registers read at once: present position to moving.
@@ -62,7 +63,8 @@ pub(crate) enum Answer {
     None,
 }
 
-/// The longest question: a write of six registers. A whole [`Frame`] takes the chip five times as long to move.
+/// The longest question: a write of six registers. A whole [`Frame`] takes the chip five times as
+/// long to move.
 const LONGEST: usize = 13;
 
 #[derive(Debug, Clone)]
@@ -119,8 +121,8 @@ impl ServoBus {
         self.ask(&frame, id, board, now_us);
     }
 
-    /// Sets goal position, speed and torque limit in one write. The torque limit goes along because a
-    /// servo that switched itself off has it at 0.
+    /// Sets goal position, speed and torque limit in one write. The torque limit goes along because
+    /// a servo that switched itself off has it at 0.
     pub(crate) fn set_goal(
         &mut self,
         id: u8,

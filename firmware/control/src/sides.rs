@@ -1,16 +1,16 @@
-//! How unlike the two motors are: what the regulator always had to add, learnt on straight lines
-//! (W3, W6).
+//! How much the two motors differ: the correction that the regulator always had to add, learnt on
+//! straight lines (W3, W6).
 //!
 //! ```text
 //!   settled corrections --> mean of the last second --- at a mark --> bias: left + b, right - b
 //! ```
 //!
-//! The line before a mark of the grid is straight, the way out to the delivery need not be: so the
+//! The line before a mark of the grid is straight; the way out to the delivery need not be. So the
 //! mean counts only when a mark comes, and neither at the delivery's bar, where the line ends, nor
-//! at the next mark behind it, where the way back does. What brings the robot to its line after
-//! a turn tells nothing of the sides, and a station's mark may come soon after one. The bias is
-//! added wherever both sides are to be alike: to every correction, to turns on the spot, which
-//! would wander off their place, and to the commands by hand.
+//! at the next mark behind it, where the way back does. The corrections that bring the robot to its
+//! line after a turn say nothing about the sides, and a station's mark may come soon after a turn.
+//! The bias is added wherever both sides should turn alike: to every correction, to turns on the
+//! spot, which would otherwise wander, and to the commands by hand.
 
 use lager_wire::LineState;
 
@@ -28,8 +28,8 @@ const SETTLED: u8 = 100;
 const LEAST: u8 = 175;
 /// The most bias, in duty steps.
 const MOST: i16 = 12;
-/// For so many words the line may look like one after tape to both sides, as the bar does that is left
-/// at an angle: 150 ms.
+/// For so many words the line may look like one after tape to both sides, as the bar does that is
+/// left at an angle: 150 ms.
 const ASKEW: u8 = 30;
 /// Stands in `end` where the line has ended and no mark has come since.
 const ENDED: u8 = u8::MAX;

@@ -7,9 +7,10 @@
 //!   save: layout = 255 --> counter, settings, CRC --> layout      into the older copy
 //! ```
 //!
-//! A copy counts when its layout and its check value are right; of two, the one with the later counter. The
-//! layout byte goes first and comes last, so a save that is cut off leaves the other copy in force. A byte
-//! takes the chip some milliseconds: every step hands over at most one, and nothing waits.
+//! A copy counts when its layout and its check value are right; of two, the one with the later
+//! counter. A save clears the layout byte first and writes it last, so a save that is cut off
+//! leaves the other copy in force. The chip takes some milliseconds for a byte: every step hands
+//! over at most one, and nothing waits.
 
 use lager_wire::checksum;
 

@@ -1,11 +1,11 @@
-//! The battery's part in the wheels' speed, taken out: a full battery drives the same duty faster
-//! than one that is nearly empty, and near the duty at which the wheels break loose much faster.
+//! Takes the battery's influence out of the wheels' speed. With the same duty a full battery drives
+//! faster than one that is nearly empty, and much faster near the duty at which the wheels break
+//! loose.
 //!
-//! `duty at the pins = duty * 11.1 V / battery`: every duty that is decided, ordered or reported is
-//! one at 11.1 V, three lithium cells at rest, and only the motor drivers are given another. The
-//! battery is the mean of the last readings, since it sags with every start. Within a reading's
-//! step of 11.1 V nothing changes, and neither does a battery that cannot be one: what is not measured
-//! is not corrected.
+//! `duty at the pins = duty * 11.1 V / battery`. Every duty that is decided, ordered or reported is
+//! a duty at 11.1 V, three lithium cells at rest; only the motor drivers get another one. The
+//! battery's voltage is the mean of the last readings, because it sags with every start. Within one
+//! step of a reading of 11.1 V nothing is corrected, nor for a voltage that no battery can have.
 
 use crate::Motor;
 use crate::divide::divide;

@@ -1,6 +1,6 @@
 //! Comparing wrapping microseconds.
 //!
-//! A time is past when it lies less than half the clock's round behind. Whoever stores a time that may grow
+//! A time is past when it lies less than half the clock's range behind. Code whose time may grow
 //! older than that stores the conclusion instead.
 
 /// Whether `now` is at or past `due`.

@@ -10,7 +10,7 @@
 //!
 //! Without words from the sensor board a turn is purely timed. With them it gets three eighths of
 //! its time more while no tape has come: motors and batteries differ, and a turn that ends before
-//! its tape ends nowhere.
+//! its tape leaves the robot without a line.
 
 use lager_wire::LineBits;
 
@@ -20,8 +20,8 @@ use crate::time::reached;
 /// A full turn at the standard duty takes twelve seconds (W4, `STANDARD_THREESIXTY`).
 pub const FULL_TURN_US: u32 = 12_000_000;
 
-/// How long the centre must be off the tape before a turn that began on tape may end on it: longer than a
-/// stain, and two words of a board that sends one every 5 ms.
+/// How long the centre must be off the tape before a turn that began on tape may end on it: longer
+/// than a stain, and two words of a board that sends one every 5 ms.
 const OFF_US: u32 = 4_500;
 
 /// Which way round a turn goes.

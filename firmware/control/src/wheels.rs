@@ -7,9 +7,9 @@
 //!      '------------------- 1 ---------------------'---> Standby <-----'
 //! ```
 //!
-//! Every wheel command replaces the mode before it; only a turn ends by itself. In all modes but following
-//! the duty is the standard one or 0. Following is watched ([`crate::follow`]): without words or tape it is
-//! given up, and stays so until the next command.
+//! Every wheel command replaces the mode before it; only a turn ends by itself. In all modes but
+//! following the duty is the standard one or 0. Following is watched ([`crate::follow`]): without
+//! words or tape it is given up, and stays so until the next command.
 
 use lager_wire::{LineBits, WheelCommand};
 
@@ -100,7 +100,8 @@ impl Wheels {
         Some(seq)
     }
 
-    /// Ends a turn that has come to its end; its number then. Starts the time of one that may begin.
+    /// Ends a turn that has come to its end; its number then. Starts the time of one that may
+    /// begin.
     pub(crate) fn advance(&mut self, may_turn: bool, now_us: u32) -> Option<u8> {
         let Mode::Turn {
             seq,
@@ -156,7 +157,8 @@ impl Wheels {
         }
     }
 
-    /// The motors in this mode. `correction` is the regulator's, `None` when there is no line to follow.
+    /// The motors in this mode. `correction` is the regulator's, `None` when there is no line to
+    /// follow.
     pub(crate) fn motors(&self, correction: Option<i16>) -> Motors {
         let ahead = Motor::forward(PWM_STANDARD);
         let back = Motor::backward(PWM_STANDARD);
@@ -232,9 +234,10 @@ impl Wheels {
     }
 }
 
-/// Duties around the standard one (AMB-20). Backwards the sensors trail the axle, so the correction changes
-/// its sign and is halved (AMB-21). That is unproven and cannot be stable by itself: any correction by
-/// trailing sensors lets the axle drift off at about speed / sensor distance, so it is for short ways only.
+/// Duties around the standard one (AMB-20). Backwards the sensors trail the axle, so the correction
+/// changes its sign and is halved (AMB-21). That is unproven and cannot be stable by itself: any
+/// correction by trailing sensors lets the axle drift off at about speed / sensor distance, so it
+/// is for short ways only.
 fn follow(along: Along, correction: i16) -> Motors {
     match along {
         Along::Forward => (

@@ -1,8 +1,8 @@
 //! The IR curves against Sharp's data, and the laws every curve keeps.
 //!
-//! The points are copied facts: figure 2 of Sharp's data sheet E4-A00201EN (GP2Y0A21YK0F, white paper; the
-//! drawing is good to about 0.02 V) and the hand-read table gp2y0A41SK of J. Doggen's Arduino distance
-//! library.
+//! The points are copied facts: figure 2 of Sharp's data sheet E4-A00201EN (GP2Y0A21YK0F, white
+//! paper; the drawing is good to about 0.02 V) and the hand-read table gp2y0A41SK of J. Doggen's
+//! Arduino distance library.
 
 use lager_control::ir::IrModel;
 use lager_wire::Centimetres;

@@ -211,7 +211,8 @@ fn the_centre_is_the_three_middle_sensors() {
     }
 }
 
-/// Tape as rectangles: middle, half length along its own axis, half width, angle to the driving direction.
+/// Tape as rectangles: middle, half length along its own axis, half width, angle to the driving
+/// direction.
 struct Tape {
     x: f64,
     y: f64,
@@ -252,8 +253,8 @@ fn across(right: f64, left: f64) -> Tape {
     }
 }
 
-/// Drives the array over the track at an angle in degrees (positive = turned left) and an offset to the
-/// left in mm, and lists every state in order, repetitions left out.
+/// Drives the array over the track at an angle in degrees (positive = turned left) and an offset to
+/// the left in mm, and lists every state in order, repetitions left out.
 fn sweep(track: &[Tape], degrees: f64, offset: f64) -> Vec<LineState> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let mut reader = Paced::every(5_000);

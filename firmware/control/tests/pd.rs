@@ -68,8 +68,8 @@ fn under_the_outer_sensors_p_counts_once_more() {
 
 #[test]
 fn the_derivative_is_over_ten_milliseconds_at_every_pace() {
-    // A line that wanders one half step every 5 ms changes by 2 in 10 ms: D = 10 * 2, give or take what a
-    // whole number of half steps can be off.
+    // A line that wanders one half step every 5 ms changes by 2 in 10 ms: D = 10 * 2, give or take
+    // what a whole number of half steps can be off.
     for pace_us in [500, 1_000, 2_600, 5_000, 8_000, 11_500, 20_000, 40_000] {
         let mut pd = Pd::new(Gains { p: 0, d: 10 });
         for step in 0.. {

@@ -153,8 +153,8 @@ fn on_a_slow_line_reports_are_fewer_and_never_late() {
     bench.run_ms(1_000);
     let reports = bench.reports().len();
     assert!((60..=87).contains(&reports), "{reports}");
-    // A report is made when the line is free, so it is not old when it arrives. Only the rarer packets
-    // stand in a row: an arm's servo and the board's status.
+    // A report is made when the line is free, so it is not old when it arrives. Only the rarer
+    // packets stand in a row: an arm's servo and the board's status.
     let waiting = bench
         .pins
         .uart

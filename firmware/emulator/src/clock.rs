@@ -1,8 +1,8 @@
 //! The chips' time for everybody on this machine, in one shared page.
 //!
-//! Leases and time-outs of the robot's services count the body's time. A simulated body follows
-//! their clock; an emulated one cannot promise a speed, so they follow its. The page holds eight
-//! 64-bit words in the machine's byte order:
+//! Leases and time-outs of the robot's services count the body's time. A simulated body follows the
+//! services' clock. An emulated body cannot promise a speed, so the services follow its clock. The
+//! page holds eight 64-bit words in the machine's byte order:
 //!
 //! ```text
 //! byte  0  the letters "LAGERCLK"
@@ -15,8 +15,10 @@
 //!      56  how often an emulator has started on this page
 //! ```
 //!
-//! Between two updates, about half a millisecond, a reader may go on at the rate, but no further
-//! than a millisecond: then the emulator is late, and time stands still with it.
+//! Between two updates, about half a millisecond, a reader may extrapolate at the rate, but by no
+//! more than a millisecond: then the emulator is late, and time stands still with it. One emulator
+//! at a time writes a page, by `flock`, so that a killed one and its successor cannot turn time
+//! back.
 #![allow(unsafe_code)] // Mapping a file is; every block says why it is sound.
 
 use core::sync::atomic::{AtomicU64, Ordering, fence};

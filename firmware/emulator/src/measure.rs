@@ -29,14 +29,16 @@ const SETTLING_BYTES: u64 = 30;
 const QUIET: u64 = FREQUENCY * 15 / 1_000;
 /// How long a jump may take to show, in cycles: 60 ms.
 const SHOWING: u64 = FREQUENCY * 60 / 1_000;
-/// Robots tried: the boards of each started at other times, so their rarer work meets in another way.
+/// Robots tried: the boards of each started at other times, so their rarer work meets in another
+/// way.
 const ROBOTS: u64 = 3;
 /// Phases tried with each. Their distance has no common divisor with any period of the boards.
 const PHASES: u64 = 140;
 const PHASE: u64 = 16_139;
 /// Phases are spread over this many cycles: longer than a pass of the sensor board at 9600 Bd.
 const SPREAD: u64 = 400_000;
-/// Phases tried about the sensor board's status, whose pass is its longest, and comes twice a second only.
+/// Phases tried about the sensor board's status, whose pass is its longest, and comes twice a
+/// second only.
 const STATUS_PHASES: u64 = 10;
 const STATUS_PERIOD: u64 = FREQUENCY / 2;
 /// From two passes before the next status on, this many cycles apart.
@@ -286,7 +288,8 @@ impl Bench {
         }))
     }
 
-    /// When the sensor board will tell a status, by the latest one: half a second after `after` or later.
+    /// When the sensor board will tell a status, by the latest one: half a second after `after` or
+    /// later.
     fn next_status(&mut self, after: u64) -> Result<u64, MeasureError> {
         self.sensor.packets.clear();
         self.run_until(self.rig.cycle() + STATUS_PERIOD + SHOWING);

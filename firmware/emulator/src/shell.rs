@@ -94,7 +94,7 @@ pub enum RunError {
         /// How fast it should.
         wanted: u32,
     },
-    /// Nobody takes the truth.
+    /// No reader takes the truth.
     #[error("the truth cannot be written to standard output: {0}; leave --truth away")]
     Truth(#[source] io::Error),
 }

@@ -1,8 +1,8 @@
 //! How the robot really is, one line of JSON at a time, and back.
 //!
-//! The emulator knows no topic; whoever started it reads these lines and publishes them. A line is
-//! a sample of the topic `truth/pose` as JSON, so it is read and written there without another
-//! format. A killed emulator goes on from the last line.
+//! The emulator knows no topic; the process that started it reads these lines and publishes them. A
+//! line is a sample of the topic `truth/pose` as JSON, so no other format is needed. A killed
+//! emulator goes on from the last line.
 
 use core::time::Duration;
 

@@ -1,20 +1,20 @@
 //! The receiver's end: sampled bits in, words out.
 //!
 //! ```text
-//!              a pulse                  silence: answer
-//!   unanswered ---------> unaligned ----------------------> aligned, 0 bits <-- silence --.
-//!                                                              | pulse    ^               |
-//!                                                              v          |               |
-//!                                                           aligned, n bits               |
-//!                                                              |      |                   |
-//!                                     silence; n = 1: a        |      '-- word full --> complete
-//!                                     handshake, answer; else <'                          | pulse:
-//!                                     an error, counted                                   '- counted
+//!              a pulse               silence: answer
+//!   unanswered ---------> unaligned -----------------> aligned, 0 bits <-- silence --.
+//!                                                         | pulse    ^               |
+//!                                                         v          |               |
+//!                                                      aligned, n bits               |
+//!                                                         |      |                   |
+//!                                silence; n = 1: a        |      '-- word full --> complete
+//!                                handshake, answer; else <'                          | pulse:
+//!                                an error, counted                                   '- counted
 //! ```
 //!
-//! Return sync is the only thing the receiver ever sends (X7): for the first pulse it meets and for a pulse
-//! that stands alone, which is how a restarted sender asks again. It knows no clock: a timer that every
-//! pulse restarts tells it of the silence.
+//! Return sync is the only thing the receiver ever sends (X7): for the first pulse it meets and for
+//! a pulse that stands alone, which is how a restarted sender asks again. It knows no clock: a
+//! timer that every pulse restarts tells it of the silence.
 
 use crate::{Timing, WORD_BITS};
 
@@ -36,8 +36,8 @@ const NO_BITS: u16 = 1;
 pub struct Receiver {
     bits: u8,
     alignment: Alignment,
-    /// The shift register of the original (X8), first bit highest, and above it a mark: a bit that is set and
-    /// tells, by its place, how many bits have come.
+    /// The shift register of the original (X8), first bit highest, and above it a mark: a bit that
+    /// is set and tells, by its place, how many bits have come.
     register: u16,
     answer: bool,
     errors: u8,
@@ -63,8 +63,8 @@ impl Receiver {
         }
     }
 
-    /// Sync rose with this level on data, `since_us` after the rise before; what it is after a silence does
-    /// not matter. The last bit of a word brings the word.
+    /// Sync rose with this level on data, `since_us` after the rise before; what it is after a
+    /// silence does not matter. The last bit of a word brings the word.
     #[inline(always)]
     pub fn on_sync(&mut self, data: bool, since_us: u16) -> Option<u16> {
         match self.alignment {
@@ -88,8 +88,8 @@ impl Receiver {
         }
     }
 
-    /// No pulse has come for [`Timing::idle_us`]; told once after the last pulse. Whether to send one pulse
-    /// on return sync now.
+    /// No pulse has come for [`Timing::idle_us`]; told once after the last pulse. Whether to send
+    /// one pulse on return sync now.
     #[must_use = "the sender waits for its answer"]
     pub fn on_silence(&mut self) -> bool {
         match self.alignment {

@@ -2,8 +2,8 @@
 
 /// Times of the bus in microseconds.
 ///
-/// They are lower bounds for the sender: when its timer is served late, everything after it moves and keeps
-/// its order.
+/// They are lower bounds for the sender: when its timer is served late, everything after it moves
+/// and keeps its order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timing {
     /// Half a bit: from data being set to the pulse on sync, and from there to the next bit.
@@ -19,8 +19,9 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// 20 microseconds a bit; the chip's interrupts make it somewhat more. Half of it is what the receiver's
-    /// interrupt may be late. A word is sent beside a packet to the Pi, which takes 220 microseconds too.
+    /// 20 microseconds a bit; the chip's interrupts make it somewhat more. Half of it is what the
+    /// receiver's interrupt may be late. A word is sent beside a packet to the Pi, which takes 220
+    /// microseconds too.
     pub const STANDARD: Self = Self {
         half_us: 10,
         gap_us: 80,

@@ -54,13 +54,15 @@ const NOTHING_LEFT: u16 = 1 << 15;
 pub struct Transmitter {
     bits: u8,
     phase: Phase,
-    /// What is left of the word, the next bit highest, and behind the last bit a mark: a bit that is set.
+    /// What is left of the word, the next bit highest, and behind the last bit a mark: a bit that
+    /// is set.
     register: u16,
     answered: bool,
 }
 
 impl Transmitter {
-    /// A sender of words of [`WORD_BITS`] bits that has not yet been answered; to be advanced at once.
+    /// A sender of words of [`WORD_BITS`] bits that has not yet been answered; to be advanced at
+    /// once.
     #[must_use]
     pub const fn new() -> Self {
         Self::with_bits(WORD_BITS)
@@ -125,8 +127,8 @@ impl Transmitter {
                 self.phase = Phase::Gap;
                 step(Action::Release, TIMING.gap_us)
             }
-            // The answer to a pulse is acted on when the next one would be due: after a silence, so that
-            // the first word does not stick to the pulse.
+            // The answer to a pulse is acted on when the next one would be due: after a silence, so
+            // that the first word does not stick to the pulse.
             Phase::Asking if !self.answered => step(Action::Pulse, TIMING.handshake_us),
             Phase::Asking | Phase::Gap | Phase::Ready => {
                 self.phase = Phase::Ready;

@@ -69,7 +69,7 @@ impl Contact {
         goods: &mut [Good],
         now_ns: u64,
     ) -> (Pose, bool) {
-        // Whoever was put into a shelf may leave it.
+        // A robot that was put into a shelf may leave it.
         let held = blocks.iter().any(|block| {
             let depth = overlap(&wanted, block).map(depth);
             depth.is_some_and(|depth| {

@@ -1,7 +1,7 @@
 //! What the boards are wired to: warehouse, tape, sensors, motors, servos.
 //!
-//! Apart from the simulator, because an emulator that runs the real firmware images is wired to
-//! the very same world. [`World`] puts the parts together; each part has its own module and can
+//! It is apart from the simulator, because an emulator that runs the real firmware images is wired
+//! to the very same world. [`World`] puts the parts together; each part has its own module and can
 //! be used alone.
 //!
 //! Everything here is pure: time is advanced by the caller, noise comes from a seed, nothing

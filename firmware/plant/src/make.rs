@@ -13,10 +13,14 @@
 //! | sagging of a joint without torque | none | 10 to 80 units/s | assumed for a worn gear |
 //! | slip of a bad grip after | 3 s | 1 to 6 s | assumed |
 //!
-//! The standard duty gives cruising speed whatever the dead band is: the people who chose 100 for
-//! the duty and 12 s for a turn (W1, W4) measured it with their robot. The dead band is therefore
-//! the foot of a line through that point, and what differs is how steep it is: a step of duty
-//! changes the speed by a fortieth of cruise at 60 and by a tenth at 90.
+//! The standard duty gives cruising speed whatever the dead band is, because the people who chose
+//! 100 for the duty and 12 s for a turn (W1, W4) measured it with their robot. So the dead band is
+//! the foot of a line through that point, and only the slope differs: a step of duty changes the
+//! speed by a fortieth of cruise with a dead band of 60, and by a tenth with 90.
+//!
+//! The robot learns what its parts are like. The steering board takes the battery out of its duties
+//! and learns at marks how unlike its sides are; logic learns there how fast the wheels are.
+//! `Make::Nominal` is the robot as drawn, for exact figures.
 
 use crate::noise::Noise;
 

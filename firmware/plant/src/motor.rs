@@ -7,9 +7,16 @@
 //!    |__________/____ duty    where duty is that at 11.1 V, which gives the same mean voltage
 //!       dead band
 //! ```
+//!
 //! Each motor of each seed has its own gain, its own dead band ([`crate::make`] has the ranges)
 //! and a slowly wandering disturbance, so the robot does not drive straight by itself, as the
 //! real one does not (W6).
+//!
+//! **Why a dead band**, as drawn of 75 of 255: with the document's gains of 2/2 a linear motor
+//! cannot follow the 25 cm curve of E3. Full error then gives ±20 duty, and a radius of about 60
+//! cm. With the dead band the same gains reach 175 mm and settle within one square without weaving:
+//! from 20 mm beside the line the largest error is 4.9 mm after 250 mm, 1.2 mm after 500 mm and 0.5
+//! mm after a metre (8 seeds, both sides).
 
 use crate::battery;
 use crate::make::Make;

@@ -1,9 +1,9 @@
 //! Seeded noise: the same seed gives the same disturbances, run after run.
 //!
-//! A generator of our own (SplitMix64, the public-domain mixing function of Steele, Lea and
-//! Flood), so that a seed written into a report still means the same robot after any dependency
-//! was updated. Every device draws from its own stream: reading one more often does not change
-//! what another one sees. Never to be used where chance must not be guessed.
+//! A generator of our own (SplitMix64, the public-domain mixing function of Steele, Lea and Flood),
+//! so that a seed in a report still means the same robot after a dependency was updated. Every
+//! device draws from its own stream: reading one device more often does not change what another one
+//! sees. Never use it where chance must not be guessed.
 
 /// One stream of noise.
 #[derive(Clone, Debug)]

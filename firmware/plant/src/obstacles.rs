@@ -1,9 +1,9 @@
-//! What stands on the edges: the things of the warehouse's file, those that people put and take,
-//! and those that come and go at random, each in the middle of an edge for a while, then nowhere
-//! for a while. Where the robot is nobody puts anything.
+//! The things on the edges: those of the warehouse's file, those that people put and take, and
+//! those that come and go at random. A random thing stands in the middle of an edge for a while,
+//! then nowhere for a while. No thing is put where the robot is.
 //!
-//! It only changes the list of what stands in the hall; who sees it or runs into it is no matter of
-//! this file.
+//! It only changes the list of things in the hall. It does not decide who sees a thing or runs into
+//! it.
 
 use thiserror::Error;
 

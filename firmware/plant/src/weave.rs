@@ -5,6 +5,9 @@
 //! do not count: there the robot comes to its line from where it was put, or from a turn that has
 //! ended within a few degrees. Bends count: on the tightest one a robot that follows well has the
 //! tape under its outer sensors.
+//!
+//! Over 200 seeds and one product it is at most 18 mm on straight tape, 22 mm on the 40 cm bends of
+//! `curved` and 23 mm on the 25 cm bend of `large`. `lager simulate` prints it as `lateral_mm`.
 
 use crate::body::{LINE_SENSOR_AHEAD, Pose};
 use crate::tape::Tape;

@@ -1,4 +1,4 @@
-//! What is known of the two boards, in the form in which `link/health` shows it.
+//! What the bridge knows of the two boards, in the form in which `link/health` shows it.
 //!
 //! It is apart from the main loop because it outlives links and ports: a board keeps its counts
 //! of restarts, epochs and losses when it changes its port or the bridge is restarted.
@@ -48,8 +48,8 @@ impl Boards {
         }
     }
 
-    /// A board has come up on the port at `place`. A board found before on another port has
-    /// moved: the newest handshake is the truth.
+    /// A board has come up on the port at `place`. A board that was found on another port before
+    /// has moved: the newest handshake counts.
     pub(crate) fn up(&mut self, place: usize, baud: u32, board: &BoardUp) {
         let Some(index) = index(board.up.callsign) else {
             return;

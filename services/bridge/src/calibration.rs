@@ -7,10 +7,9 @@
 //!                           +-- the board falls silent or restarts --> broken off
 //! ```
 //!
-//! It is apart from the settings because a calibration is answered twice: when it begins, which
-//! answers the request, and five seconds later when it ends, which nobody waits for in this
-//! process. An end that comes without a beginning is that of a calibration which an earlier
-//! bridge began.
+//! It is apart from the settings because the board answers a calibration twice: when it begins,
+//! which answers the request, and five seconds later when it ends, which no request in this process
+//! waits for. An end without a beginning belongs to a calibration that an earlier bridge began.
 
 use lager_topics::{Calibration as State, Health};
 use lager_wire::{SettingReply, SettingStatus};

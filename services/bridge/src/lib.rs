@@ -12,17 +12,20 @@
 //!  steering board ==UART====+<======+
 //! ```
 //!
-//! * [`arbiter`]: whose word counts, as a pure state machine.
-//! * [`machine`]: all that the bridge decides, around the arbiter, and just as pure.
+//! * [`arbiter`]: which origin may steer, as a pure state machine.
+//! * [`machine`]: every other decision of the bridge, around the arbiter and just as pure.
 //! * [`listener`]: the receiving end of one port, pure too. `lager simulate` runs both.
 //! * [`serial`]: a port, and what to do when it cannot be opened.
 //! * [`frames`], [`settings`], [`profile`]: pure helpers between packets and samples.
 //! * `path`: how long sensor frames take to become commands, for `latency/path`.
 //! * [`run`]: the shell with its three threads.
 //!
-//! **Invariants:** no other process opens the ports; a reader never writes and the main loop
-//! never reads; nothing is written that the arbiter did not decide, handshakes and settings
-//! excepted; the bridge never decides where the robot goes.
+//! **Invariants:** no other process opens the ports. A reader thread never writes, and the main
+//! loop never reads. Everything that is written was decided by the arbiter, except for handshakes
+//! and settings. The bridge never decides where the robot goes.
+//!
+//! The main loop publishes `steering/state`, because only the arbiter knows the end of an order.
+//! Line and distance frames are published by the reader thread directly.
 
 pub mod arbiter;
 mod boards;

@@ -21,7 +21,7 @@ use crate::frames::LineAssembler;
 pub enum Heard {
     /// For the main loop, which must not miss it.
     Link(PortEvent),
-    /// For the main loop; the board's next word repeats it.
+    /// For the main loop, which may miss it: the board's next report repeats it.
     Data(PortEvent),
     /// For `sensor/line`.
     Line(LineFrame),
@@ -66,8 +66,8 @@ impl Listener {
         self.take(event, at, counts)
     }
 
-    /// What is due without a byte, when all that had come by `now` was pushed; ask until there is
-    /// nothing.
+    /// Events that need no byte, after all bytes that had come by `now` were pushed. Call it until
+    /// it returns nothing.
     pub fn poll(&mut self, now: Duration, counts: &Counts) -> Option<Heard> {
         let event = self.link.poll(now)?;
         // No packet is among what comes without a byte.
@@ -156,14 +156,14 @@ impl Listener {
             (Callsign::Steering, Payload::ArmData(data)) => PortEvent::Arm(data),
             (_, Payload::BoardStatus(status)) => PortEvent::Status(status),
             (_, Payload::SettingReply(reply)) => PortEvent::Setting(reply),
-            // A board does not send what is the Pi's to send.
+            // A board does not send packets that only the Pi sends.
             _ => return None,
         };
         Some(Heard::Data(data))
     }
 
-    /// Adds to the board's total what its link has found missing. A link finds that out with a
-    /// packet, so nothing is forgotten when it begins a new epoch.
+    /// Adds to the board's total the losses that its link has found. A link finds a loss when a
+    /// packet comes, so none is forgotten when it begins a new epoch.
     fn add_loss(&mut self, counts: &Counts) {
         let Some(board) = self.link.callsign().and_then(counts::index) else {
             return;

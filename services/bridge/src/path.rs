@@ -1,8 +1,8 @@
 //! How long frames take to become commands: what `latency/path` shows.
 //!
-//! It is pure and apart from the main loop because what counts has to be proven: it takes stamps
-//! and moments as arguments and reads no clock. The histograms are made once; taking up, measuring
-//! and telling do not allocate.
+//! It is pure and apart from the main loop, because it has to be proven which frames count: it
+//! takes stamps and moments as arguments and reads no clock. The histograms are made once; taking
+//! up, measuring and publishing do not allocate.
 //!
 //! ```text
 //!   begin(order in force, its stamp)          written: measured
@@ -86,7 +86,8 @@ impl PathMeter {
         self.since_start += 1;
     }
 
-    /// What has not been written by now is held back for a reason of its own.
+    /// An order that has not been written by now is held back for a reason of its own, and is not
+    /// measured.
     pub(crate) fn give_up(&mut self) {
         self.under_way = None;
     }

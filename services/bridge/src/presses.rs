@@ -1,11 +1,12 @@
 //! Presses of the switch: each one counts once, however often and however late its sample comes.
 //!
-//! A press toggles the mode, so a repeated one would undo itself. Pure; it goes on where an
-//! earlier life of the bridge ended.
+//! A press toggles the mode, so a repeated press would undo itself. This file is pure, and a new
+//! bridge goes on where the one before ended.
 
 use lager_topics::Health;
 
-/// A press that is older than this has been given up by whoever pressed, in real ns.
+/// A press that is older than this no longer counts, in real ns: the person who pressed has given
+/// it up.
 const LONGEST_NS: u64 = 1_000_000_000;
 
 /// The presses taken last.

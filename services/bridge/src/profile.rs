@@ -10,8 +10,8 @@
 //! ```
 //!
 //! One value is on its way at a time: a board's queue holds five packets, and at 9600 Bd a command
-//! to the wheels must not wait for twenty-five. Until the board has accepted, the arbiter keeps
-//! the arm where it is: limits that were not told protect nothing.
+//! to the wheels must not wait for twenty-five. Until the board has accepted the profile, the
+//! arbiter keeps the arm where it is: the board cannot hold limits that it has not been told.
 //!
 //! It is pure and apart from the other settings because it is one thing in many packets, which no
 //! request changes while the robot runs.

@@ -2,9 +2,8 @@
 //! the rest to the main loop.
 //!
 //! It is apart so that a sensor packet goes from the port to the bus without a second thread: one
-//! `read`, the decoder, one loaned sample. It never writes to the port; what has to be answered
-//! it asks the main loop to send. After start-up of a link it does not allocate, and it holds no
-//! lock.
+//! `read`, the decoder, one loaned sample. It never writes to the port; it asks the main loop to
+//! send an answer. Once a link is up it allocates nothing and holds no lock.
 //!
 //! ```text
 //!          open                  gone (unplugged, hung up)
@@ -146,8 +145,8 @@ impl<'a> Reader<'a> {
     fn listen(&mut self, port: &SerialPort) -> Result<(), PortGone> {
         let mut listener = Listener::new(self.place);
         let mut buffer = [0; 512];
-        // When all that had come by then was read: only as of such a moment a board is silent. A
-        // reader that was kept from running finds the bytes first and then the time.
+        // When everything that had come by then was read. A board counts as silent only as of such
+        // a moment: a reader that was kept from running finds the bytes first and then the time.
         let mut heard = self.clock.now();
         while !self.stopped() {
             let mut ring = false;
@@ -215,7 +214,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Hands over what must not be lost; waits while the main loop is behind.
+    /// Hands over an event that must not be lost; waits while the main loop is behind.
     fn hand(&mut self, event: FromReader) {
         let mut event = event;
         while let Err(refused) = self.events.enqueue(event) {

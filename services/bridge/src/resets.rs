@@ -21,7 +21,7 @@ pub(crate) struct Resets {
 }
 
 impl Resets {
-    /// A board has been reset; whether that was once too often.
+    /// A board has been reset. Returns whether it has been reset too often.
     pub(crate) fn note(&mut self, now: Duration, board: Callsign) -> bool {
         let Some(index) = counts::index(board) else {
             return false;

@@ -1,7 +1,7 @@
 //! Settings on their way to the boards: sent until the board answers, and sent again to a board
 //! that has restarted and forgotten them.
 //!
-//! It is pure and apart from the main loop because it has time in it: tries, answers that fit no
+//! It is pure and apart from the main loop because it deals with time: tries, answers that fit no
 //! question, boards that come back. It knows nothing of ports and requests.
 
 use core::time::Duration;
@@ -111,7 +111,7 @@ impl Settings {
         self.start(now, key, value);
     }
 
-    /// Makes a value one that a board is told whenever it comes up, from its next coming on.
+    /// Sets a value that a board is sent whenever it comes up, from the next time on.
     pub fn keep(&mut self, key: SettingKey, value: i16) {
         if let Some(slot) = self.slot(key) {
             slot.kept = Some(value);
@@ -166,9 +166,9 @@ impl Settings {
             .min()
     }
 
-    /// A board has answered; whether that was the answer to a question under way. Any other
-    /// changes nothing: it comes twice, or tells how a calibration ended that had been answered
-    /// when it began.
+    /// A board has answered. Returns whether that was the answer to a question under way. Any other
+    /// answer changes nothing: it is a repetition, or the end of a calibration whose beginning was
+    /// already answered.
     pub fn answer(&mut self, reply: &SettingReply) -> bool {
         let Some(slot) = self.slot(reply.key) else {
             return false;

@@ -19,15 +19,16 @@
 //! - Nothing is asked before the bridge has told the mode. When it becomes manual the robot asks at
 //!   once (L436); an answer to what was held before is passed over.
 //! - The floor is asked for once; side and goods by each connection.
-//! - A command is carried out while its answer is fresh: what was read after this process was held
-//!   up for [`Conversation::LONGEST_PAUSE`] may be old, so in manual mode the connection is given up
-//!   instead. `styrcomm 1` makes the robot stand even where nothing is asked.
+//! - A command is carried out while its answer is fresh. An answer that was read after this process
+//!   was held up for [`Conversation::LONGEST_PAUSE`] may be old, so in manual mode comm closes the
+//!   connection instead. `styrcomm 1` makes the robot stand even when nothing was asked.
 //! - **A link that is lost makes the robot stand in manual mode.** A peer that speaks the extension
-//!   repeats its `lager` line whenever the robot repeats its own, every 50 ms in manual mode; 150 ms
-//!   without a word while something is carried out are a lost link. A peer that speaks only the
+//!   repeats its `lager` line whenever the robot repeats its own, every 50 ms in manual mode; 150
+//!   ms without a word while something is carried out are a lost link. A peer that speaks only the
 //!   document's language may be silent as long as it likes, so there only the end of its connection
 //!   counts, which the kernel finds some 3 s after the last sign of the peer's machine.
-//! - In autonomous mode a lost link changes nothing: the order is carried out (AMB-49 leaves it open).
+//! - In autonomous mode a lost link changes nothing: the order is carried out (AMB-49 leaves it
+//!   open).
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
 //!   commands among these are dropped.
 //! - What cannot be done is told in a `thought`, and asked again a little later.
@@ -67,7 +68,7 @@ const SIGN: u64 = 1_000_000_000;
 /// How long a peer that answers it may be silent while something is carried out, and else.
 const SILENT_BY_HAND: u64 = 150_000_000;
 const SILENT: u64 = 5_000_000_000;
-/// When something is asked again that was answered with what cannot be.
+/// When a question is asked again after an impossible answer.
 const AGAIN: u64 = 200_000_000;
 /// How long after the connection is there a robot in manual mode asks for the warehouse rather than
 /// for commands.
@@ -113,7 +114,7 @@ pub struct Conversation {
 
 /// What happens to the connection.
 impl Conversation {
-    /// How long its thread may be kept from its work before what has come meanwhile is old.
+    /// How long its thread may be held up before the lines that have come meanwhile count as old.
     pub const LONGEST_PAUSE: Duration = Duration::from_millis(200);
 
     /// A conversation of the robot `name`; `kept` is the map that an earlier one has published.

@@ -6,8 +6,9 @@
 //! - [`run`]: its shell between a socket and the bus.
 //!
 //! It has no right that a person at the robot would not have: it orders, presses and steers as an
-//! operator, and the bridge's arbiter judges it as one. Of all that it needs to go on after it was
-//! killed, the map alone is its own, and lies on the bus; what the robot is doing the others tell.
+//! operator, and the bridge's arbiter judges it as one. Of the state that it needs to go on after a
+//! kill, only the map is its own, and that is published on the bus; the other services publish what
+//! the robot is doing.
 
 #![forbid(unsafe_code)]
 

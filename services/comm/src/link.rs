@@ -2,7 +2,7 @@
 //! ever.
 //!
 //! ```text
-//!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, each ± a quarter ──> connecting
+//!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, ± a quarter ──> connecting
 //! ```
 //!
 //! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing is
@@ -28,7 +28,7 @@ const CONNECT: Duration = Duration::from_secs(2);
 /// The first pause between two tries, doubled up to the longest.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// What cannot be reached is told when the pauses have become longer than this.
+/// The log names an address that cannot be reached when the pauses have become longer than this.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// A connection that lasted this long was good: the next pause is the first again.
 const GOOD: Duration = Duration::from_secs(5);
@@ -36,11 +36,11 @@ const GOOD: Duration = Duration::from_secs(5);
 const GLANCE: Duration = Duration::from_millis(20);
 /// What the peer may leave unread, in bytes, before it is given up.
 const MOST_UNREAD: usize = 64 * 1024;
-/// What is read that nobody has taken yet, in pieces of at most 4 KiB.
+/// How many pieces of at most 4 KiB may be read that the other thread has not taken yet.
 const PIECES: usize = 16;
-/// When the kernel begins to ask a silent peer's machine whether it is there, how often, and when it
-/// gives up. Seconds are the shortest that it counts in; a peer that speaks the extension is found
-/// silent long before.
+/// When the kernel begins to ask a silent peer's machine whether it is there, how often, and when
+/// it gives up. Seconds are the shortest that it counts in; a peer that speaks the extension is
+/// found silent long before.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 const UNCONFIRMED_MS: u32 = 3_000;
 
@@ -234,7 +234,7 @@ impl Thread {
         Err(failure)
     }
 
-    /// Reads until the connection ends; `None` where nobody listens any more.
+    /// Reads until the connection ends; `None` if the other thread has gone.
     fn hold(&self, mut stream: TcpStream) -> Option<()> {
         let ended = match stream.try_clone() {
             Ok(writer) => {

@@ -1,9 +1,9 @@
-//! The conversation's shell between the socket and the bus: it carries lines and samples and decides
-//! nothing.
+//! The conversation's shell between the socket and the bus: it carries lines and samples and
+//! decides nothing.
 //!
-//! **Safe state**: silence. When this process ends, however it ends, nobody renews the command that
-//! it gave, and the bridge brings the robot to rest when the lease is over, 120 ms later. What logic
-//! was ordered it goes on with.
+//! **Safe state**: silence. When this process ends, for whatever reason, its command is no longer
+//! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with
+//! its orders.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -27,8 +27,8 @@ use crate::link::{Link, News};
 use crate::moment::Moment;
 use crate::telling;
 
-/// Longest wait for anything, in real time: most samples ring nobody here, so that the path has
-/// nobody more to wake.
+/// Longest wait for anything, in real time. Most samples do not ring comm, so that the path has no
+/// further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
 /// How often the map is offered to late joiners, in real time.
@@ -236,7 +236,7 @@ impl Shell {
                     self.conversation.connected(now);
                 }
                 News::Down(why) => {
-                    // What was said before the end is still heard, a stop above all.
+                    // Lines that came before the end are still carried out, a stop above all.
                     self.conversation.heard(now, &lines);
                     lines.clear();
                     tracing::info!("the external computer is away: {why}");
@@ -324,7 +324,7 @@ impl Shell {
         }
     }
 
-    /// Says what goes wrong on the bus, but not for ever.
+    /// Logs faults of the bus, but not the same one for ever.
     fn complain(&mut self, error: &dyn std::error::Error) {
         self.complaints = self.complaints.wrapping_add(1);
         if self.complaints.is_power_of_two() {

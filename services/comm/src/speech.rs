@@ -1,4 +1,4 @@
-//! What is told without being asked: thoughts, nodes and headings (G9, C8, L500).
+//! What comm tells the station without being asked: thoughts, nodes and headings (G9, C8, L500).
 //!
 //! Node and heading are said when they change, and anew to every peer.
 

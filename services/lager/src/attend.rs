@@ -1,13 +1,14 @@
 //! The service `lager attend`: what `up` needs done on the bus, and must not do itself.
 //!
-//! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file is cut off
-//! ends the process. So the supervisor stays away from the bus, and this child of it keeps each
-//! service's last state for a successor, sweeps what dead processes leave, listens whether all
-//! are heard, tells what the robot does, and plays the operator. Where there is no external computer
-//! it tells the robot its warehouse. Whatever happens
-//! to it, the supervisor starts another one; the script goes on where it was.
+//! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file was cut
+//! short ends the process. So the supervisor stays away from the bus. This child of it keeps each
+//! service's last state for a successor, sweeps what dead processes leave, listens whether every
+//! service is heard, prints what the robot does, and plays the operator. Where there is no external
+//! computer it tells the robot its warehouse. If this process fails, the supervisor starts another
+//! one, and the script goes on where it was.
 //!
-//! It decides nothing about processes: it says what it hears (`words.rs`), the supervisor acts.
+//! It decides nothing about processes: it reports what it hears (`words.rs`), and the supervisor
+//! acts.
 
 mod ears;
 
@@ -41,7 +42,7 @@ const PULSE: Duration = Duration::from_millis(200);
 const SWEEP: Duration = Duration::from_secs(1);
 /// How long the first word may take.
 const FIRST_WORD: Duration = Duration::from_secs(2);
-/// How long nothing but errors may come from the bus.
+/// How long the bus may return nothing but errors.
 const ERRORS: Duration = Duration::from_secs(2);
 
 /// Attends the supervisor `parent` until `shutdown`.
@@ -168,7 +169,7 @@ impl Attendant {
                 Request::HandOver(service) => {
                     self.keepers.owe(service);
                     self.hand_over()?;
-                    // What the dead one left is removed as soon as its last word is kept.
+                    // What the dead process left is removed as soon as its last value is kept.
                     self.sweep_due = Instant::now();
                 }
             }
@@ -247,7 +248,7 @@ impl Attendant {
         };
         let act = operator.step(self.clock.now(), self.narrator.seen());
         if self.told.as_ref() != Some(operator.script()) {
-            // Told before it is done: a successor must know of an order that was given.
+            // Report it before it is done: a successor must know of an order that was given.
             self.told = Some(operator.script().clone());
             self.line.send(&Word::Script(operator.script().clone()))?;
         }
@@ -329,7 +330,7 @@ struct Complaints {
     count: u32,
     last: String,
     heard: bool,
-    /// Since when every look has met one.
+    /// Since when every look has met an error.
     since: Option<Instant>,
 }
 

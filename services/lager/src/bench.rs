@@ -78,7 +78,7 @@ fn run_stop(args: &BenchArgs) -> Result<String> {
     })
 }
 
-/// What was not chosen is measured in full.
+/// Everything that the flags leave open is measured in full.
 fn options(args: &BenchArgs) -> Options {
     let or_all = |chosen: &[Mode]| {
         let all = Mode::ALL.into_iter();

@@ -8,8 +8,8 @@ use crate::cli::CommArgs;
 use crate::config::{Config, StationSection};
 use crate::runtime::RuntimeFolder;
 
-/// The configuration it runs with, and what it does. Started beside a robot that is up it takes over
-/// that robot's clock, in which leases count.
+/// The configuration it runs with, and what it does. Started beside a robot that is up it takes
+/// over that robot's clock, in which leases count.
 ///
 /// # Errors
 /// The robot's name is none that the external computer could call it by.

@@ -1,6 +1,6 @@
 //! The configuration: one TOML file, every key with a default, command-line flags on top.
 //!
-//! It is apart from the command line because the services read it too: the supervisor gives every
+//! It is apart from the command line because the services read it too. The supervisor gives every
 //! child process the effective configuration on its standard input, so a flag reaches all of them
 //! or none. An unknown key is an error, never ignored.
 

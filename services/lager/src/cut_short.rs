@@ -1,6 +1,6 @@
-//! A sentence for a tool that touches a part of a shared file which is not there: the file was cut
-//! short by somebody, or `/dev/shm` was full when its first use was to find room for it. The
-//! kernel then sends SIGBUS, and without this the shell says no more than "bus error".
+//! A sentence for a tool that touches a missing part of a shared file: somebody cut the file short,
+//! or `/dev/shm` was full when its first use had to find room for it. The kernel then sends SIGBUS,
+//! and without this the shell says only "bus error".
 
 #![allow(
     unsafe_code,

@@ -1,6 +1,6 @@
-//! Why a robot does not answer: what can be told of it without its bus.
+//! Why a robot does not answer, as far as that can be found out without its bus.
 //!
-//! An error of the bus says what failed. What stands here is asked after it, and before a tool
+//! An error of the bus says what failed. This file is asked after such an error, and before a tool
 //! waits for a robot that is not there.
 
 use anyhow::{Result, bail};
@@ -41,7 +41,7 @@ pub fn causes(config: &Config) -> Vec<String> {
         return causes;
     };
     let Ok(place) = bus.place() else {
-        // That error names folder and cause by itself.
+        // That error already names folder and cause.
         return causes;
     };
     let holders = place.up().remove(&bus.robot).unwrap_or_default();

@@ -1,8 +1,8 @@
 //! `lager doctor`: what is wrong with this machine, and how to mend it.
 //!
-//! Each check looks at one thing and returns a finding; nothing is changed but what `--fix` is
-//! for: what dead processes left on the bus. This process opens nothing of the bus that it could be
-//! kept waiting by.
+//! Each check looks at one thing and returns a finding. Only `--fix` changes anything: it removes
+//! what dead processes left on the bus. This process opens nothing of the bus that could make it
+//! wait.
 
 mod realtime;
 
@@ -302,7 +302,8 @@ fn bus_state(config: &Config, fix: bool) -> Result<Finding> {
     };
     let mut removed = 0;
     if fix {
-        // What the dead have registered with the living is for somebody who joins the bus.
+        // What dead processes have registered with living ones is removed by a process that joins
+        // the bus.
         if count(NodeState::Alive)? > 0 && count(NodeState::Stale)? > 0 {
             sweep_beside(&bus)?;
         }

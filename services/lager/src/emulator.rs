@@ -8,8 +8,8 @@
 //!         '<-- world/request -- what hands do, a line each on its standard input, and answered
 //! ```
 //! The emulator is GPL-3 and a program of its own: it and this process share a command line, two
-//! pipes and a file. It dies with this process, and this process ends with it; the supervisor
-//! starts both again, and the last truth on the bus is the world that they go on with.
+//! pipes and a file. It dies with this process, by the kernel's signal, and this process ends with
+//! it. The supervisor starts both again, and they resume the world from the last truth on the bus.
 //!
 //! **Safe state**: no emulator. Its steering board starts with motors off.
 

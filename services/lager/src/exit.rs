@@ -39,7 +39,7 @@ pub fn code(error: &anyhow::Error) -> ExitCode {
     }
 }
 
-/// Whether the machine may be the cause of an error, and not who asked.
+/// Whether the machine may be the cause of an error, rather than the user's request.
 pub fn may_have_a_cause(error: &anyhow::Error) -> bool {
     !error.is::<Usage>() && !error.is::<Interrupted>() && !error.is::<LockError>()
 }

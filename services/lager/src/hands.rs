@@ -1,4 +1,4 @@
-//! The operator's hands on the bus: everything a person, or the script, can do to the robot.
+//! The operator's hands on the bus: everything that a person, or the script, can do to the robot.
 //!
 //! One set of ports for `up` and for the one-shot commands, so that both act the same way. It
 //! decides nothing.

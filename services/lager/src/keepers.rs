@@ -1,9 +1,9 @@
 //! What the attendant remembers for the services: the last state each one published, handed to its
 //! successor when it has to be restarted.
 //!
-//! A service restarted with `--resume` reads the last value of its own topic; this is where that
-//! value comes from once the process that published it is gone. Each topic is served by itself: what
-//! is wrong with one is no reason for another service to stand there without its state.
+//! A service that is restarted with `--resume` reads the last value of its own topic. That value
+//! comes from here once the process that published it is gone. Each topic is served separately, so
+//! a fault on one does not leave another service without its state.
 
 use anyhow::{Context, Result};
 use lager_ports::{Bus, Keeper};
@@ -51,7 +51,7 @@ impl Keepers {
         ]
     }
 
-    /// A service has ended: what it was doing is owed to its successor.
+    /// A service has ended: its state is to be handed to its successor.
     pub fn owe(&mut self, service: Service) {
         self.owed.retain(|owed| *owed != service);
         self.owed.push(service);
@@ -62,7 +62,7 @@ impl Keepers {
     pub fn hand_over(&mut self) -> Vec<Result<Service>> {
         let mut results = Vec::new();
         for service in core::mem::take(&mut self.owed) {
-            // Its last word may have come since the last look.
+            // Its last sample may have come since the last look.
             let served = match service {
                 Service::Bridge => hand_over(&mut self.bridge),
                 Service::Logic => {
@@ -91,7 +91,7 @@ fn remember<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
 }
 
 fn hand_over<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
-    // A value that was kept before is better than none.
+    // An earlier value is better than none.
     let remembered = remember(keeper);
     let name = T::NAME;
     let served = keeper

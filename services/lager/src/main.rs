@@ -169,7 +169,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Emulator(args) => {
-            // It is what the clock follows, so its own bus has another.
+            // The emulator is what the clock follows, so its own bus has another clock.
             let resting = Config {
                 chip: ChipSection {
                     clock: None,
@@ -325,7 +325,7 @@ fn service(
     let _lock = bus.place()?.lock(&bus.robot, role)?;
     let bus = Bus::open(&bus, role)?;
     let result = run(&bus, args.resume);
-    // A supervisor that was killed left its node behind; the last to go sweeps it.
+    // A killed supervisor left its node behind; the last process to go sweeps it.
     bus.sweep();
     result
 }

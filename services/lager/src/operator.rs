@@ -1,7 +1,7 @@
 //! The scripted operator: what a person would do at the panel, as a pure state machine.
 //!
 //! It sees only what a person sees (link health and what logic is doing) and acts only through what
-//! a person has: the mode and orders. The robot picks by itself. It is apart from `up` because
+//! a person has (the mode and orders). The robot picks by itself. It is apart from `up` because
 //! `simulate` plays the same script in virtual time.
 //!
 //! ```text
@@ -9,8 +9,11 @@
 //!                                      ^                                  |
 //!                                      +------------ delivered -----------+
 //! ```
-//! A process that takes the script over from one that was killed starts from its [`Script`] and
-//! finds its place by what logic says of the order (`Joining`).
+//! A process that takes the script over from a killed one starts from its [`Script`]. It finds its
+//! place by what logic says of the order (`Joining`).
+//!
+//! `up` plays the script on a simulated or emulated robot. Real boards move by it only where both
+//! `--script` and `--mission` are given. `--headless` means "no panel", and there is none yet.
 
 use core::time::Duration;
 
@@ -48,7 +51,7 @@ pub enum Act {
     Order(Order),
 }
 
-/// A mission and how far it has come: all that whoever takes the script over needs.
+/// A mission and its progress: all that a process needs which takes the script over.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Script {
     /// The products to fetch, in this order.
@@ -62,7 +65,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// A mission that nobody has begun.
+    /// A mission that has not been begun.
     pub fn new(mission: Vec<i32>) -> Self {
         Self {
             mission,
@@ -122,8 +125,8 @@ enum Step {
 }
 
 impl ScriptedOperator {
-    /// A script that has its mission fetched, from where it stands. Ids start at `first_id`, which
-    /// is beyond those of whoever had the script before.
+    /// A script that fetches the rest of its mission. Ids start at `first_id`, which is beyond
+    /// those of the process that had the script before.
     pub fn new(script: Script, first_id: u32) -> Self {
         let step = match (script.outcome(), script.order) {
             (Some(Ok(())), _) => Step::Finished,

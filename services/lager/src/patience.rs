@@ -1,8 +1,8 @@
 //! How long a tool waits for the bus, and how it ends when that is in vain.
 //!
-//! A tool has nothing that must be put in order before it ends: what it leaves on the bus is
-//! swept like that of any process that dies. So one Ctrl-C ends it whatever it is in, and a bus
-//! that does not answer ends it by itself, with a sentence.
+//! A tool has nothing to put in order before it ends: what it leaves on the bus is swept like that
+//! of any dead process. So one Ctrl-C ends it whatever it is doing, and it ends by itself, with a
+//! sentence, when the bus does not answer.
 
 use std::time::{Duration, Instant};
 

@@ -1,9 +1,11 @@
 //! Real time for a service's process: priority, memory that stays, cores of its own.
 //!
-//! All of it is asked for before the process starts its first thread, so that every thread
-//! inherits it. Who asks and does not get it gets an error that says how to get it, never a robot
-//! that is slower than he believes. The supervisor tries everything out in a thread that ends at
-//! once ([`Wanted::rehearse`]); it never becomes real-time itself.
+//! All of it is asked for before the process starts its first thread, so that every thread inherits
+//! it. A process that asks and does not get it ends with an error that says how to get it (exit
+//! code 5); it never runs slower than its user believes. The supervisor tries everything out before
+//! it starts any service, in a thread that ends at once ([`Wanted::rehearse`]); it never becomes
+//! real-time itself. Spinning with a real-time priority on as many cores as the machine has is
+//! refused, since it can hang the machine.
 
 mod cores;
 mod error;

@@ -1,5 +1,5 @@
-//! What the attendant tells of the robot: a line whenever it begins something new. It reads the bus
-//! as an observer and never writes to it; `terminal.rs` shows the lines.
+//! What the attendant prints of the robot: a line whenever the robot begins something new. It reads
+//! the bus as an observer and never writes to it; `terminal.rs` shows the lines.
 
 use std::time::Duration;
 
@@ -45,7 +45,8 @@ pub struct Note {
 }
 
 impl Narrator {
-    /// Subscribes to everything it tells of. One that joins late takes what it sees first for told.
+    /// Subscribes to everything that it reports. If it joins late, what it sees first counts as
+    /// reported.
     pub fn new(bus: &Bus, joins_late: bool) -> Result<Self> {
         Ok(Self {
             line: bus.subscriber()?,

@@ -1,8 +1,6 @@
 //! What a running robot keeps in its folder of the bus ([`Place`]): the lock of its `up`, the
 //! effective configuration, the links to the simulated or emulated ports, an emulated body's clock
 //! and EEPROMs, and what a station of its own keeps.
-//!
-//! The folder lies with the bus, so that nobody can take a robot's name without meeting the robot.
 
 use std::fs;
 use std::path::PathBuf;
@@ -68,8 +66,8 @@ impl RuntimeFolder {
         Ok(bus.place()?.folder_of(&bus.robot).join(WAREHOUSE))
     }
 
-    /// The page for an emulated body's time. One that a killed robot has left is gone, so that
-    /// nobody takes it for the new one.
+    /// The page for an emulated body's time. A page that a killed robot has left is removed, so
+    /// that no process takes it for the new one.
     pub fn fresh_clock(&self) -> Result<PathBuf> {
         let path = self.path.join(CLOCK);
         match fs::remove_file(&path) {
@@ -104,7 +102,8 @@ impl RuntimeFolder {
         let whole = || -> Result<()> {
             let new = self.path.join("lager.toml.new");
             fs::write(&new, toml::to_string(config)?)?;
-            // Whoever reads it at this moment reads all of the old one or all of the new one.
+            // A process that reads it at this moment reads all of the old one or all of the new
+            // one.
             Ok(fs::rename(&new, &path)?)
         };
         whole().with_context(|| format!("cannot write {}", path.display()))?;
@@ -161,8 +160,8 @@ impl NameLock {
 }
 
 impl Drop for NameLock {
-    /// Leaves nothing of `up` behind after a clean stop but a stop that is set, and what boards have
-    /// written into their EEPROM.
+    /// Leaves nothing of `up` behind after a clean stop but a stop that is set, and what boards
+    /// have written into their EEPROM.
     fn drop(&mut self) {
         if self.is_held() {
             for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, WAREHOUSE] {

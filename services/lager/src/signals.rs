@@ -1,7 +1,7 @@
 //! The signals that end `lager up`, as something that can be waited for.
 //!
-//! Apart from the other commands' handling, which sets a flag: `up` sleeps in one place, and must
-//! wake there whichever thread a signal meets.
+//! It is apart from the other commands' handling, which sets a flag: `up` sleeps in one place and
+//! must wake there, whichever thread gets the signal.
 
 use std::io::Read;
 use std::os::fd::{AsFd, BorrowedFd};

@@ -1,9 +1,9 @@
 //! `lager simulate`: the whole robot in one process in virtual time.
 //!
-//! The same state machines as in the real processes are joined by function calls: no bus, no
-//! clock, no thread. The bridge is the real one but for its ports: its core, and the receiving end
-//! of each port. A run is a function of warehouse, mission and seed. It is the proof that the
-//! shells decide nothing, and the fast way to try a warehouse or a change.
+//! It joins the same state machines as the real processes by function calls: no bus, no clock, no
+//! thread. The bridge is the real one except for its ports: its core, and the receiving end of each
+//! port. A run is a function of warehouse, mission and seed. It proves that the shells decide
+//! nothing, and it is the fast way to try a warehouse or a change.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -328,7 +328,7 @@ impl Whole {
             }
             self.bridge.decide(self.now);
             self.act();
-            // Whoever asked sees by `link/health` what became of it.
+            // The asker sees by `link/health` what became of it.
             let _ = self.bridge.answer();
         }
     }
@@ -352,7 +352,7 @@ impl Whole {
                     self.stop = None;
                     self.bridge.released(true);
                 }
-                // What was written is on the wire, and nobody waits for a stop.
+                // What was written is on the wire, and no process waits for a stop.
                 Action::Discard { .. } | Action::ShowReport(_) => {}
                 Action::Say(news) => tracing::debug!(at = ?self.now, ?news),
             }
@@ -471,7 +471,7 @@ mod tests {
     fn a_script_that_is_taken_over_again_and_again_is_delivered_once() {
         let warehouse = Warehouse::builtin("small").expect("built in");
         let mission = [1, 2];
-        // Whoever takes over sees nothing of before, not even the ids that were given.
+        // A successor sees nothing of what was before, not even the ids that were given.
         for every in [700, 1_900, 5_300, 13_700] {
             let mut whole =
                 Whole::new(&Config::default(), &warehouse, &mission, 1, 0).expect("a robot");

@@ -1,6 +1,6 @@
-//! The one-shot commands: `drive`, `arm`, `resume`, `mode`, `picked`, `reset`, `gains`,
-//! `calibrate`, and in files of their own those about orders and those that do what hands do.
-//! `stop` is apart, since it must do without the bus.
+//! The one-shot commands: `drive`, `arm`, `resume`, `mode`, `picked`, `reset`, `gains` and
+//! `calibrate`. The commands about orders and those that act like hands have their own files.
+//! `stop` is apart, because it must work without the bus.
 //!
 //! Each opens the bus as an operator, does one thing through the same [`Hands`] as `up`, waits
 //! until the robot shows the effect, and says what came of it.
@@ -72,8 +72,7 @@ impl Operator {
         Ok(operator)
     }
 
-    /// `lager drive`: gives the order and renews it until it is done, `seconds` have passed or
-    /// Ctrl-C; then the robot stands, because nobody renews it any more.
+    /// Ctrl-C; then the robot stands, because its order is no longer renewed.
     pub fn drive(&mut self, command: OperatorCommand, seconds: Option<f64>) -> Result<String> {
         let health = self.health()?;
         if health.mode.get() != Some(Mode::Manual) {
@@ -284,7 +283,8 @@ impl Operator {
         let give_up = Instant::now() + PATIENCE;
         let mut renewed = clock.now();
         while end.is_none_or(|end| clock.now() < end) {
-            // Stopped and continued, or kept from its core: what it held is over.
+            // This process was stopped and continued, or kept from its core: the order that it
+            // renewed is over.
             let pause = clock.now().saturating_sub(renewed);
             if pause >= LEASE {
                 bail!(
@@ -294,7 +294,7 @@ impl Operator {
             }
             renewed = clock.now();
             self.hands.steer(order)?;
-            // Whoever lets go by Ctrl-C has done what he wanted.
+            // A user who lets go by Ctrl-C has done what he wanted.
             if self.patience.pause(clock.real(RENEW)).is_err() {
                 break;
             }

@@ -1,8 +1,8 @@
 //! `lager stop`: sets the robot's stop word and says what became of it.
 //!
 //! It opens nothing of the bus, so it works when every place there is taken, when the bus's files
-//! are gone or damaged and when the bridge is frozen. What it says it has from the word's file,
-//! where the bridge answers, and from the kernel, which knows what the bridge's process does.
+//! are gone or damaged, and when the bridge is frozen. It reads the bridge's answers from the
+//! word's file, and asks the kernel what the bridge's process does.
 
 use std::fs;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ use crate::config::{Body, Config};
 /// How long the robot may take to stand, in real time.
 const PATIENCE: Duration = Duration::from_millis(2_500);
 
-/// How long a bridge is waited for that nobody knows of.
+/// How long to wait for a bridge that has not been seen yet.
 const SHORT: Duration = Duration::from_millis(300);
 
 /// How often the answer is looked at.
@@ -113,7 +113,7 @@ enum Verdict {
     Stands(String),
     /// Not yet, and why.
     NotYet(String),
-    /// Nobody will ever know that they do.
+    /// It cannot be known whether they do.
     Never(String),
 }
 

@@ -1,13 +1,16 @@
 //! The supervisor of the service processes: starts them, restarts them with back-off, ends them
 //! in order.
 //!
-//! It knows processes, not what they do, and never touches the bus: what to hand over before a
-//! restart, and whether a silent process hangs, is its caller's business. Children die with it. Each
-//! asks the kernel for SIGTERM at its parent's death ([`adopt`]), so even `kill -9` of the
-//! supervisor leaves no child.
+//! It knows processes, not what they do, and never touches the bus. Its caller decides what to hand
+//! over before a restart, and whether a silent process hangs. Children die with it: each asks the
+//! kernel for SIGTERM at its parent's death ([`adopt`]), so even `kill -9` of the supervisor leaves
+//! no child.
 //!
-//! A child reads its configuration from its standard input, which is memory: no file has to be
-//! there for a restart.
+//! A child reads its configuration from its standard input, which is a file in memory, so a restart
+//! needs no file on disk.
+//!
+//! A service that ends by itself at every start is given up after five times where a mission is
+//! waited for. One that was killed is always started again.
 
 use std::fs::File;
 use std::io::{Seek, Write};
@@ -32,7 +35,7 @@ const HEALTHY: Duration = Duration::from_secs(1);
 const FIRST_WAIT: Duration = Duration::from_millis(50);
 /// The longest wait between two starts.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
-/// A child that lived this long has found all it needs.
+/// A child that lived this long has everything it needs.
 const SETTLED: Duration = Duration::from_secs(30);
 /// How often in a row a child may end by itself before it has settled.
 const MOST_FAILURES: u32 = 5;
@@ -94,7 +97,7 @@ pub struct Ended {
     pub service: Service,
     /// How it ended, in words.
     pub how: String,
-    /// Whether it has ended itself; nobody's signal has.
+    /// Whether it has ended by itself, not by a signal.
     pub by_itself: bool,
     /// Whether memory that it had mapped was gone.
     pub lost_memory: bool,
@@ -278,7 +281,7 @@ impl Supervisor {
 }
 
 impl Drop for Supervisor {
-    /// Nobody who has ended them in order has any left.
+    /// Kills the children that are left; after an end in order there are none.
     fn drop(&mut self) {
         self.kill_all();
     }
@@ -392,7 +395,7 @@ fn faulted(status: ExitStatus) -> bool {
         .is_some_and(|signal| signals.contains(&signal))
 }
 
-/// A text as a file that nobody can remove.
+/// A text as a file in memory, which cannot be removed.
 fn in_memory(text: &str) -> Result<Stdio> {
     let mut file = File::from(memfd_create("lager.toml", MemfdFlags::CLOEXEC)?);
     file.write_all(text.as_bytes())?;

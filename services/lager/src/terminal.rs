@@ -1,7 +1,7 @@
-//! The lines that `up` shows while it runs: the one place that writes them.
+//! The lines that `up` shows while it runs; only this file writes them.
 //!
-//! A terminal that is held (Ctrl-S, a pager) takes no more, and whoever writes to it waits. So the
-//! lines are written by a thread of their own, and what it cannot write for long is dropped.
+//! A terminal that is held (Ctrl-S, a pager) takes no more, and a thread that writes to it waits.
+//! So a separate thread writes the lines, and drops those that it cannot write for long.
 
 use std::io::Write;
 use std::sync::mpsc::{self, Receiver, SyncSender};

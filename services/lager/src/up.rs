@@ -1,9 +1,8 @@
 //! `lager up`: the whole robot on this machine, as supervised processes that meet on the bus.
 //!
-//! This process owns no decision of the robot, and nothing of the bus: it opens, maps and sweeps
-//! nothing there, so nothing there can hold it up or end it. It starts the services, restarts them,
-//! answers signals, and shows what it is told. What needs the bus is done by a child of it, the
-//! attendant (`attend.rs`).
+//! This process takes no decision for the robot. It opens, maps and sweeps nothing on the bus, so
+//! nothing there can hold it up or end it. It starts the services, restarts them, answers signals,
+//! and shows what it is told. Its child, the attendant (`attend.rs`), does what needs the bus.
 
 mod external;
 mod resets;

@@ -5,10 +5,9 @@
 //!     7.02 s  bridge  WARNING: the board on /dev/ttyUSB0 has fallen silent
 //! ```
 //!
-//! What the robot does is told by `up`'s narrator. What goes wrong in a service is an event of
-//! `tracing`, and is told here in the same way on standard error. Traces are for whoever debugs:
-//! they are shown, in the form of `tracing`, only where `RUST_LOG` asks for them, or written to
-//! the file of `--log`.
+//! `up`'s narrator says what the robot does. A fault in a service is an event of `tracing`, and is
+//! shown in the same form on standard error. Traces are for debugging: they are shown, in the form
+//! of `tracing`, only where `RUST_LOG` asks for them, or written to the file of `--log`.
 
 use std::fmt;
 use std::fs::File;

@@ -1,4 +1,4 @@
-//! What supervisor and attendant say to each other.
+//! The messages between supervisor and attendant.
 //!
 //! The two are joined by a pair of sockets, the attendant's being its standard output. A message is
 //! a packet, one value in JSON:
@@ -17,8 +17,8 @@
 //!       │  SIGTERM                                        │
 //!       │ <──────────────────────────────────── last words│ sweeps, ends
 //! ```
-//! The supervisor never waits: what it cannot send at once, or has not heard in time, is a fault of
-//! the attendant, and a fault of the attendant is mended by another one.
+//! The supervisor never waits. What it cannot send at once, or does not hear in time, counts as a
+//! fault of the attendant, and it then starts another attendant.
 
 use std::io::{Error, ErrorKind, Result};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -143,7 +143,7 @@ impl Line {
     /// The attendant's end.
     ///
     /// # Errors
-    /// Standard output is no such socket: nobody started this process as an attendant.
+    /// Standard output is no such socket: no supervisor started this process.
     pub fn to_supervisor() -> Result<Self> {
         let end = std::io::stdout().as_fd().try_clone_to_owned()?;
         rustix::net::sockopt::socket_type(&end)?;

@@ -29,8 +29,8 @@ impl Default for ArmSeen {
 }
 
 impl ArmSeen {
-    /// A bridge that has just started knows no servo; what was known before still holds, since
-    /// nothing moves the arm but by way of the bridge.
+    /// A bridge that has just started knows no servo. What was known before still holds, since only
+    /// the bridge can move the arm.
     pub(crate) fn take(&mut self, report: &SteeringReport) {
         for (known, heard) in self.position.iter_mut().zip(report.servo_position) {
             if heard != SERVO_UNKNOWN {

@@ -7,7 +7,7 @@ use core::time::Duration;
 pub(crate) struct Battery {
     /// It is low.
     low: bool,
-    /// A person has put the robot to work all the same.
+    /// A person has told the robot to work all the same.
     accepted: bool,
     /// Since when the reports contradict `low`.
     contradicted: Option<Duration>,
@@ -25,7 +25,7 @@ pub(crate) struct Limits {
 }
 
 impl Battery {
-    /// A low battery that a predecessor stood still for.
+    /// A low battery for which a predecessor stood still.
     pub(crate) const LOW: Self = Self {
         low: true,
         accepted: false,

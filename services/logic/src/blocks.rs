@@ -1,9 +1,9 @@
-//! What blocks ways at run time: which way, since when, and who says so. The floor below it never
-//! changes ([`crate::map`]); what is blocked is never part of the published map.
+//! What blocks ways at run time: which way, since when, and who says so. The map never changes
+//! ([`crate::map`]), and a block is never part of the published map.
 //!
-//! It is told what is blocked and asked what is open. It never senses anything, and forgets only
-//! what it is told to, or, where there are more blocks than places, the oldest of those that the robot
-//! has found by itself.
+//! It is told what is blocked and asked what is open. It senses nothing. It forgets a block only
+//! when it is told to, or, when its places are full, the oldest block that the robot has found by
+//! itself.
 
 use core::time::Duration;
 
@@ -35,7 +35,7 @@ pub struct Blocks {
     list: heapless::Vec<Block, MAX_BLOCKS>,
     /// For each node the blocked headings, a bit each; both ends of a way have theirs.
     closed: [u8; MAX_SIDE * MAX_SIDE],
-    /// Counts changes, so that whoever has computed with these blocks knows when they are others.
+    /// Counts changes, so that a result computed with these blocks can be recognised as outdated.
     revision: u32,
 }
 
@@ -64,7 +64,7 @@ impl Blocks {
             return false;
         }
         if self.list.is_full() {
-            // What a person has closed stays closed as long as there is anything else to forget.
+            // A person's block is forgotten only if there is no other to forget.
             let sensed = |block: &Block| block.source == BlockSource::Sensor;
             let oldest = self.list.iter().position(sensed).unwrap_or(0);
             let oldest = self.list.remove(oldest);
@@ -114,7 +114,7 @@ impl Blocks {
             .max()
     }
 
-    /// As they are published, but for what only the floor and the mission know.
+    /// As they are published, except for what only the map and the mission know.
     pub fn to_payload(&self) -> BlockedWays {
         let mut ways = BlockedWays::default();
         for (place, block) in ways.ways.iter_mut().zip(&self.list) {

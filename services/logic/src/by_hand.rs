@@ -1,7 +1,7 @@
 //! Whether somebody has driven the robot by hand since the navigator was last sure of its place.
 //!
-//! The bridge sums what the wheels turn in manual mode, over all lives of both services, so that
-//! a navigator that was not there finds out as well. This only compares and converts.
+//! The bridge sums what the wheels turn in manual mode, over all lives of both services, so that a
+//! navigator that was not running then finds out as well. This file only compares and converts.
 
 use lager_topics::NavigatorStatus;
 
@@ -36,8 +36,8 @@ impl ByHand {
         }
     }
 
-    /// Takes the bridge's sum; the way of the wheels since the place was known, in mm. A bridge
-    /// that has forgotten its sum has stopped the robot for that.
+    /// Takes the bridge's sum, and returns how far the wheels have moved since the place was known,
+    /// in mm. A bridge that has forgotten its sum has stopped the robot for that.
     pub(crate) fn take(&mut self, sum: u64, cruise_mm_per_s: f32) -> f32 {
         self.now = sum;
         let here = *self.here.get_or_insert(sum);

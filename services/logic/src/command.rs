@@ -1,7 +1,7 @@
 //! The one steering order the navigator wants to be in force, with the id that makes it execute.
 //!
-//! The same id renews, a new id executes: so a changed command, and one that has to be given
-//! again, gets the next id, and everything else keeps the one it has. It knows nothing of maps.
+//! The same id renews an order, a new id executes it. So a changed command, and one that has to be
+//! given again, gets the next id; every other order keeps its id. This file knows nothing of maps.
 
 use core::time::Duration;
 
@@ -28,7 +28,7 @@ pub(crate) enum News {
     None,
     /// It has ended.
     Ended(Finish),
-    /// The bridge has not spoken of it for too long.
+    /// The bridge has not reported it for too long.
     Unheard,
 }
 
@@ -45,9 +45,9 @@ impl Standing {
         }
     }
 
-    /// An order given before a restart. One that runs once is the same order still; a setpoint may
-    /// have been followed by another that nobody was told of, so it is given anew under a number
-    /// that is nobody's.
+    /// An order given before a restart. A one-shot is still the same order. A setpoint may have
+    /// been followed by another one that was never published, so it is given again under an unused
+    /// number.
     pub(crate) fn resumed(id: u32, command: Command) -> Self {
         let is_setpoint = !command.is_one_shot();
         Self {
@@ -86,7 +86,7 @@ impl Standing {
         }
     }
 
-    /// Begins to wait for news: before now nobody could have heard the order.
+    /// Begins to wait for reports: before now no report could show the order.
     pub(crate) fn listen_from(&mut self, now: Duration) {
         self.heard = now;
     }

@@ -65,7 +65,7 @@ pub struct LogicConfig {
     pub turn_room_mm: f32,
     /// How far behind the next node a thing still blocks the way to it, in mm.
     pub beyond_node_mm: f32,
-    /// How old a distance is, at most, when it comes.
+    /// The greatest age of a distance when it arrives.
     pub ranger_lag: Duration,
     /// How long a thing between two nodes must stay to block the way.
     pub halt_patience: Duration,
@@ -93,7 +93,7 @@ pub struct LogicConfig {
     pub unheard_board: Duration,
     /// How long the robot stands before an interrupted turn or drop is judged or begun.
     pub settle: Duration,
-    /// How long a setpoint may stay unheard of in the bridge's reports before it is given anew.
+    /// How long a setpoint may be missing in the bridge's reports before it is given again.
     pub unheard_setpoint: Duration,
     /// The same for a turn or a drop.
     pub unheard_one_shot: Duration,

@@ -1,4 +1,4 @@
-//! The four directions of a grid, and how they lie to each other.
+//! The four directions of a grid, and the turns between them.
 //!
 //! The enum itself is the bus's; this file adds the arithmetic of quarter turns, so that no
 //! other file counts directions modulo four.

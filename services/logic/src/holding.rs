@@ -1,5 +1,5 @@
-//! Standing although the phase would turn the wheels: the steering board is unheard, the arm is
-//! not where goods are carried, or the battery is low.
+//! Why the robot stands although its phase would turn the wheels: the steering board is unheard,
+//! the arm is not in the carry pose, the battery is low, or no line frames come.
 //!
 //! ```text
 //!   no report for 200 ms ------> Unheard ---- a report; a turn that was under way is judged --->
@@ -8,9 +8,10 @@
 //!   no line frame for 120 ms --> Blind ------ a line frame ----------------------------------->
 //! ```
 //!
-//! It is apart from the phases because any of them can be held, and goes on where it was. A hold
-//! never begins in the middle of anything but a lost report or frame: the others wait until the
-//! robot stands anyway, or is at a node.
+//! It is apart from the phases because any of them can be held, and goes on where it was. Without
+//! reports the robot stands because every limit counts the odometer's millimetres. A hold never
+//! begins in the middle of anything but a lost report or frame: the others wait until the robot
+//! stands anyway, or is at a node.
 
 use core::time::Duration;
 
@@ -40,8 +41,8 @@ impl Holding {
         self.joint_off = None;
     }
 
-    /// Stands when the steering board has not reported for too long: every limit counts the
-    /// odometer's mm, and that stands still then. Whether that begins now.
+    /// Stands when the steering board has not reported for too long. Returns whether that begins
+    /// now.
     pub(crate) fn watch_board(&mut self, now: Duration, config: &LogicConfig) -> bool {
         let heard = *self.heard.get_or_insert(now);
         if self.unheard || now.saturating_sub(heard) <= config.unheard_board {

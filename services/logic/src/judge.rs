@@ -7,8 +7,8 @@
 //!          [ stations of this edge )[ the node's sides   ) overdue
 //! ```
 //!
-//! One mark looks like another (AMB-18: a border crossing is a one-sided mark), so a mark that is
-//! neither expected nor plausible is nobody's: the caller says so and drives on.
+//! One mark looks like another (AMB-18: a border crossing is a one-sided mark). A mark that is
+//! neither expected nor plausible is ignored: the caller says so and drives on.
 
 use crate::marks::Sides;
 
@@ -30,7 +30,7 @@ pub enum Verdict {
     Station,
     /// The node at the end of the edge.
     Node,
-    /// Nothing the map knows of.
+    /// Nothing that is on the map.
     Unexpected,
 }
 

@@ -1,8 +1,8 @@
 //! The logic unit (L1-L10): a pure navigator in a thin shell on the bus.
 //!
-//! The [`Navigator`] takes events and time and yields the one steering order that should be in
-//! force, with the mission's events and thoughts. It is apart from its shell ([`run`]) so that
-//! whole missions, restarts at every moment included, run in virtual time in a test.
+//! The [`Navigator`] takes events and time. It returns the one steering order that should be in
+//! force, and the mission's events and thoughts. It is apart from its shell ([`run`]), so that
+//! tests run whole missions in virtual time, with a restart at every moment.
 //!
 //! **Invariant:** the navigator never reads a clock, never allocates and never knows of the bus;
 //! the shell never decides.

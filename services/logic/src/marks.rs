@@ -1,8 +1,8 @@
 //! Marks on the floor: from single line states to one mark with its sides, judged once.
 //!
-//! The sensors take about 200 ms to cross a tape. Seen at an angle a crossing shows one side
-//! first, frames get lost, and noise shows a mark that is none. So sides are counted while a mark
-//! lasts, and the mark is given out when it has ended:
+//! The sensors take about 200 ms to cross a tape. At an angle, a crossing first shows one side;
+//! frames get lost; and noise shows marks that do not exist. So the sides are counted while a mark
+//! lasts, and the mark is reported when it has ended:
 //!
 //! ```text
 //!  OnLine OnLine StationToLeft FourWay FourWay StationToRight OnLine
@@ -126,8 +126,8 @@ impl MarkReader {
         None
     }
 
-    /// Takes one line state while nobody can judge a mark: what is under the sensors is counted,
-    /// and ends with the first state that is pushed again.
+    /// Takes one line state while no mark can be judged: the mark under the sensors is counted, and
+    /// ends with the first state that is pushed again.
     pub fn hold(&mut self, state: LineState) {
         match state {
             LineState::StationToLeft | LineState::StationToRight | LineState::FourWay => {
@@ -143,7 +143,7 @@ impl MarkReader {
     }
 
     /// Believes what has been seen so far, however briefly: the rest of the mark may have passed
-    /// while nobody was reading.
+    /// while no process was reading.
     pub fn believe(&mut self) {
         for count in [&mut self.left, &mut self.right] {
             if *count > 0 {

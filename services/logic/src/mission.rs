@@ -119,7 +119,7 @@ impl Mission {
         }
     }
 
-    /// Nobody kept where the robot is.
+    /// The robot's place was not kept.
     pub(crate) fn lose_place(&mut self) {
         self.phase = Phase::Lost;
         self.failure = self.failure_here(FailureKind::StateLost, 0, 0);
@@ -166,7 +166,7 @@ impl Mission {
                 Manoeuvre::Look(Look::new(limit, Duration::ZERO))
             }
             Phase::Halted => {
-                // Who has halted does not go on for a thing that trembles.
+                // A robot that has halted does not go on because a thing trembles.
                 let limit = config.halt_cm + config.halt_cm / 5;
                 Manoeuvre::Look(Look::new(limit, config.halt_patience))
             }
@@ -493,7 +493,7 @@ impl Mission {
         self.map.as_ref()?.station(self.order.product)
     }
 
-    /// Gives up until somebody helps (AMB-49).
+    /// Gives up until a person helps (AMB-49).
     fn get_stuck(&mut self, kind: FailureKind, expected: i32, seen: i32, out: &mut Output) {
         self.failure = self.failure_here(kind, expected, seen);
         self.phase = Phase::Stuck;

@@ -1,11 +1,11 @@
 //! Dead reckoning from the steering board's reports: how far the axle has come and how far the
 //! robot has turned.
 //!
-//! Speed is taken as proportional to duty. That is wrong by ten per cent and more, so every judged
-//! mark sets the way anew and teaches how fast these wheels really are: half of what was missing on
-//! the way between two marks is believed. A successor learns it anew. This is only the bridge
-//! between two marks. It never guesses beyond the reports: what the board did not confirm lately
-//! counts as standing still, because a board that is silent stops by itself.
+//! Speed is taken as proportional to duty. That is wrong by ten per cent and more. So every judged
+//! mark corrects the way and teaches how fast these wheels really are: half of what was missing on
+//! the way between two marks is taken over. A successor learns it again. Dead reckoning only fills
+//! the gap between two marks. It never extrapolates beyond the reports: without a recent report the
+//! wheels count as standing still, because a board that is silent stops by itself.
 
 use core::time::Duration;
 
@@ -20,10 +20,10 @@ pub(crate) const STANDARD_DUTY: f32 = 100.0;
 /// How long a report is believed; the board stops by itself when its command is this old.
 const REPORT_AGE: Duration = Duration::from_millis(150);
 
-/// Way between two marks below which nothing is learnt, in mm: where exactly a mark was seen counts
-/// for too much there.
+/// The odometer learns nothing from a shorter way between two marks, in mm: there the error in
+/// where a mark was seen is too large.
 const LEAST_LESSON_MM: f32 = 150.0;
-/// Part of what was missing that is believed.
+/// The part of the missing way that is taken over.
 const BELIEVED: f32 = 0.5;
 /// The most that wheels are faster or slower than configured.
 const MOST_FASTER: f32 = 0.3;
@@ -62,8 +62,8 @@ impl Odometer {
         self.advance(now);
         let (left, right) = speeds(report);
         let (left, right) = (left * (1.0 + self.faster), right * (1.0 + self.faster));
-        // On the spot the board has both sides go alike, and duties that differ say how unlike the
-        // motors are, not that the axle moves.
+        // In a turn on the spot the board makes both sides turn alike. Duties that differ then show
+        // how much the motors differ, not that the axle moves.
         self.mm_per_s = match left * right < 0.0 {
             true => 0.0,
             false => (left + right) / 2.0 * config.cruise_mm_per_s,
@@ -92,8 +92,9 @@ impl Odometer {
 /// Speed of both wheels as a share of that at the standard duty.
 fn speeds(report: &SteeringReport) -> (f32, f32) {
     let flags = SteerFlags(report.flags);
-    // A board of ours locks its arm while the wheels move. No flag at all is an original board,
-    // which reports nothing, and the bridge tells what it was told: its duty is the standard one.
+    // A board of ours locks its arm while the wheels move. A report without flags comes from an
+    // original board, which reports nothing: the bridge fills in the command that it was sent, and
+    // its duty is the standard one.
     if flags == SteerFlags::NONE && report.left_duty == 0 && report.right_duty == 0 {
         return nominal(report.code);
     }

@@ -10,16 +10,16 @@ use crate::place::Place;
 pub struct Output {
     /// What has happened on the mission, in order.
     pub events: heapless::Vec<Event, 6>,
-    /// What it thinks; the last one if there were several.
+    /// Its thought; the last one if there were several.
     pub thought: Option<Thought>,
-    /// [`Navigator::route`](crate::Navigator::route) is another one now.
+    /// [`Navigator::route`](crate::Navigator::route) has changed.
     pub route_changed: bool,
-    /// [`Navigator::blocks`](crate::Navigator::blocks) are others now.
+    /// [`Navigator::blocks`](crate::Navigator::blocks) have changed.
     pub blocks_changed: bool,
-    /// [`Navigator::queue`](crate::Navigator::queue) is another one now.
+    /// [`Navigator::queue`](crate::Navigator::queue) has changed.
     pub queue_changed: bool,
-    /// [`Navigator::status`](crate::Navigator::status) is another one now, in more than what
-    /// changes with every frame: it has to go out at once.
+    /// [`Navigator::status`](crate::Navigator::status) has changed in more than what changes with
+    /// every frame: it has to go out at once.
     pub status_changed: bool,
 }
 

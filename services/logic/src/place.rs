@@ -1,11 +1,11 @@
 //! Where the robot is: the node last passed, where it looks, and where it may be besides since a
 //! turn was disturbed.
 //!
-//! The end of a turn that was cut short, or that nobody heard the reports of, is judged by dead
-//! reckoning and by the tape under the sensors; but one tape looks like another, and the robot may
-//! look a quarter or two further. So it drives on as it believes and keeps the other headings in
-//! mind. Each mark is asked which of them it fits, and how well; what does not fit is forgotten,
-//! and what fits better than the belief takes its place:
+//! The end of a turn that was cut short, or whose reports were lost, is judged by dead reckoning
+//! and by the tape under the sensors. But one tape looks like another, and the robot may have
+//! turned a quarter or two more. So it drives on in the heading that it believes and remembers the
+//! other headings. Each mark is compared with all of them. A heading that the mark does not fit is
+//! dropped, and one that it fits better than the believed one takes its place:
 //!
 //! ```text
 //!   a disturbed turn ends        a mark that fits          a mark that fits another better
@@ -13,8 +13,8 @@
 //!        others where there is tape     doubt     doubt                             believed now
 //! ```
 //!
-//! The others keep their angle to the belief whatever the robot does, so only their nodes are
-//! state. It never turns the robot: whoever plans does, from the node that is believed now.
+//! The angle between the other headings and the believed one never changes, so only their nodes are
+//! state. This file never turns the robot: the planner does, from the node that is believed now.
 
 use lager_topics::{Heading, NavigatorStatus};
 
@@ -103,7 +103,7 @@ impl Doubt {
 }
 
 impl Place {
-    /// A place nobody doubts.
+    /// A place without a doubt.
     pub(crate) fn at(node: Node, heading: Heading) -> Self {
         Self {
             node,
@@ -138,8 +138,8 @@ impl Place {
             .retain(|quarters, node| map.neighbour(node, believed.turned(Spin::Right, quarters)));
     }
 
-    /// Asks a mark which of the possible places it fits, and believes one of them if the belief
-    /// itself, on `edge`, does not fit. Whether it believes another one now.
+    /// Compares a mark with each possible place, and believes another one if the belief itself, on
+    /// `edge`, does not fit. Returns whether it believes another one now.
     pub(crate) fn ask_mark(
         &mut self,
         map: &Map,
@@ -161,7 +161,7 @@ impl Place {
             (fits > Fit::No).then_some(node)
         });
         let (_, Some((quarters, node))) = best else {
-            // A mark that fits nobody is dirt.
+            // A mark that fits no possible place is dirt.
             if best.0 > Fit::No {
                 self.doubt = fitting;
             }

@@ -1,9 +1,9 @@
 //! The orders that wait for their turn (F3): in the order given, unless a person moves one up or
 //! takes one back.
 //!
-//! It keeps them and nothing else: whose turn it is, and who can be reached, is the mission's
-//! question. An order that was under way and has to wait comes back to the first place, and for it
-//! one place is always kept.
+//! It only keeps the orders. The mission decides whose turn it is and which station can be reached.
+//! An order that was under way and has to wait goes back to the first place; one place is always
+//! kept free for it.
 
 use lager_topics::{Order, OrderQueue, WaitingOrder};
 
@@ -41,7 +41,7 @@ impl Queue {
         self.revision
     }
 
-    /// Whether an order with this number waits; 0 is nobody's.
+    /// Whether an order with this number waits; 0 is no order's number.
     pub fn has(&self, id: u32) -> bool {
         self.place(id).is_some()
     }
@@ -127,9 +127,9 @@ impl Queue {
         queue
     }
 
-    /// As a predecessor published them, who may have been killed before it told what it did with
-    /// them: `known` is the order that its status tells of. Any other one that was under way by then
-    /// waits again.
+    /// As a predecessor published them. It may have been killed before it published what it did
+    /// with them: `known` is the order that its status names. Any other order that was under way
+    /// then waits again.
     pub fn from_payload(queue: &OrderQueue, known: Order) -> Self {
         let under_way = (queue.under_way != 0).then_some(Waiting {
             order: Order {

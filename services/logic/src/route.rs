@@ -1,15 +1,15 @@
 //! Shortest ways over open edges: the breadth-first search of L5.
 //!
-//! The search runs from the goals and yields every node's distance to the nearest of them, so that
-//! one search answers both questions the navigator has: which of two nodes is nearer, and where to
-//! go from here. It is kept until the goals, the floor or what blocks it are others: on the way
-//! nothing is searched twice. Among equally short ways the one with the fewest quarter turns is
-//! taken, because each costs three seconds, and among those the one that goes straight on first.
-//! Nothing is allocated but the tables themselves, at start-up.
+//! The search runs from the goals and gives every node's distance to the nearest goal. So one
+//! search answers both questions of the navigator: which of two nodes is nearer, and where to go
+//! from here. The result is kept until the goals, the map or the blocks change, so the robot does
+//! not search again on its way. Among equally short ways it takes the one with the fewest quarter
+//! turns, because each costs three seconds, and among those the one that goes straight on first.
+//! Only the tables are allocated, at start-up.
 //!
 //! The search queues the nodes by their distance, so a second pass in that order knows the turns of
-//! every nearer node already: leaving `n` along `h` towards `m`, the turns to come are the fewest of
-//! `m` after arriving there along `h`.
+//! every nearer node already: leaving `n` along `h` towards `m`, the turns to come are the fewest
+//! of `m` after arriving there along `h`.
 
 use lager_topics::{Heading, Route, RouteNode};
 

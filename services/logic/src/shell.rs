@@ -1,18 +1,19 @@
 //! The navigator's shell on the bus: it carries samples in and out and decides nothing.
 //!
-//! One turn: wait, drain what has been rung for, hand each sample to the navigator, and send what
-//! changed at once: events first, then the blocked ways, the queue and the status, then the order,
-//! and what nobody acts upon last. Killed between any two of the first five, the successor knows at
-//! least as much as the bridge; an event can come twice, never not at all. Only a setpoint in place of a
-//! setpoint goes before the status, since giving it twice is giving it once; its number, which the
-//! successor may not know, is left out when a status is taken up. An unchanged order is renewed
-//! every 40 ms of robot time.
+//! One turn: wait, drain the topics that were rung for, hand each sample to the navigator, and send
+//! at once what changed. Events go out first, then the blocked ways, the queue and the status, then
+//! the order; what no service acts upon goes last. If the process is killed between any two of the
+//! first five, its successor knows at least as much as the bridge: an event may come twice, but is
+//! never lost. Only a setpoint that replaces a setpoint goes out before the status, because giving
+//! it twice has the effect of giving it once. The successor may not know its number, so it leaves
+//! one number out when it takes up a status. An unchanged order is renewed every 40 ms of robot
+//! time.
 //!
 //! A turn takes one decision for each sample and, only if there was none, one for the time that
 //! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`).
 //!
-//! **Safe state**: silence. When this process ends, however it ends, nobody renews the order in
-//! force; the bridge brings the robot to rest when the lease is over, 120 ms later.
+//! **Safe state**: silence. When this process ends, for whatever reason, the order in force is no
+//! longer renewed, and the bridge stops the robot when the lease is over, 120 ms later.
 
 use core::time::Duration;
 
@@ -69,7 +70,7 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
     Ok(())
 }
 
-/// What an earlier navigator has left. Whatever stands in the way of it, without it the robot may be
+/// What an earlier navigator has left. If it cannot be read, for whatever reason, the robot may be
 /// anywhere.
 fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
     bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
@@ -172,8 +173,8 @@ impl Shell {
     /// One turn of the loop.
     fn turn(&mut self) {
         self.wait();
-        // First who may drive and in what world, then what people want, then what the robot
-        // senses: the line last, so that its decision knows all the rest.
+        // First who may drive and in what world, then what people want, then what the robot senses.
+        // The line comes last, so that its decision knows all the rest.
         let decisions = self.decisions;
         self.take_states();
         self.take_wishes();
@@ -273,8 +274,7 @@ impl Shell {
         }
     }
 
-    /// A sample that `receive` has brought, and what is to be said of everything that follows from
-    /// it.
+    /// A sample that `receive` has returned, and the cause for everything that follows from it.
     fn next<T: Topic>(
         &mut self,
         receive: impl FnOnce(&mut Self) -> Result<Option<Sample<T>>, ReceiveError>,
@@ -379,7 +379,8 @@ impl Shell {
         self.check(sent);
     }
 
-    /// Samples missed of the topics on which each one counts; of the others only the last does.
+    /// Samples missed on the topics on which each sample counts; of the others only the last one
+    /// does.
     fn lost(&self) -> u64 {
         self.line.lost()
             + self.distance.lost()
@@ -394,7 +395,7 @@ impl Shell {
         }
     }
 
-    /// Says what goes wrong on the bus, but not for ever.
+    /// Logs faults of the bus, but not the same one for ever.
     fn complain(&mut self, error: &dyn std::error::Error) {
         self.complaints = self.complaints.wrapping_add(1);
         if self.complaints.is_power_of_two() {

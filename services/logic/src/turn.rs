@@ -1,4 +1,4 @@
-//! What a turn that has ended amounts to.
+//! How many quarters a turn that has ended has turned.
 //!
 //! The steering board turns by time and ends early when the tape comes under its centre sensors
 //! (AMB-22), so "done" alone does not say where the robot looks: a cross bar, a spot of dirt or an
@@ -10,8 +10,8 @@
 //!   | fragment | by line | one quarter     | by line   | two quarters
 //! ```
 //!
-//! Two quarters come of one turn when there was no tape at the first, and when an interrupted
-//! turn is given again.
+//! One turn makes two quarters when there was no tape at the first, or when an interrupted turn is
+//! given again.
 
 use lager_wire::LineState;
 
@@ -49,10 +49,10 @@ pub fn done(turned_deg: f32, seen: LineState) -> Turned {
 
 /// Judges a turn that was cut short, once the robot stands and `seen` is under its sensors.
 ///
-/// Turning again from the new tape would lead past it to the next one, so the tape counts when
-/// it is in the middle or already on the far side. Where no tape is in sight the turn goes on,
-/// whatever dead reckoning says: after several interruptions it is the less reliable of the two,
-/// and a turn given again ends on tape, at the first quarter or at the second.
+/// To turn again from the new tape would lead past it to the next one, so the tape counts when it
+/// is in the middle or already on the far side. Where no tape is in sight the turn goes on,
+/// whatever dead reckoning says: after several interruptions dead reckoning is the less reliable of
+/// the two, and a turn that is given again ends on tape, at the first quarter or at the second.
 pub fn interrupted(turned_deg: f32, spin: Spin, seen: LineState) -> Turned {
     let beyond = match spin {
         Spin::Left => LineState::LeftOfLine,

@@ -11,11 +11,11 @@
 //!   epoch                  1           1
 //! ```
 //!
-//! Nothing here knows a topic; what a sample means is said by [`crate::sentence`]. Order, names and
-//! kinds of the fields are the table's; a unit is what a field's name ends with; a value that is the
-//! payload's stated blank value is not known and shown as `-`. Enums are words, fields of the same
-//! make stand beside each other. Numbers are exact but for floating-point ones, which have three
-//! decimals; programs take the JSON.
+//! Nothing here knows a topic; [`crate::sentence`] says what a sample means. The table gives order,
+//! names and kinds of the fields, and the end of a field's name is its unit. A value that equals
+//! the payload's blank value is unknown and shown as `-`. Enums are words, and fields of the same
+//! structure stand beside each other. Numbers are exact, except for floating-point ones, which have
+//! three decimals; programs take the JSON.
 
 use std::fmt::Write;
 
@@ -38,7 +38,7 @@ const YES_OR_NO: [&str; 4] = ["up", "stopped", "under_way", "arm_granted"];
 pub(crate) struct Blocks {
     topic: &'static str,
     fields: &'static [FieldInfo],
-    /// The payload as nobody has written it.
+    /// The payload's blank value.
     blank: Value,
     /// The columns' widths so far, where samples are rows; none before the first.
     row: Option<Vec<usize>>,
@@ -270,7 +270,8 @@ fn line<'a>(
 
 /// One value without its unit.
 fn plain(name: &str, value: &Value, blank: &Value) -> String {
-    // 0 is a value; whatever else a payload states as blank means that nobody has written it.
+    // 0 is a value; any other value that a payload states as blank means that the field was never
+    // written.
     let is_zero = blank.as_f64().is_none_or(|number| number == 0.0);
     if value == blank && !is_zero {
         return UNKNOWN.to_owned();

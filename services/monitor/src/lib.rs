@@ -1,11 +1,10 @@
 //! The topic tools: list, info, echo and hz, for any topic of any robot, by name.
 //!
-//! They are observers: they poll, hold no listener and never slow the path. They know no topic
-//! by itself, but for what some samples mean in words (`sentence.rs`); the table leads from a name
-//! to its static type. Each tool writes to a writer it is
-//! given, for people or as one JSON value a line, and tells how many samples it lost. Every call
-//! into the bus is made under a watchdog, so that a bus that does not answer is told and not
-//! waited for.
+//! They are observers: they poll, hold no listener and never slow the path. They know no topic,
+//! except for the sentences of some samples (`sentence.rs`); the table leads from a name to its
+//! static type. Each tool writes text or one JSON value a line to the writer that it is given, and
+//! says how many samples it lost. Every call into the bus is made under a watchdog, so that a tool
+//! reports a bus that does not answer and does not wait for it.
 
 mod block;
 mod describe;
@@ -52,8 +51,8 @@ impl<W: Write> Tools<'_, W> {
     }
 
     /// Waits a moment for the next sample. A subscriber that cannot reach a writer for want of
-    /// something, or whose bus was cleared, hears nothing and no error, so whoever has heard nothing
-    /// asks.
+    /// something, or whose bus was cleared, hears nothing and no error, so whoever has heard
+    /// nothing asks.
     fn pause(&self, silent_since: Instant) -> Result<(), ToolError> {
         if silent_since.elapsed() >= SILENCE {
             if let Some(shortage) = Shortage::now() {

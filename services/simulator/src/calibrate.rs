@@ -1,8 +1,8 @@
 //! What a person does to calibrate the line sensors: asks the board, as `lager calibrate` does, and
 //! moves the robot over tape and floor by hand until the board says that it is done (E9).
 //!
-//! It speaks to the board over its serial line, and whoever takes the robot over afterwards begins
-//! with a handshake of its own. It never tells the board what the thresholds are.
+//! It talks to the board over its serial line; the bridge that takes the robot over afterwards
+//! begins with a handshake. It never tells the board what the thresholds are.
 
 use core::f64::consts::TAU;
 use core::time::Duration;

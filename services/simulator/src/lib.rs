@@ -4,9 +4,9 @@
 //! speak bytes at the baud rate in virtual time. [`run`] is its shell as a process: two ptys in
 //! place of the USB cables, real time times the speed of the bus's clock, and `truth/pose`.
 //!
-//! Nobody on the Pi can tell it from the boards, and it knows nothing of who is there: it never
-//! reads a topic but its own, from before its restart. What a person's hands would do to the world
-//! it does when it is asked to.
+//! A service on the Pi cannot tell it from the boards. It does not know which services run: it
+//! reads no topic but its own, from before its restart. On request it does to the world what a
+//! person's hands would do.
 //!
 //! Safe state: the steering board's own. A simulator that ends takes the robot with it; a
 //! restarted one begins with both boards starting, motors off.

@@ -66,7 +66,7 @@ pub enum RunError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] PortError),
-    /// Nobody's hands can be obeyed.
+    /// The requests of a person's hands cannot be received.
     #[error(transparent)]
     Hands(#[from] ReceiveError),
     /// The truth cannot be told.

@@ -1,7 +1,7 @@
 //! One connection: bytes to lines and lines to bytes, without ever waiting for its peer.
 //!
-//! What is kept of a peer is bounded: one line that it has not ended, and [`MOST_UNREAD`] bytes
-//! that it has not read. Whoever is slower than that is closed, see [`Connection::overdue`].
+//! The memory for a peer is bounded: one line that it has not ended, and [`MOST_UNREAD`] bytes that
+//! it has not read. A connection that is slower than that is closed, see [`Connection::overdue`].
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -18,7 +18,7 @@ const MOST_UNREAD: usize = 64 * 1024;
 /// waits for it.
 const SLOWEST: Duration = Duration::from_secs(5);
 
-/// How long somebody may be connected without having said a line.
+/// How long a peer may be connected without having sent a line.
 const SILENT: Duration = Duration::from_secs(10);
 
 /// Bytes that are read at a time. What a peer sends beyond them waits for its next turn, so that

@@ -249,7 +249,7 @@ impl Handle {
         look(&self.lock().station)
     }
 
-    /// The number of the last change. What looks the same has the same.
+    /// The number of the last change: equal numbers mean equal content.
     pub fn revision(&self) -> u64 {
         self.lock().revision
     }
@@ -301,7 +301,7 @@ impl Handle {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Nobody leaves it half changed: what panics below is a mistake of one line's handling.
+        // It is never left half changed: a panic below comes from the handling of one line.
         let state = self.shared.state.lock();
         state.unwrap_or_else(PoisonError::into_inner)
     }

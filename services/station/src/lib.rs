@@ -1,4 +1,4 @@
-//! The external computer: what it answers robots and a GaG, and the warehouse it keeps.
+//! The external computer: it answers the robots and a GaG, and keeps the warehouse.
 //!
 //! ```text
 //!   robots ── TCP ──┐                     ┌── unix socket ── somebody's GaG
@@ -18,7 +18,7 @@
 //!   has shown and when, a [`Subscription`] to events and thoughts, actions whose answer is
 //!   [`Awaited`], and one [`Driver`] for each robot.
 //!
-//! It never joins a robot's bus: whatever it knows, robots have told it.
+//! It never joins a robot's bus. It knows only what robots have told it.
 
 #![forbid(unsafe_code)]
 

@@ -1,13 +1,13 @@
-//! The robots' queues as they lie in a file beside the warehouse's, so that orders outlive a station
-//! that was killed.
+//! The robots' queues as they lie in a file beside the warehouse's, so that orders outlive a
+//! station that was killed.
 //!
 //! ```toml
 //! r1 = [3, 1, 2]                # the next one first
 //! r2 = [7]
 //! ```
 //!
-//! It is saved after robots have been told: a product that a robot was told at the last moment may
-//! stand here still and is then told again, but none is lost.
+//! It is saved after robots have been told. So a product that a robot was told at the last moment
+//! may still be in the file and be told again, but none is lost.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;

@@ -10,7 +10,7 @@
 //!  armcomm                   with pickup_done, once a person has said so and no command waits
 //! ```
 //!
-//! - One question is held; a new one takes its place, and nothing is said to the old one any more.
+//! - One question is held. A new question takes its place, and the old one is never answered.
 //! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
 //!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. When the robot asks
 //!   for something else, or its connection ends, they are dropped: nobody's old command moves it
@@ -76,7 +76,7 @@ pub enum CommandRefused {
         "the robot takes no commands now; it does when it is switched to manual or stands at goods"
     )]
     NotAsked,
-    /// It is slower than whoever gives them.
+    /// It is slower than the person who gives them.
     #[error(
         "{} commands wait already; wait until the robot has taken some, or stop it",
         Robot::MOST_COMMANDS

@@ -1,5 +1,5 @@
-//! Saves warehouse and queues in a thread of its own, because a disk may take seconds and a robot's
-//! stop may not.
+//! Saves warehouse and queues in its own thread, because a disk may take seconds and a robot's stop
+//! must not wait for it.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Sender, channel};

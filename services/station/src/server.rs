@@ -3,9 +3,9 @@
 //!
 //! - At most [`Server::MOST_ROBOTS`] connections of robots are open; a further one is closed at
 //!   once, and so is the one of a GaG while there is one.
-//! - Whoever is too slow is closed (`connection.rs`); of a peer that is gone without a word the
-//!   kernel says so: it asks every silent peer after 5 s and gives one up that has not answered for
-//!   10 s, or has not confirmed for 10 s what it was sent.
+//! - A peer that is too slow is closed (`connection.rs`). A peer that is gone without a word is
+//!   found by the kernel: it probes every silent peer after 5 s, and gives one up that has not
+//!   answered for 10 s, or has not confirmed for 10 s what it was sent.
 //! - Each connection reads at most 4 KiB a turn.
 
 use std::collections::BTreeMap;
@@ -428,7 +428,7 @@ fn listen_for_gag(path: &Path) -> Result<UnixListener, ServerError> {
         fs::remove_file(path).map_err(failed)?;
     }
     let listener = UnixListener::bind(path).map_err(failed)?;
-    // Whoever was quicker than this is refused for his user when he is let in.
+    // A process of another user that connected first is refused when it is let in.
     fs::set_permissions(path, fs::Permissions::from_mode(0o600)).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     Ok(listener)

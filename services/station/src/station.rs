@@ -6,13 +6,13 @@
 //!   anything else of a robot          robot-1, robot-2 ..., the first that is free
 //! ```
 //!
-//! - A name has one connection, the newest: one before it is closed, since a robot that comes back
-//!   may have left one behind of which nobody here has heard the end.
-//! - A line that nobody could have said closes its connection; nothing of it has counted.
+//! - A name has one connection, the newest: the one before is closed, because a robot that comes
+//!   back may have left a connection whose end this station has not noticed.
+//! - A line that breaks the grammar closes its connection; no part of it counts.
 //! - A GaG's language has no names of robots, so it speaks for one: the one that has been connected
 //!   for longest. The others are answered from the warehouse and their queues.
-//! - What a GaG answers is checked as a file is. What cannot be is told it in a `thought`, and it is
-//!   asked again. What it says of the warehouse becomes the station's warehouse.
+//! - A GaG's answers are checked as a file is. The station refuses an impossible answer in a
+//!   `thought` and asks again. It takes over what a GaG says of the warehouse.
 //!
 //! - A person drives a robot that speaks the extension by actions (`station/actions.rs`); meanwhile
 //!   neither a GaG nor anybody else here moves it, but anybody stops it.
@@ -296,7 +296,7 @@ impl Station {
         self.seat_gag();
     }
 
-    /// Somebody has said a line, or what cannot be one.
+    /// A peer has sent a line, or bytes that cannot be one.
     pub fn heard(&mut self, peer: Peer, line: Result<&str, LineError>) {
         let line = match line {
             Ok(line) => line,
@@ -387,7 +387,7 @@ impl Station {
             .expect("there are more names than connections")
     }
 
-    /// Makes room for a robot where robots are remembered for nothing.
+    /// Makes room for a robot by forgetting one of which nothing needs to be remembered.
     fn forget_robots(&mut self) {
         if self.robots.len() >= Self::MOST_ROBOTS {
             let links = &self.links;

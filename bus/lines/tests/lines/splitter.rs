@@ -1,4 +1,4 @@
-//! Bytes in any pieces become lines; a bad line costs itself alone.
+//! Bytes in any pieces become lines; a bad line does not damage its neighbours.
 
 use lager_lines::MAX_LINE;
 use lager_lines::splitter::{LineError, LineSplitter};

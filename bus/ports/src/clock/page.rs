@@ -1,7 +1,9 @@
 //! The page in which an emulated body publishes its time, as its readers see it.
 //!
-//! The emulator writes it (`firmware/emulator/src/clock.rs`), about every half millisecond. It is
-//! a program of its own licence and shares no code with this crate, so the layout stands in both:
+//! The emulator writes it about every half millisecond. It is a program of its own licence and
+//! shares no code with this crate, so the layout stands both here and in
+//! `firmware/emulator/src/clock.rs`; `tests/chip.rs` runs both ends. A reader pays two reads and a
+//! comparison more than for the system's clock, and no system call.
 //!
 //! ```text
 //! byte  0  the letters "LAGERCLK"
@@ -122,10 +124,10 @@ impl fmt::Debug for Page {
     }
 }
 
-/// Reads until nobody has written meanwhile.
+/// Reads until no writer has written meanwhile.
 ///
-/// A writer killed in the middle leaves the sequence odd until its successor starts. Then this is,
-/// at worst, the time of one update with the moment of the next.
+/// A writer that is killed in the middle leaves the sequence odd until its successor starts. At
+/// worst the result then has the time of one update and the moment of the next.
 fn whole(sequence: &AtomicU64, mut read: impl FnMut() -> Told) -> Told {
     for _ in 0..LOOKS {
         let before = sequence.load(Ordering::Acquire);

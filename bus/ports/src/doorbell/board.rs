@@ -8,11 +8,11 @@
 //!     384 seat 1     …                                             32 seats of 128 bytes
 //! ```
 //!
-//! A seat has 128 bytes, since processors fetch lines in pairs and a neighbour's rings must not
-//! disturb one that is spinning.
+//! A seat has 128 bytes because processors fetch cache lines in pairs: a ring of a neighbour must
+//! not disturb a waiter that spins.
 //!
-//! **Invariant:** nothing here asks the system; who may write what is decided by the locks of
-//! `segment.rs`. A seat's callers, spinner bit and occupant are written only by who holds its lock.
+//! **Invariant:** nothing here makes a system call. The locks of `segment.rs` decide who may write
+//! what: only the holder of a seat's lock writes its callers, its spinner bit and its occupant.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
@@ -41,7 +41,7 @@ pub(crate) struct Seat {
     pub(super) reasons: [AtomicU8; REASONS],
 }
 
-/// What a seat can be rung for: as many as fit into the word's line.
+/// The number of reasons a seat can be rung for: as many as fit into the word's cache line.
 pub(crate) const REASONS: usize = 56;
 
 /// The board. Every bit pattern of the right size is a valid one.
@@ -114,16 +114,16 @@ impl Board {
         self.seats[seat].pid.load(Ordering::Acquire)
     }
 
-    /// Registers a waiter. From now on it is rung, and its word is its own.
+    /// Registers a waiter. From now on it is rung, and the word belongs to it.
     pub(crate) fn take(&self, seat: usize, role: Role, pid: u32) {
         self.seats[seat].pid.store(pid, Ordering::Release);
         self.callers_of(role).fetch_or(1 << seat, Ordering::SeqCst);
     }
 
-    /// Removes whoever sits in a seat.
+    /// Removes the occupant of a seat.
     pub(crate) fn clear(&self, seat: usize) {
         for seats in &self.callers.0 {
-            // Most are not set, and writing would take the line from every ringer.
+            // Most reasons are not set, and a write would take the cache line from every ringer.
             if seats.load(Ordering::Acquire) & (1 << seat) != 0 {
                 seats.fetch_and(!(1 << seat), Ordering::AcqRel);
             }
@@ -132,8 +132,8 @@ impl Board {
         self.seats[seat].pid.store(0, Ordering::Release);
     }
 
-    /// Asks to be one of at most `limit` that look without pause; who may, keeps the right until
-    /// [`Board::stop_spinning`].
+    /// Asks for the right to look without pause, which at most `limit` waiters have. A waiter that
+    /// gets the right keeps it until [`Board::stop_spinning`].
     pub(crate) fn may_spin(&self, seat: usize, limit: usize) -> bool {
         let granted = |spinners: u32| {
             let with_me = spinners | 1 << seat;

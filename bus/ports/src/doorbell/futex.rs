@@ -1,7 +1,7 @@
 //! A seat in shared memory: its word is an atomic that the kernel can put a process to sleep on.
 //!
-//! Apart from the protocol, which knows of no kernel. The futex is a shared one, found by its page
-//! in memory, so ringer and waiter need nothing in common but the mapping.
+//! It is apart from the protocol, which knows no kernel. The futex is a shared one: the kernel
+//! finds it by its page in memory, so ringer and waiter share only the mapping.
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;
@@ -37,20 +37,20 @@ impl Word for Seat {
     }
 
     fn sleep_while(&self, value: u32, timeout: Duration) -> Ended {
-        // Beyond the type's range a time-out is for ever in any case, and nobody asks for that.
+        // A time-out beyond the type's range is for ever, and no caller asks for that.
         let timeout = Timespec::try_from(timeout).unwrap_or(Timespec {
             tv_sec: 3600,
             tv_nsec: 0,
         });
         match futex::wait(&self.word, futex::Flags::empty(), value, Some(&timeout)) {
             Err(Errno::TIMEDOUT) => Ended::TimedOut,
-            // Woken, changed before it slept, or a signal: whoever waits looks around.
+            // Woken, changed before it slept, or a signal: in each case the waiter looks again.
             _ => Ended::Awake,
         }
     }
 
     fn wake(&self) {
-        // It fails only for an address that is none.
+        // It fails only for an invalid address.
         let _ = futex::wake(&self.word, futex::Flags::empty(), 1);
     }
 
@@ -62,7 +62,7 @@ impl Word for Seat {
     #[inline]
     fn take_reason(&self, reason: usize, order: Ordering) -> bool {
         let byte = &self.reasons[reason % REASONS];
-        // Most are not set, and a swap costs as much as some looks.
+        // Most reasons are not set, and a swap costs as much as several looks.
         byte.load(Ordering::Relaxed) != 0 && byte.swap(0, order) != 0
     }
 }

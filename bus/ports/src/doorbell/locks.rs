@@ -1,9 +1,9 @@
 //! Locks on single bytes of an open file, which the kernel drops when their holder dies.
 //!
-//! They belong to the opened file and not to the process, so two buses in one process exclude each
-//! other as two processes do, and no process id has to be believed. Whoever unlocks does so by
-//! name instead of closing the file only, because a child that is being forked at this moment
-//! holds the same opened file until it executes its program.
+//! They belong to the open file and not to the process. So two buses in one process exclude each
+//! other as two processes do, and no process id has to be trusted. To unlock, this module names the
+//! byte and does not just close the file: a child that is being forked at this moment shares the
+//! open file until it executes its program.
 
 #![allow(
     unsafe_code,
@@ -34,9 +34,10 @@ pub(super) fn try_lock(file: &File, byte: u64, kind: Kind) -> Result<bool, Error
     }
 }
 
-/// Unlocks a byte; that it was not locked is in order.
+/// Unlocks a byte; a byte that was not locked is fine.
 pub(super) fn unlock(file: &File, byte: u64) {
-    // Unlocking fails only without memory for the kernel's list, and then closing does it.
+    // Unlocking fails only when the kernel has no memory for its list; closing the file then
+    // unlocks.
     let _ = command(file, libc::F_OFD_SETLK, byte, libc::F_UNLCK);
 }
 

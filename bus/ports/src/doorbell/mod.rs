@@ -1,10 +1,11 @@
 //! How one thread wakes another, in its own process or not: a board of bells in shared memory.
 //!
-//! Each waiter has a seat on its robot's board with one word of its own, on which it sleeps for all
-//! its topics at once. Who publishes on a topic rings the seats of the roles that act on it: one
-//! atomic addition for each, and one system call where somebody sleeps. Observers have no seat and
-//! cost a ringer nothing. There is nothing to connect: a waiter that starts later, restarts or
-//! replaces a killed one is rung by the next sample.
+//! It takes the place of iceoryx2's events. Each waiter has a seat on the board of its robot: one
+//! futex word in shared memory, on which it sleeps for all its topics at once. A publisher adds to
+//! the words of the roles that act on its topic, and makes a system call only where a word says
+//! that its owner sleeps. Observers have no seat and cost a ringer nothing. There is nothing to
+//! connect: a waiter that starts late, restarts or replaces a killed one is rung by the next
+//! sample.
 //!
 //! | file | what it is |
 //! |---|---|
@@ -15,8 +16,8 @@
 //! | `pace` | when looking without pause is worth it |
 //! | `standard` | listeners of plain iceoryx2, which know nothing of boards |
 //!
-//! **Invariant:** a ring is a hint, and so are its reasons, which topics it was for; whoever waits has
-//! a time-out and looks at everything now and then. Ringing and waiting do not allocate.
+//! **Invariant:** a ring is a hint, and so are its reasons (the topics it was for). A waiter has a
+//! time-out and looks at everything now and then. Ringing and waiting do not allocate.
 
 mod board;
 mod futex;
@@ -46,8 +47,8 @@ use crate::place::Place;
 /// The reason of a ring by a thread of the waiter's own process.
 pub(crate) const INSIDE: usize = 0;
 
-/// The reason of a ring for the topic or request with the number `id`, the same in every process and
-/// build. Two may share one, and then each is looked at for the other's rings.
+/// The reason of a ring for the topic or request with the number `id`, the same in every process
+/// and build. Two topics may share a reason; then a ring for one makes the waiter look at both.
 pub(crate) const fn reason(id: u32) -> usize {
     1 + id as usize % (board::REASONS - 1)
 }
@@ -84,14 +85,14 @@ pub(crate) fn sweep_all(place: &Place) {
 }
 
 fn sweep_at(path: &std::path::Path) {
-    // What cannot be swept now, because somebody is just joining, is swept the next time. Being
-    // the last to leave removes the file.
+    // A board that cannot be swept now, because a process is just joining, is swept the next time.
+    // The last process to leave removes the file.
     if let Ok(Some(segment)) = Segment::existing(path) {
         let _ = segment.sweep();
     }
 }
 
-/// Removes the board of a robot that has nobody to ring, whatever is in it.
+/// Removes the board of a robot without waiters, whatever the board contains.
 pub(crate) fn remove(place: &Place, robot: &RobotName) {
     let _ = std::fs::remove_file(segment::path(place, robot));
 }
@@ -133,7 +134,8 @@ impl Bell {
         self.sleeper.rung(self.segment.seat(self.seat))
     }
 
-    /// Whether it has rung for `reason` since this was last asked; after a ring was noticed.
+    /// Whether it has rung for `reason` since this was last asked. Call it after a ring was
+    /// noticed.
     #[inline]
     pub(crate) fn rung_for(&self, reason: usize) -> bool {
         word::rung_for(self.segment.seat(self.seat), reason)
@@ -178,8 +180,8 @@ pub(crate) struct Rope {
 }
 
 impl Rope {
-    /// A rope to the bells of `role`, those that hang and those that will, for samples of the
-    /// topic or request with the number `id`.
+    /// A rope to the bells of `role`, present and future, for samples of the topic or request with
+    /// the number `id`.
     pub(crate) fn to(bus: &Bus, role: Role, id: u32) -> Result<Self, PortError> {
         Ok(Self {
             segment: bus.board().open(bus, role)?,
@@ -195,8 +197,8 @@ impl Rope {
     }
 }
 
-/// A rope to one bell, for the threads of its own process; clones pull the same bell. When the bell
-/// is gone, its seat's next owner may be woken in vain.
+/// A rope to one bell, for the threads of its own process; clones ring the same bell. After the
+/// bell is gone, a ring may wake the next owner of its seat in vain.
 #[derive(Clone)]
 pub(crate) struct InsideRope {
     segment: Arc<Segment>,

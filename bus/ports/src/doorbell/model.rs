@@ -2,8 +2,8 @@
 //! of switches between threads.
 //!
 //! The word is loom's, and so is the futex: a queue behind a lock, which compares and puts to sleep
-//! in one step, as the kernel's does. Nobody has a time-out unless the model gives one, so a lost
-//! wake-up is a deadlock, and loom reports that.
+//! in one step, as the kernel's does. A waiter has a time-out only where the model gives it one, so
+//! a lost wake-up is a deadlock, which loom reports.
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;

@@ -7,28 +7,30 @@
 //!                                                         at most the longest spin
 //! ```
 //!
-//! Looking must be earned by a streak of rings that came close to each other. A distance that is too
-//! long halves the streak; a look in vain does so too, and doubles what is needed for the next. So a
-//! quiet robot sleeps, a stream that ends costs one look in vain, a late ring among many is forgiven,
-//! and a waiter that takes the processor from the very writer it waits for (both on one core) soon
-//! gives up. A short sleep within the distance leaves
-//! the core to others while nothing is due.
+//! A waiter may look without pause only after a streak of rings that came close to each other. A
+//! distance that is too long halves the streak. A look in vain halves it too, and doubles the
+//! streak that is needed next time. So a quiet robot sleeps, a stream that ends costs one look in
+//! vain, and a single late ring is forgiven. A waiter that takes the core from the very writer it
+//! waits for soon stops looking; for the same reason at most one waiter fewer than the machine has
+//! cores looks at a time. Between two rings the waiter sleeps for as long as none is due, which
+//! leaves the core to others.
 //!
 //! **Invariant:** pure; the clock is an argument, in nanoseconds, and the answer is a plan.
 
-/// The streak that earns looking, at least and at most; the longest streak that is counted.
+/// The streak of rings after which looking is allowed: the least and the most that is asked for,
+/// and the longest streak that is counted.
 const EASY: u32 = 4;
 const HARD: u32 = 256;
 
-/// Added to the learnt end: a ring is late more often than early, and one that is missed costs a
-/// sleep and a wake.
+/// Added to the learnt end of a look: a ring is late more often than early, and a missed ring costs
+/// a sleep and a wake.
 const MARGIN_NS: u64 = 100_000;
 
-/// How much earlier than needed a short sleep ends: waking takes time, most of all on a core that has
-/// halted.
+/// How much earlier than needed a short sleep ends: waking takes time, most of all on a core that
+/// has halted.
 const LEAD_NS: u64 = 130_000;
 
-/// A sleep shorter than this within a distance is not worth its two system calls.
+/// Within a distance, a sleep shorter than this is not worth its two system calls.
 const SHORTEST_NAP_NS: u64 = 200_000;
 
 /// What to do until the next ring. Times are absolute.
@@ -65,7 +67,7 @@ impl Pace {
         }
     }
 
-    /// Whether looking is earned.
+    /// Whether the streak is long enough to look.
     pub(crate) fn is_quick(&self) -> bool {
         self.streak >= self.needed
     }
@@ -81,8 +83,8 @@ impl Pace {
         }
     }
 
-    /// It had rung before anybody had to wait: there is no distance to learn, but the next one is
-    /// counted from now.
+    /// It had rung before the waiter began to wait: there is no distance to learn, but the next one
+    /// is counted from now.
     pub(crate) fn touched(&mut self, now_ns: u64) {
         self.last_ns = Some(now_ns);
     }

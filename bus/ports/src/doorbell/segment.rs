@@ -7,10 +7,11 @@
 //!     2+n  seat n    exclusively, by the bus whose waiter sits there
 //! ```
 //!
-//! The kernel drops all of them when a process dies, so what a killed one has left is known by a
-//! lock that can be had: its seats are cleared by whoever sweeps or needs one, and a board without
-//! presence is removed. Joining and leaving exclude each other by the door, so of two that leave at
-//! once the second knows that it is the last, and nobody joins a board that is being removed.
+//! The kernel drops all of them when a process dies. So a lock that can be taken shows what a
+//! killed process has left: a sweep, or a process that needs a seat, clears its seats, and a board
+//! without presence is removed. The door excludes joining and leaving at the same time: of two
+//! processes that leave at once the second knows that it is the last, and no process joins a board
+//! that is being removed.
 //!
 //! The file is `bells` in the robot's folder ([`Place`]).
 
@@ -42,7 +43,8 @@ const DOOR: u64 = 0;
 const PRESENCE: u64 = 1;
 const FIRST_SEAT: u64 = 2;
 
-/// Longer than anybody keeps the door, which is microseconds; a stopped process may.
+/// Longer than any running process holds the door, which is microseconds; a stopped process may
+/// hold it longer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Why a board cannot be used.
@@ -79,7 +81,8 @@ pub(crate) struct Segment {
     file: File,
     path: PathBuf,
     board: Mapping,
-    /// The seats whose locks this holds, as bits: asking the kernel for them would only say yes.
+    /// The seats whose locks this process holds, as bits. The kernel would grant their locks again,
+    /// since the same open file already has them, so they must be remembered here.
     own: Mutex<u32>,
 }
 
@@ -127,7 +130,7 @@ impl Segment {
         if state.len() == 0 {
             // Backed by memory now, so that a full /dev/shm is an error here and no fault later.
             if let Err(error) = fallocate(&file, FallocateFlags::empty(), 0, size) {
-                // Nobody uses a file without contents.
+                // No process uses a file without contents.
                 let _ = std::fs::remove_file(path);
                 return Err(Fault::File(error.into()));
             }
@@ -136,13 +139,13 @@ impl Segment {
         }
         let board = Mapping::of(&file)?;
         match board.layout() {
-            // Whoever makes it signs it before the door opens.
+            // The process that makes the board signs it before the door opens.
             Layout::Blank => board.sign(),
             Layout::Ours => (),
             Layout::Other => return Self::replace_foreign(&file, path),
         }
         if !try_lock(&file, PRESENCE, Kind::Shared)? {
-            // Only who leaves wants it for itself, and that is behind the door.
+            // Only a leaving process takes this lock exclusively, and it holds the door meanwhile.
             return Err(Fault::Busy);
         }
         drop(door);
@@ -180,8 +183,9 @@ impl Segment {
             if *own & (1 << seat) == 0 && try_lock(&self.file, byte(seat), Kind::Exclusive)? {
                 *own |= 1 << seat;
                 self.take(seat, role, std::process::id());
-                // A ringer that has just found nobody to ring has sent its sample before: after
-                // this, whoever looks sees it. Older kernels leave that to the time-out.
+                // A ringer that has just found no seat to ring has sent its sample before. After
+                // this call, a waiter that looks sees that sample. On older kernels the sample
+                // waits for the time-out.
                 let _ = membarrier(MembarrierCommand::GlobalExpedited);
                 return Ok(seat);
             }
@@ -227,14 +231,15 @@ impl Segment {
     }
 
     fn own(&self) -> MutexGuard<'_, u32> {
-        // What it guards is one number, which is right at every moment.
+        // The mutex guards one number, which is valid at every moment.
         self.own.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Segment {
     fn drop(&mut self) {
-        // Without the door, or killed on the way, the next sweep removes the file.
+        // If the door cannot be had, or this process is killed here, the next sweep removes the
+        // file.
         if let Ok(door) = Door::lock(&self.file) {
             if try_lock(&self.file, PRESENCE, Kind::Exclusive).unwrap_or(false)
                 && self.file.metadata().is_ok_and(|file| file.nlink() > 0)

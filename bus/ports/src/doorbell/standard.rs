@@ -1,8 +1,8 @@
 //! Listeners of plain iceoryx2, for programs that know nothing of bell boards.
 //!
 //! Beside each topic stands an event service of the same name. A stock process that listens there
-//! is notified of every sample, at the price of a system call each; as long as nobody does, a
-//! writer only reads a counter in shared memory.
+//! is notified of every sample, which costs the writer one system call for each listener. While
+//! there is no listener, a writer only reads a counter in shared memory.
 
 use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
 use iceoryx2::prelude::PortFactory;
@@ -44,7 +44,7 @@ impl StandardListeners {
     #[inline]
     pub(crate) fn notify(&self) {
         if self.service.dynamic_config().number_of_listeners() > 0 {
-            // One that has died or is full needs no notice.
+            // A listener that has died or is full needs no notice.
             let _ = self.notifier.notify();
         }
     }

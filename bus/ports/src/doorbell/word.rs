@@ -13,15 +13,17 @@
 //! ```
 //!
 //! One waiter, any number of ringers. A ring and the decision to sleep are read-modify-writes of
-//! the same word, so one of the two comes first: either the waiter finds the ring and does not
-//! sleep, or the ringer finds `S` and wakes. Only the waiter clears `S`: a ringer that is killed
-//! between its addition and its wake leaves `S` standing, and the next one wakes.
+//! the same word, so one of them comes first: either the waiter finds the ring and does not sleep,
+//! or the ringer finds `S` and wakes the waiter. Only the waiter clears `S`: a ringer that is
+//! killed between its addition and its wake leaves `S` set, and the next ringer wakes the waiter.
 //!
-//! The reasons tell what is worth looking at. Whoever takes one sees what was written before it was
-//! set; it is a byte, so that setting it is a plain store into a line that the addition needs in any
-//! case. A ringer killed before its addition leaves a reason that the next wake finds.
+//! The reasons tell which topics to look at. A waiter that takes a reason sees all that was written
+//! before the reason was set. A reason is a byte, so setting it is a plain store into the cache
+//! line that the addition needs anyway. A ringer that is killed before its addition leaves a reason
+//! that the next wake finds.
 //!
-//! Apart and generic, so that `model.rs` can run this very source under every interleaving.
+//! It is generic over the atomics, so that `model.rs` can run this very source under every
+//! interleaving.
 //!
 //! **Invariant:** `S` is set only by the one waiter of the word and only while it is in
 //! [`Sleeper::sleep`]. A waiter that does not look for 2^31 rings may miss them all.
@@ -41,11 +43,11 @@ const ONE: u32 = 2;
 pub(crate) enum Ended {
     /// Woken, interrupted by a signal, or never asleep because the word had changed.
     Awake,
-    /// Nobody woke it in time.
+    /// The time-out came first.
     TimedOut,
 }
 
-/// What the protocol asks of the machine: an atomic word, and sleeping on it as a futex does.
+/// What the protocol needs from the machine: an atomic word, and sleeping on it as a futex does.
 pub(crate) trait Word {
     fn load(&self, order: Ordering) -> u32;
     fn fetch_add(&self, value: u32, order: Ordering) -> u32;
@@ -61,8 +63,8 @@ pub(crate) trait Word {
     fn take_reason(&self, reason: usize, order: Ordering) -> bool;
 }
 
-/// Rings for `reason`: what was written before is seen by the waiter when it has noticed the ring,
-/// or has taken the reason.
+/// Rings for `reason`. A waiter that has noticed the ring, or has taken the reason, sees everything
+/// that was written before.
 pub(crate) fn ring(word: &impl Word, reason: usize) {
     if count(word, reason) {
         word.wake();
@@ -71,8 +73,8 @@ pub(crate) fn ring(word: &impl Word, reason: usize) {
 
 /// The first half of a ring; says whether the second is needed.
 pub(crate) fn count(word: &impl Word, reason: usize) -> bool {
-    // Released by itself as well: a waiter that another ring has woken may take the reason before
-    // this ring's addition, and looks because of it.
+    // The reason is stored with release ordering by itself, too: a waiter that another ring has
+    // woken may take the reason before this ring's addition, and look because of it.
     word.set_reason(reason, Ordering::Release);
     word.fetch_add(ONE, Ordering::Release) & SLEEPING != 0
 }
@@ -91,7 +93,7 @@ pub(crate) struct Sleeper {
 impl Sleeper {
     /// Begins to wait on a word nobody else waits on; earlier rings do not count.
     pub(crate) fn new(word: &impl Word) -> Self {
-        // One that was killed asleep has left its mark.
+        // A waiter that was killed while it slept has left `S` set.
         let old = word.fetch_and(!SLEEPING, Ordering::Acquire);
         Self {
             seen: Cell::new(old & !SLEEPING),

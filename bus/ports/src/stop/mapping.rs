@@ -50,8 +50,9 @@ impl Page {
         })
     }
 
-    /// Sees to it that the path leads to the mapped file, whole: otherwise it is mended or made
-    /// anew, mapped, and stops the robot. `known` is the file that is mapped.
+    /// Makes sure that the path leads to the mapped file and that the file is whole. Otherwise the
+    /// file is mended or made anew, mapped, and stops the robot. `known` is the file that is
+    /// mapped.
     ///
     /// Returns the file that is mapped now.
     pub(super) fn verify(&self, known: Identity) -> Result<Identity, Error> {
@@ -137,7 +138,7 @@ fn prepared(path: &Path, new: Option<StopCause>) -> Result<File, Error> {
     Ok(file)
 }
 
-/// Sets a stop in a file, unless there is one: no word that anybody has set is lost.
+/// Sets a stop in a file unless one is set, so no earlier stop is lost.
 fn stop_in(file: &File, cause: StopCause) -> Result<(), Error> {
     let place = map(file, None)?;
     // SAFETY: mapped with the length of a page, so aligned and long enough for one word, until

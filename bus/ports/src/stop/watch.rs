@@ -1,6 +1,6 @@
 //! The thread that watches the stop word's file, so that the bridge's main loop needs no system
-//! call for it: it sleeps until somebody writes to the file, removes it or puts another in its
-//! place, mends what has to be mended, and rings.
+//! call for it. It sleeps until the file is written to, removed, replaced or cut short, mends what
+//! has to be mended, and rings. A file that is removed, replaced or cut short stops the robot.
 //!
 //! Watched are the file, its folder, and the folder above, which may be moved. Where the kernel
 //! has no watch to give, the thread looks every 20 ms.
@@ -19,7 +19,7 @@ use rustix::fs::inotify::{self, CreateFlags, WatchFlags};
 use super::StopError;
 use super::mapping::{Identity, Page};
 
-/// How often the thread looks when nobody tells it, and after a failure.
+/// How often the thread looks without a watch, and after a failure.
 const LOOK: Timespec = Timespec {
     tv_sec: 0,
     tv_nsec: 20_000_000,
@@ -90,7 +90,8 @@ fn run(page: &Page, ring: &impl Fn(), end: &OwnedFd) {
                 complained = false;
             }
             Err(error) => {
-                // Nobody can reach the page that is mapped, and none can be put in its place.
+                // No other process can reach the mapped page, and no new file can be put in its
+                // place.
                 if !page.path().exists() {
                     page.stop(StopCause::WordRemoved);
                 }
@@ -125,7 +126,7 @@ fn look(
         let seen = page.verify(mapped)?;
         match watch {
             Some(watch) if seen == mapped => return Ok((seen, watch)),
-            // Nobody tells what happened before the watch began: look again.
+            // The watch does not report what happened before it began, so look again.
             _ => {
                 watch = match listen(page.path()) {
                     Err(error) if error.kind() == ErrorKind::NotFound => None,
@@ -154,7 +155,7 @@ fn listen(path: &Path) -> Result<OwnedFd, Error> {
     Ok(watch)
 }
 
-/// Forgets what was told: all that it means is to look.
+/// Discards the events: each of them only means that the thread has to look.
 fn drain(watch: &OwnedFd) {
     let mut events = [0_u8; 4096];
     while matches!(rustix::io::read(watch, &mut events), Ok(1..)) {}

@@ -22,10 +22,10 @@ use crate::error::{CallError, PortError, ReceiveError};
 use crate::service::{self, Fault, MAX_CLIENTS, MAX_SERVERS, RequestService, patiently};
 use crate::transport::Ipc;
 
-/// How often an asker looks for its answer. Nobody wakes it, since askers are not actors.
+/// How often an asker looks for its answer. Askers are not actors, so no ring wakes them.
 const LOOK_EVERY: Duration = Duration::from_micros(200);
 
-/// What [`crate::Client`] is but for the types.
+/// [`crate::Client`] without its types.
 pub(crate) struct Asker {
     port: Here<AskingPort>,
     question: Question,
@@ -150,7 +150,7 @@ impl Asker {
     }
 }
 
-/// What [`crate::Server`] is but for the types.
+/// [`crate::Server`] without its types.
 pub(crate) struct Answerer {
     port: Here<AnsweringPort>,
     request: TypeDetail,
@@ -226,7 +226,7 @@ impl Asked<'_> {
     }
 }
 
-/// Copies the payload behind a header that is none.
+/// Copies the payload. The header is empty.
 fn copy_out(header: &Header, payload: &TypeDetail, to: &mut [u8]) {
     assert_eq!(to.len(), payload.size());
     let from = behind(NonNull::from(header), 0, payload.alignment());
@@ -234,7 +234,7 @@ fn copy_out(header: &Header, payload: &TypeDetail, to: &mut [u8]) {
     unsafe { from.copy_to_nonoverlapping(NonNull::from(to).cast(), payload.size()) }
 }
 
-/// Writes the payload behind a header that is none, of a loan.
+/// Writes the payload of a loan. The header is empty.
 fn copy_in(header: &mut Header, payload: &TypeDetail, from: &[u8]) {
     assert_eq!(from.len(), payload.size());
     let to = behind(NonNull::from(header), 0, payload.alignment());

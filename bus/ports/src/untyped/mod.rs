@@ -1,16 +1,20 @@
 //! The transport's ports without their payload's type, compiled here and nowhere else.
 //!
-//! iceoryx2 is generic over its service type, and what is generic is compiled again by every crate
-//! that uses it: some six thousand functions each time, for a port of any type. So the typed ports
-//! hold one of these, which knows its payload by size and alignment only, and nothing of the
-//! transport is left in what they hand on, not even how to drop it ([`Here`]).
+//! iceoryx2 is generic over its service type, and every crate that uses generic code compiles it
+//! again: some six thousand functions, for a port of any type. So a typed port holds one of these,
+//! which knows its payload by size and alignment only, as iceoryx2's bindings for other languages
+//! do. What it hands on contains nothing of the transport, not even its drop code ([`Here`]).
 //!
-//! The services are the typed ones to everybody else: name, size and alignment of payload and header
-//! are the same, and a typed process of plain iceoryx2 is at the other end of them
-//! (tests/bus/interop.rs).
+//! To other processes the services look typed: name, size and alignment of payload and header are
+//! the same, and a typed port of plain iceoryx2 may be at the other end (tests/bus/interop.rs).
 //!
 //! **Invariant:** a payload's address is only ever read or written as the type whose [`Kind`] or
 //! [`Question`] the port was made with.
+//!
+//! What it costs and saves: a publish takes 140 instructions more than the 4 833 it took with
+//! generic ports. A cold build of everything took 5 min 19 s before; with this, without line tables
+//! and without the regular expressions of a log filter it takes 3 min 7 s (one machine, within one
+//! hour).
 
 #![allow(
     unsafe_code,
@@ -108,8 +112,8 @@ fn detail<T: TypeName>() -> TypeDetail {
 
 /// Where a payload is: behind its header of `size` bytes, at the next multiple of `align`.
 ///
-/// The transport would give it as bytes, but how many stands in shared memory, where others can write
-/// anything; so only addresses are taken from it.
+/// The transport would return it as a slice, but its length stands in shared memory, where others
+/// can write anything. So only the address is taken from it.
 fn behind(header: NonNull<Header>, size: usize, align: usize) -> NonNull<u8> {
     let header = header.cast::<u8>();
     // SAFETY: header and payload are of one chunk, whose layout this is
@@ -120,7 +124,7 @@ fn behind(header: NonNull<Header>, size: usize, align: usize) -> NonNull<u8> {
     }
 }
 
-/// Something of the transport's whose end is compiled in this crate, whoever drops it.
+/// A value of the transport whose drop code is compiled in this crate, wherever it is dropped.
 pub(crate) struct Here<T: Ends>(ManuallyDrop<T>);
 
 /// How a [`Here`] ends. Implemented for each type by [`ends_here!`], since a function for any type

@@ -19,7 +19,7 @@ use crate::service::{self, Fault, MAX_HELD, TopicService, patiently};
 use crate::streams::{Newest, Streams};
 use crate::transport::Ipc;
 
-/// What [`crate::Subscriber`] is but for the payload's type.
+/// [`crate::Subscriber`] without the payload's type.
 pub(crate) struct Reader {
     port: Here<Port>,
     payload_align: usize,
@@ -65,8 +65,8 @@ impl Reader {
                     }
                     other => service::no_resources(kind.name, other),
                 })?;
-            // Counted with the new one in place, so that two that come at once cannot both slip
-            // through.
+            // This counts with the new reader in place, so that two readers that come at once
+            // cannot both get the last place.
             if bus.role().is_observer() && observers(&service) > OBSERVERS {
                 return Err(Fault::Full(no_place(bus, kind)));
             }
@@ -76,7 +76,8 @@ impl Reader {
         Ok(Self {
             port: Here::new(port),
             payload_align: details.payload.alignment(),
-            // After the port exists: a publisher that is younger has seen it from the start.
+            // Taken after the port exists: a publisher that is younger has seen the port from its
+            // start.
             streams: Streams::new(Clock::monotonic_ns()),
             newest: Newest::default(),
             unreached,
@@ -134,7 +135,7 @@ impl Reader {
 }
 
 impl Taken {
-    /// Where the payload is; valid as long as this is, and nobody writes to it meanwhile.
+    /// The payload's address, valid as long as this is. No process writes to it meanwhile.
     pub(crate) fn payload(&self) -> NonNull<u8> {
         self.payload
     }

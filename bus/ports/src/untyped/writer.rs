@@ -20,7 +20,7 @@ use crate::error::{PortError, SendError};
 use crate::service::{self, Fault, MAX_LOANS, patiently};
 use crate::transport::Ipc;
 
-/// What [`crate::Publisher`] is but for the payload's type.
+/// [`crate::Publisher`] without the payload's type.
 pub(crate) struct Writer {
     port: Here<Port>,
     payload_align: usize,
@@ -42,7 +42,7 @@ pub(crate) struct Lent {
     payload: NonNull<u8>,
 }
 
-/// Who is told of a sample.
+/// Which processes are rung for a sample.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ring {
     Actors,
@@ -85,8 +85,8 @@ impl Writer {
             standard: Here::new(standard),
             ropes,
             next_sequence: Cell::new(0),
-            // After the port exists: a subscriber that is older than the epoch has been there
-            // for every sample, and may count what it missed from 0 on.
+            // Taken after the port exists: a subscriber that is older than the epoch was there for
+            // every sample, and may count its losses from 0 on.
             epoch: new_epoch(),
             writer: std::process::id(),
         })

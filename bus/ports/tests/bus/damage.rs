@@ -1,5 +1,5 @@
-//! Files that were never finished, emptied, or belong to somebody else: nothing waits for ever, and
-//! what nobody uses is removed by the files alone.
+//! Files that were never finished, were emptied, or belong to another user: no process waits for
+//! ever, and files without a user are removed.
 
 use std::fs::{self, OpenOptions, Permissions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt, chown};

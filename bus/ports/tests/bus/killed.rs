@@ -1,4 +1,4 @@
-//! `kill -9` of every part, and what the others make of it.
+//! `kill -9` of every kind of process, and how the others react.
 
 use std::path::Path;
 use std::sync::Barrier;

@@ -1,4 +1,4 @@
-//! Asking and answering.
+//! Requests and replies.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -1,10 +1,10 @@
 //! Rings by the million, and the search for one that is lost.
 //!
 //! Rounds of random length: two ringers ring four waiters at random, with random pauses, and then
-//! fall silent until every waiter has answered its last ring. No later ring can cover for a lost
-//! one, and no time-out either, since three of the waiters wait a minute; so a waiter that has not
-//! answered a second after the round is one that sleeps through a ring. The fourth waits shortly
-//! and at random, so that time-outs and rings meet, and answers only when a wait ends by a ring.
+//! fall silent until every waiter has answered its last ring. No later ring can make up for a lost
+//! one, and no time-out either, since three of the waiters wait a minute. So a waiter that has not
+//! answered a second after the round has slept through a ring. The fourth waits for short, random
+//! times, so that time-outs and rings meet, and answers only when a ring ends its wait.
 
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};

@@ -1,9 +1,9 @@
-//! What goes wrong on a mission: the kind, where, what was expected, what was seen, and what would
-//! end it. Travels in `mission/event` and `nav/status`; a sentence is made of it where a person
-//! reads it, by [`Failure`]'s `Display`.
+//! What goes wrong on a mission: its kind, its place, what was expected, what was seen, and what
+//! would end it. A failure travels in `mission/event` and `nav/status`. [`Failure`]'s `Display`
+//! makes a sentence of it where a person reads it.
 //!
-//! Everything that is known of a kind stands in this file: its code, what its two values mean, its
-//! remedy and its sentence.
+//! This file has everything about a kind: its code, what its two values mean, its remedy and its
+//! sentence.
 
 use core::fmt;
 

@@ -1,8 +1,8 @@
-//! What the services think: `log/thought` (G9). It travels as a kind with its values; a sentence is
-//! made of it where a person reads it, by [`Thought`]'s `Display`.
+//! What the services are doing: `log/thought` (G9). A thought travels as a kind with its values.
+//! [`Thought`]'s `Display` makes a sentence of it where a person reads it.
 //!
-//! Everything that is known of a kind stands in this file: its code, what its values mean, and its
-//! sentence. What goes wrong is a [`Failure`] and has its own.
+//! This file has everything about a kind: its code, what its values mean, and its sentence. A
+//! failure is a [`Failure`] and has its own file.
 
 use core::fmt;
 

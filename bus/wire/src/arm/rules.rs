@@ -1,7 +1,8 @@
-//! What a profile of the arm has to keep, and the sentences for those that do not.
+//! The rules that a profile of the arm has to keep, and the sentences for a profile that breaks
+//! one.
 //!
-//! The rules look at values and places alone, so that a board checks them in little flash; the
-//! words are for whoever wrote the configuration.
+//! The rules look at values and places alone, so that a board checks them in little flash. The
+//! sentences are for the person who wrote the configuration.
 
 use core::fmt;
 

@@ -1,10 +1,14 @@
 //! What makes the Pi believe that a board is there: runs of SYNs, runs of data.
 //!
-//! A version-1 SYN proves itself by its check value. Nothing protects an original packet, so an
-//! original board is believed only by repetition, in a stream without stray bytes and without a
-//! version-1 packet in between, and when none of those has come for a while. Two of those in a row
-//! show that a board that was believed to be an original one is not. It is apart from the link
-//! because belief is all it knows: it holds no peer, counts no loss and answers nothing.
+//! A version-1 SYN proves itself by its check value. Nothing protects an original packet, so a
+//! handshake without a check value is believed only if no damaged version-1 handshake could look
+//! like it: if it is repeated, in a stream without stray bytes and without a version-1 packet in
+//! between, and if no version-1 packet has come for a while. Two version-1 packets in a row show
+//! that a board that was believed to be an original one is not. A board that sends what only the
+//! other board can send is asked again who it is.
+//!
+//! It is apart from the link because it only judges what was received: it keeps no state of the
+//! peer, counts no losses and sends nothing.
 
 use core::time::Duration;
 

@@ -20,7 +20,7 @@
 //! ```
 //!
 //! Each time a board comes up a new epoch starts: counters begin at 0 and nothing from before
-//! counts as lost. It never sends: what it asks for goes to the transmitter.
+//! counts as lost. This end never sends; it asks the transmitter to.
 
 use core::time::Duration;
 

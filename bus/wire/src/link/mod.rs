@@ -11,11 +11,11 @@
 //!    | -- SYN/board at once ---------------> |   the board keeps running, only the ids restart
 //! ```
 //!
-//! A board's SYN says whether the link has been up since the board started. So a reset is told from
-//! a line that was cut, also after a silence in which the Pi has asked too.
+//! A board's SYN says whether the link has been up since the board started. So a reset can be told
+//! from a cut line, even after a silence in which the Pi has asked too.
 //!
-//! Handshake packets stand outside the id count and carry id 0. They live beside each other so
-//! that they are tested against each other; neither does input or output nor reads a clock.
+//! Handshake packets are not counted and carry id 0. Both ends stand beside each other so that they
+//! are tested against each other. Neither does input or output, and neither reads a clock.
 
 mod board;
 mod evidence;

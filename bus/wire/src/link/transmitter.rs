@@ -1,7 +1,7 @@
 //! The Pi's sending end: numbers packets and knows which version the board takes.
 //!
-//! It is apart from the receiving end because bytes are read and written by different threads;
-//! what the receiving end asks for is handed over and sent with this.
+//! It is apart from the receiving end because different threads read and write the port. What the
+//! receiving end wants to send is handed to this one.
 
 use super::handshake;
 use crate::handshake::{Callsign, ResetCause, SynAck, Version};

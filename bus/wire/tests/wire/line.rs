@@ -1,4 +1,4 @@
-//! A board's end and the Pi's end on one line that can do harm, in virtual time.
+//! A board's end and the Pi's end on one faulty line, in virtual time.
 
 use std::time::Duration;
 

@@ -6,10 +6,11 @@
 //!   program                                                 | judges n while n + 1 is converted
 //! ```
 //!
-//! The ranger is converted behind the last sensor every time, so that a pass that wants it does not wait.
+//! The ranger is converted behind the last sensor every time, so that a pass that wants it does not
+//! wait.
 //!
-//! The clock of 1 MHz is above what the data sheet promises ten bits at; eight of the line sensors' bits
-//! hold, and the IR ranger's own noise is larger than the two that do not.
+//! The clock of 1 MHz is above what the data sheet promises ten bits at; eight of the line sensors'
+//! bits hold, and the IR ranger's own noise is larger than the two that do not.
 
 use avr_device::asm::delay_cycles;
 use lager_avr::register::{adc, bit, get, put};
@@ -31,7 +32,8 @@ const LINE: u8 = AVCC | LEFT_ADJUST | pins::LINE_INPUT;
 const IR: u8 = AVCC | pins::IR_INPUT;
 /// Number of line sensors.
 const CHANNELS: u8 = 11;
-/// A conversion's sample is held after a clock of the converter to start and one and a half to sample.
+/// A conversion's sample is held after a clock of the converter to start and one and a half to
+/// sample.
 const SAMPLING_CYCLES: u32 = 42;
 
 /// Switches the ADC on, with the first line sensor selected.
@@ -46,8 +48,8 @@ pub(crate) fn start() {
     wait();
 }
 
-/// Reads a line sensor. They are read in order: with the first one the chain of conversions begins, and each
-/// reading starts the next one, which runs while this one is judged.
+/// Reads a line sensor. They are read in order: with the first one the chain of conversions begins,
+/// and each reading starts the next one, which runs while this one is judged.
 pub(crate) fn read_line_sensor(channel: u8) -> u8 {
     if channel == 0 {
         put(adc().admux(), LINE);
@@ -71,7 +73,8 @@ fn reading() -> u8 {
     (get(adc().adc()) >> 8) as u8
 }
 
-/// Starts to convert the sensor that is selected, and selects the one after it as soon as it is sampled.
+/// Starts to convert the sensor that is selected, and selects the one after it as soon as it is
+/// sampled.
 fn begin(channel: u8) {
     put(adc().adcsra(), START);
     delay_cycles(SAMPLING_CYCLES);

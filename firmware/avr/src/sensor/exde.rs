@@ -1,7 +1,8 @@
-//! The sending end of ExDe: `lager_exde::Transmitter`, driven by the timer's second compare interrupt.
+//! The sending end of ExDe: `lager_exde::Transmitter`, driven by the timer's second compare
+//! interrupt.
 //!
 //! ```text
-//!   send(word) --> first bit on data --compare B--> pulse on sync --compare B--> next bit ... --> gap
+//!   send(word) --> bit on data --compare B--> pulse on sync --compare B--> next bit ... --> gap
 //!   INT0: return sync
 //! ```
 

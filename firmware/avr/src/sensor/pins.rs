@@ -4,7 +4,7 @@
 //!   port   pin  name   way  use
 //!   A      0    ADC0   in   common output of the line multiplexer, 0..5 V, 5 V = darkest
 //!          1    ADC1   in   IR ranger
-//!   B      0-3         out  address of the line multiplexer, bit 0 first; 0 = leftmost sensor ..= 10
+//!   B      0-3         out  address of the line multiplexer, bit 0 first; 0 (leftmost) to 10
 //!          4           out  enable of the line multiplexer, low = on
 //!          5-7              ISP: MOSI, MISO, SCK
 //!   C      2-5              JTAG: TCK, TMS, TDO, TDI

@@ -29,7 +29,8 @@ static LISTENER: Shared<Listener> = Shared::new(Listener {
     receiver: Receiver::new(),
     last: 0,
 });
-/// Words and the timer's ticks at their last bits; the main loop looks long before the ticks go round.
+/// Words and the timer's ticks at their last bits; the main loop looks long before the ticks go
+/// round.
 static WORDS: Ring<(u16, u16), 4> = Ring::new((0, 0));
 
 /// Listens for sync.

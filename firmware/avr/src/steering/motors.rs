@@ -1,4 +1,5 @@
-//! The motors' PWM: timer 2, 8 bits at 7.8 kHz, so that a new duty holds within 128 us (W1, AMB-23).
+//! The motors' PWM: timer 2, 8 bits at 7.8 kHz, so that a new duty holds within 128 us (W1,
+//! AMB-23).
 //!
 //! A fast PWM gives a pulse of one tick even at 0, so a motor that stands has its compare output
 //! disconnected and its pin is what the port says: low.

@@ -8,7 +8,7 @@
 //!          2    INT2   in      ExDe sync
 //!          5-7                 ISP: MOSI, MISO, SCK
 //!   C      0           out     DIR of the left driver, low = forwards
-//!          1           out     DIR of the right driver, high = forwards: the drivers are mirrored (W2)
+//!          1           out     DIR of the right driver, high = forwards: mirrored (W2)
 //!          2-5                 JTAG: TCK, TMS, TDO, TDI
 //!   D      0    RXD0   in      UART from the Pi
 //!          1    TXD0   out     UART to the Pi

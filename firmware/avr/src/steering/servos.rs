@@ -1,13 +1,14 @@
-//! UART 1, the servos' wire: 1 Mbit/s, half duplex, both pins on one wire (A1, A8, P10, AMB-25, AMB-26).
+//! UART 1, the servos' wire: 1 Mbit/s, half duplex, both pins on one wire (A1, A8, P10, AMB-25,
+//! AMB-26).
 //!
 //! ```text
 //!              write()                    TXC: the last stop bit has left
 //!   listening --------> sending, deaf ------------------------------------> listening
 //! ```
 //!
-//! While it listens the transmitter is off, so its pin floats and the servos can pull the wire; while it
-//! sends the receiver is off, so it does not hear itself. The end is TXC, not UDRE: the data register is
-//! empty two bytes too early.
+//! While it listens the transmitter is off, so its pin floats and the servos can pull the wire;
+//! while it sends the receiver is off, so it does not hear itself. The end is TXC, not UDRE: the
+//! data register is empty two bytes too early.
 
 use avr_device::interrupt;
 use lager_avr::clock;

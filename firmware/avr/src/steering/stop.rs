@@ -1,4 +1,5 @@
-//! The two ways this program ends: its main loop hangs, or it meets what it does not allow. The motors first.
+//! The two ways in which this program ends: its main loop hangs, or it panics. Either stops the
+//! motors first.
 
 use avr_device::interrupt;
 use core::panic::PanicInfo;

@@ -1,5 +1,5 @@
-//! What the document does not tell about the arm: its steps, speeds and times (AMB-32). What hangs on how
-//! a robot is built, its limits and poses, is the profile, which the Pi may change.
+//! What the document does not say about the arm: its steps, speeds and times (AMB-32). Limits and
+//! poses depend on how a robot is built; they are in the profile, which the Pi may change.
 
 use lager_ax12::table;
 use lager_wire::ArmProfile;

@@ -1,4 +1,5 @@
-//! The arm: eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6, AMB-29..32).
+//! The arm: eight AX-12 servos for six joints, moved in small steps and one sequence (A1-A6,
+//! AMB-29..32).
 //!
 //! ```text
 //!   id   1 base   2+3 shoulder   4+5 elbow   6 wrist   7 wrist rotation   8 gripper
@@ -8,9 +9,9 @@
 //!   3 and 5 face their partners: their position is 1023 minus the partner's
 //! ```
 //!
-//! What the module does with its one wire, most urgent first: the command under way ([`program`]), bringing
-//! a servo into service, looking at one servo after the other. A servo is brought into service without
-//! moving it, so that nothing held is dropped when the board restarts:
+//! The module uses its one wire for these tasks, most urgent first: the command under way
+//! ([`program`]), bringing a servo into service, looking at one servo after the other. A servo is
+//! brought into service without moving it, so that the arm drops nothing when the board restarts:
 //!
 //! ```text
 //!              answers             goal = position         torque on
@@ -21,9 +22,10 @@
 //!
 //! A missing servo never holds up the others: it is flagged, left out, and asked again in its turn.
 //!
-//! No command leads out of the limits of the profile: its poses lie inside by [`ArmProfile::validate`], a
-//! step ends at a limit and is refused there. An arm that stands outside, moved by hand or before the limits
-//! were told, may only be stepped back, and nothing moves it there by itself.
+//! No command leads out of the limits of the profile: its poses lie inside by
+//! [`ArmProfile::validate`], and a step ends at a limit or is refused there. An arm that stands
+//! outside, because it was moved by hand or before the limits were sent, may only be stepped back;
+//! nothing moves it there by itself.
 
 mod config;
 mod program;
@@ -184,8 +186,8 @@ impl Arm {
         &self.config.profile
     }
 
-    /// Obeys another profile from now on. The caller has validated it. What moves goes on to where it was
-    /// sent; servos in service are told a new torque limit where they stand.
+    /// Obeys another profile from now on. The caller has validated it. What moves goes on to where
+    /// it was sent; servos in service are told a new torque limit where they stand.
     pub fn set_profile(&mut self, profile: ArmProfile) {
         self.torque_untold |= profile.torque_limit != self.config.profile.torque_limit;
         self.config.profile = profile;

@@ -13,8 +13,8 @@
 //!   abort:   Move --> Freeze: look where each moving servo is, make that its goal
 //! ```
 //!
-//! Every state ends: each question has a time-out, each Move a deadline, and a squeeze has no more steps
-//! than the gripper has way.
+//! Every state ends: each question has a time-out, each Move a deadline, and a squeeze has no more
+//! steps than the gripper has way.
 
 use lager_ax12::table;
 use lager_wire::{ArmCommand, ArmPose};
@@ -292,7 +292,8 @@ impl Arm {
         movement.wait = 0;
     }
 
-    /// A servo that stopped short. A load bends every servo a little; only what is far off is a failure.
+    /// A servo that stopped short. A load bends every servo a little; only what is far off is a
+    /// failure.
     fn note_stuck(&mut self, index: usize) {
         if self.servos[index].distance() > NEAR_GOAL {
             self.servos[index].stuck = true;

@@ -15,8 +15,8 @@ pub(super) enum Setup {
     Ready,
 }
 
-/// A goal this near to the position is kept when a servo comes back and stepped from; one farther off is
-/// not where the servo is going.
+/// A goal this near to the position is kept when a servo comes back and stepped from; one farther
+/// off is not where the servo is going.
 pub(super) const NEAR_GOAL: u16 = 30;
 
 /// One servo.
@@ -46,7 +46,8 @@ impl Servo {
         self.setup == Setup::Missing || self.stuck || !self.errors.is_empty()
     }
 
-    /// It answered with its state. One that was away is brought into service again without moving it.
+    /// It answered with its state. One that was away is brought into service again without moving
+    /// it.
     pub(super) fn seen(&mut self, look: Look) {
         let away = !self.is_seen();
         let first = self.setup == Setup::Unseen;
@@ -67,8 +68,8 @@ impl Servo {
         self.distance() <= NEAR_GOAL
     }
 
-    /// Where a relative movement starts from: the goal, so that what hangs on the arm does not make it sag
-    /// step by step; the position, when the goal is not where the servo is.
+    /// Where a relative movement starts from: the goal, so that what hangs on the arm does not make
+    /// it sag step by step; the position, when the goal is not where the servo is.
     pub(super) fn base(&self) -> u16 {
         if self.is_near_goal() {
             self.goal

@@ -6,8 +6,8 @@
 //!         '----------- else --------'
 //! ```
 //!
-//! The goal stays where it is at the end, a little inside what is held: that is the grip. A squeeze has no
-//! more steps than the gripper has way, so it ends whatever the servo answers.
+//! The goal stays where it is at the end, a little inside what is held: that is the grip. A squeeze
+//! has no more steps than the gripper has way, so it ends whatever the servo answers.
 
 use super::task::{GIVES_UP, Program, Squeeze};
 use super::{Arm, GRIPPER, Job, bit};

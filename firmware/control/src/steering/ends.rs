@@ -4,8 +4,8 @@
 //!   done, aborted, refused --> waiting, in order --> one report each --> told
 //! ```
 //!
-//! A report has room for one end. Two ends in one step would hide the first, so each waits for a report of
-//! its own; the last one told stands in every report until the next.
+//! A report has room for one end. Two ends in one step would hide the first, so each waits for its
+//! own report; the last reported one stands in every report until the next.
 
 use heapless::Deque;
 
@@ -42,7 +42,7 @@ impl Ends {
         }
     }
 
-    /// A command has ended. While nobody listens the oldest gives way.
+    /// A command has ended. If no Pi listens, the oldest end is dropped.
     pub(crate) fn push(&mut self, finish: Finish) {
         if self.waiting.is_full() {
             self.waiting.pop_front();

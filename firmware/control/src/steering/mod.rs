@@ -10,14 +10,18 @@
 //! ```
 //!
 //! Rules that hold whatever comes:
-//! - The motors stand still from boot until the first valid command, while the command is too old, while the
-//!   arm moves, and while the line to follow is not reported.
-//! - The arm is locked from boot until the first standby, and while the wheels have another command (T4).
-//! - What runs once (turns, arm commands) ends exactly once: done, aborted or refused, under its number.
-//!   Setpoints do not end; they are replaced. One does: following that has lost its words or its tape is
-//!   aborted with the failsafe's flag, and only another command turns the wheels again.
-//! - A refused command is counted and changes nothing: what was under way goes on and is not renewed by it.
-//! - Duties are those at 11.1 V, in orders and reports; the drivers get what gives the same voltage.
+//! - The motors stand still from boot until the first valid command, while the command is too old,
+//!   while the arm moves, and while the line to follow is not reported.
+//! - The arm is locked from boot until the first standby, and while the wheels have another command
+//!   (T4).
+//! - What runs once (turns, arm commands) ends exactly once: done, aborted or refused, under its
+//!   number. Setpoints do not end; they are replaced. One does: following that has lost its words
+//!   or its tape is aborted with the failsafe's flag, and only another command turns the wheels
+//!   again.
+//! - A refused command is counted and changes nothing: what was under way goes on and is not
+//!   renewed by it.
+//! - Duties are those at 11.1 V, in orders and reports; the drivers get what gives the same
+//!   voltage.
 //! - Of an arm command, the servos' states are told before its end is.
 
 mod ends;
@@ -78,7 +82,8 @@ impl Default for SteeringConfig {
 /// The longest a step may be put off, in microseconds; well inside the watchdog's 64 ms.
 const LONGEST_SLEEP_US: u32 = 20_000;
 
-/// A step is put off so long while a word comes in, in microseconds, unless its last bit comes first.
+/// A step is put off so long while a word comes in, in microseconds, unless its last bit comes
+/// first.
 const WORD_US: u32 = 300;
 
 /// What the line sensors say, as far as the wheels care.
@@ -167,8 +172,8 @@ impl SteeringUnit {
         }
     }
 
-    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which the next
-    /// step is wanted at the latest. Any input wants one at once.
+    /// Takes in everything that has arrived, decides, acts; the time of the board's clock at which
+    /// the next step is wanted at the latest. Any input wants one at once.
     pub fn step<B: SteeringBoard>(&mut self, board: &mut B) -> u32 {
         let now_us = board.now_us();
         board.kick_watchdog();
@@ -187,8 +192,9 @@ impl SteeringUnit {
         self.next_due_us(now_us)
     }
 
-    /// Does what takes long; whether it could. The wheels do not wait for it: it is begun between two words.
-    /// A word, whole or broken off by silence, is over within a millisecond whatever is on the wire.
+    /// Does what takes long; whether it could. The wheels do not wait for it: it is begun between
+    /// two words. A word, whole or broken off by silence, is over within a millisecond whatever is
+    /// on the wire.
     fn take_time<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> bool {
         if !self.is_between_words(board, now_us) {
             return false;
@@ -203,8 +209,8 @@ impl SteeringUnit {
         true
     }
 
-    /// Looks at the line: first of all, and between things that take long, so that the wheels do not wait for
-    /// them.
+    /// Looks at the line: first of all, and between things that take long, so that the wheels do
+    /// not wait for them.
     fn follow<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) {
         if let Some((state, at_us)) = self.read_words(board) {
             self.drive(board, now_us);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   byte --> link --> command, new --> register --> wheel: at once
-//!                 |           |                 '-> arm: only in standby, when the one before has ended
+//!                 |           |                 '-> arm: only in standby, after the one before
 //!                 |           '-- repeated: renews its age
 //!                 '-> setting --> gain, answered
 //!                             '-> arm's profile: value by value, answered --> in force as a whole

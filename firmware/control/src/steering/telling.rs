@@ -1,13 +1,13 @@
 //! What the steering board tells the Pi, and in which order.
 //!
 //! ```text
-//!   states of servos --> ends of commands --> answers to settings --> board status --> regular report
-//!   '------------------- as soon as the UART takes them ----------------------------'  '-- when the
-//!                                                                                        UART is idle
+//!   states of servos --> ends of commands --> answers to settings --> board status --> report
+//!   '------------------- as soon as the UART takes them ----------------------------'  when it
+//!                                                                                      is idle
 //! ```
 //!
-//! A servo's state comes before the end of the command that moved it, so whoever hears of the end knows
-//! where the arm is.
+//! A servo's state is sent before the end of the command that moved it, so a Pi that learns of the
+//! end already knows where the arm is.
 
 use lager_wire::{BoardStatus, Command, Payload, SteerData, SteerFlags};
 
@@ -64,8 +64,9 @@ impl SteeringUnit {
         }
     }
 
-    /// What is to be told now, most urgent first. Everything but the regular report is told as soon as the
-    /// UART takes it; that one waits until the line is free, so that it is never old when it arrives.
+    /// What is to be told now, most urgent first. Everything but the regular report is told as soon
+    /// as the UART takes it; that one waits until the line is free, so that it is never old when it
+    /// arrives.
     fn next_payload<B: SteeringBoard>(&mut self, board: &mut B, now_us: u32) -> Option<Payload> {
         if let Some(arm_data) = self.arm.take_report() {
             return Some(Payload::ArmData(arm_data));

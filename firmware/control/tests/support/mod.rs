@@ -1,6 +1,7 @@
 //! Two small test boards, a servo model and a Pi, stepped in virtual time.
 //!
-//! The boards are stepped when they asked to be and on input, as the simulator and a sleeping chip do.
+//! The boards are stepped when they asked to be and on input, as the simulator and a sleeping chip
+//! do.
 
 // Each test file uses its part.
 #![allow(dead_code, unreachable_pub, unused_imports)]

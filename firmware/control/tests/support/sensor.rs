@@ -112,7 +112,8 @@ impl SensorBench {
         let mut bench = Self::boot(u32::MAX - 40_000, config);
         bench.run_ms(10);
         bench.pins.answered = true;
-        // Not on a pass's own time, which whoever runs in whole milliseconds would meet a step late.
+        // Not on a pass's own time, which whoever runs in whole milliseconds would meet a step
+        // late.
         bench.run_us(60_333);
         bench.pi.packets.clear();
         bench.pins.words.clear();

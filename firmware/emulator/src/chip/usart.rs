@@ -195,7 +195,8 @@ impl Usart {
         self.sending.is_some()
     }
 
-    /// Bytes destroyed because nobody read them in time, since power came on.
+    /// Bytes that were destroyed because the program did not read them in time, since power came
+    /// on.
     pub(crate) fn overruns(&self) -> u64 {
         self.overruns
     }

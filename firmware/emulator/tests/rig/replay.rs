@@ -1,5 +1,5 @@
-//! The same recorded inputs give the same outputs from the chip and from the host's build of the very
-//! same control code, frame by frame.
+//! The same recorded inputs give the same outputs from the chip and from the host's build of the
+//! very same control code, frame by frame.
 //!
 //! ```text
 //!   chip:  conversions, bytes, words --> image ------------> packets, words, duties
@@ -62,8 +62,8 @@ pub(crate) fn words(robot: &Robot) -> Vec<(u64, u16)> {
         .collect()
 }
 
-/// A drive with turns of the tape under the sensors, everything recorded from power on. On slow lines it is
-/// a longer one, as there is less to compare in the same time.
+/// A drive with turns of the tape under the sensors, everything recorded from power on. On slow
+/// lines it is a longer one, as there is less to compare in the same time.
 pub(crate) fn drive(baud: u32, settings: &[Setting]) -> Robot {
     let mut robot = Robot::at(baud, 11);
     let longer = if baud == SLOW { 10 } else { 1 };

@@ -8,8 +8,8 @@ use lager_wire::{LineBits, Setting, SettingKey};
 use crate::replay::{board, drive, microseconds, words};
 use crate::support::{FAST, SLOW, milliseconds};
 
-/// How many words the chip may be late, whose work may reach into the next word, or the host, which hears of
-/// the Pi's bytes only with a word.
+/// How many words the chip may be late, whose work may reach into the next word, or the host, which
+/// hears of the Pi's bytes only with a word.
 const LATEST: usize = 2;
 
 /// The steering board on the host, fed with the words on the wire and the Pi's bytes.

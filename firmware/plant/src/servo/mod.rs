@@ -9,8 +9,8 @@
 //!  board  | FF FF id .. sum |
 //!  servo                      return delay  | FF FF id .. sum |      10 us a byte
 //! ```
-//! The board's own bytes are not echoed here: whoever owns the wire mutes its receiver while it
-//! sends (AMB-26). Not modelled: heat, shutdown by overload, change of the baud rate; RESET is
+//! The board's own bytes are not echoed here: the owner of the wire mutes its receiver while it
+//! sends (AMB-26). Not modelled: heat, shutdown by overload, change of the baud rate. RESET is
 //! refused, because it would leave eight servos with one id.
 
 mod device;

@@ -1,7 +1,7 @@
-//! What the wheels turn while a person drives, for whoever must know whether the robot stands
-//! where it stood.
+//! How far the wheels turn while a person drives, for services that must know whether the robot
+//! still stands where it stood.
 //!
-//! Apart from the arbiter because it only counts: nothing is decided by it. It is in the bridge
+//! It is apart from the arbiter because it only counts and decides nothing. It is in the bridge
 //! because the bridge sees every report and outlives the services that want to know.
 
 use core::time::Duration;
@@ -12,8 +12,8 @@ const REPORT_AGE: Duration = Duration::from_millis(150);
 /// The duty of both motors of a board that does not report it, while it is told to move.
 const STANDARD_DUTY: u64 = 200;
 
-/// What a bridge that is killed while a person drives has not told yet: the time since its last
-/// `link/health`, and the board's limit on a command's age.
+/// The time that a bridge which is killed while a person drives has not reported: since its last
+/// `link/health`, plus the board's limit on a command's age.
 const UNTOLD: Duration = Duration::from_millis(100 + 150);
 
 /// Duty × µs, summed over both motors, whatever the direction.
@@ -39,7 +39,7 @@ impl Driven {
         }
     }
 
-    /// Goes on to `now`; it counts only while a person is the one who drives.
+    /// Advances to `now`. It counts only while a person drives.
     pub(super) fn advance(&mut self, now: Duration, by_hand: bool) {
         let until = now.min(self.believed_until);
         if by_hand {
@@ -55,7 +55,7 @@ impl Driven {
         self.believed_until = now + REPORT_AGE;
     }
 
-    /// A board that reports nothing has been told to move, or to stand.
+    /// A board that does not report has been told to move, or to stand.
     pub(super) fn told(&mut self, moves: bool) {
         self.duty = if moves { STANDARD_DUTY } else { 0 };
         self.believed_until = Duration::MAX;

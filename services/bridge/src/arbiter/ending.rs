@@ -1,7 +1,8 @@
-//! How orders end: by their lease, by the board's word, by a stop or a change of the mode.
+//! How orders end: when their lease lapses, when the board reports it, by a stop or by a change of
+//! mode.
 //!
-//! Apart from the judgement of orders because an end needs nobody's word. What is written to a
-//! board afterwards is the wire's side.
+//! It is apart from the judgement of orders because no origin has to ask for an end. What is
+//! written to the board afterwards is `wire.rs`'s task.
 
 use core::time::Duration;
 
@@ -51,10 +52,10 @@ impl Arbiter {
         self.revision = self.revision.wrapping_add(1);
     }
 
-    /// Ends what nobody had renewed by `at`.
+    /// Ends every order that was not renewed before `at`.
     pub(super) fn expire(&mut self, at: Duration) {
         if self.grant.is_some_and(|grant| grant.lease.is_over(at)) {
-            // What the operator moved, he moved by logic's leave.
+            // The operator moved the arm by logic's grant.
             self.grant = None;
             self.lapse();
         }
@@ -69,7 +70,7 @@ impl Arbiter {
         }
     }
 
-    /// Nobody has renewed the order in force.
+    /// The order in force was not renewed.
     fn lapse(&mut self) {
         if self
             .running

@@ -1,7 +1,7 @@
-//! What outlives the arbiter: all that a successor needs, as `link/health` carries it, and what
-//! `steering/state` tells of orders.
+//! What outlives the arbiter: the state that a successor needs, as `link/health` carries it, and
+//! what `steering/state` says of orders.
 //!
-//! Apart from the arbiter because it decides nothing: what is written here is read here.
+//! It is apart from the arbiter because it decides nothing: what is written here is read here.
 
 use core::time::Duration;
 
@@ -17,8 +17,8 @@ impl Arbiter {
     /// Goes on where an earlier life of the bridge ended: mode, latch, counters, and which order
     /// belongs to which sequence byte.
     ///
-    /// Nothing is written for the order in force until its origin renews it; if nobody does
-    /// within [`LEASE`], it lapses. Until then the board's own limit of 150 ms protects.
+    /// Nothing is written for the order in force until its origin renews it. If the origin does not
+    /// within [`LEASE`], the order lapses. Until then the board's own limit of 150 ms protects.
     pub fn resume(kept: &Health) -> Self {
         let mut arbiter = Self {
             mode: kept.mode.get().unwrap_or(Mode::Manual),
@@ -35,7 +35,8 @@ impl Arbiter {
             let id = kept.refused_id;
             arbiter.refused = Some((OrderKey { origin, id }, refusal));
         }
-        // One setpoint may have been written and not told: its sequence byte is not used again.
+        // One setpoint may have been written and not published: its sequence byte is not used
+        // again.
         arbiter.next_seq();
         arbiter.idle_seq = arbiter.wire_seq;
         let finish = kept.finish.get().unwrap_or(Finish::None);

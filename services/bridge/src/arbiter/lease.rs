@@ -1,10 +1,10 @@
-//! How long a word counts: the lease of an order, from its origin's last word.
+//! How long an order counts: the lease, from the last renewal by its origin.
 //!
-//! Apart from the arbiter because orders and grants hold by it alike; it knows nothing of either.
+//! It is apart from the arbiter because orders and grants both use it; it knows nothing of either.
 
 use core::time::Duration;
 
-/// How long an order holds after its origin's last word, in robot time.
+/// How long an order holds after its origin's last renewal, in robot time.
 pub const LEASE: Duration = Duration::from_millis(120);
 
 /// How long an order in force still holds.

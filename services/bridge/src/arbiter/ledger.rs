@@ -1,4 +1,4 @@
-//! The memory of orders that are over: it makes "exactly once" true.
+//! The memory of ended orders. It makes sure that each order is executed exactly once.
 //!
 //! An order is known by its origin and id. Origins renew an order until they hear how it ended,
 //! and a report can be missed, so a renewal of an ended order must be recognised, answered with
@@ -21,8 +21,8 @@ pub struct OrderKey {
 pub struct Ended {
     /// Which order.
     pub key: OrderKey,
-    /// How it ended; [`Finish::None`] for a setpoint that a newer order replaced, which is
-    /// nobody's news.
+    /// How it ended; [`Finish::None`] for a setpoint that a newer order replaced, whose end is
+    /// reported to no one.
     pub finish: Finish,
 }
 

@@ -1,9 +1,9 @@
 //! Who may steer: the one place where orders of several origins become one stream of commands.
 //!
-//! It is apart from the shell because it must be provable: it is pure, owns no port and no clock,
-//! and takes robot time as an argument, so the whole of it is tested in virtual time and the
-//! simulation in one process runs the same code. It never decides what the robot should do; it
-//! decides whose word counts, and that the word dies with the one who gave it.
+//! It is apart from the shell so that it can be proven: it is pure, owns no port and no clock, and
+//! takes robot time as an argument. So all of it is tested in virtual time, and the simulation in
+//! one process runs the same code. It does not decide what the robot should do. It decides whose
+//! order is obeyed, and ends an order when its origin is gone.
 //!
 //! ```text
 //!                 new id, allowed                     lease over, mode changed, stop
@@ -15,20 +15,20 @@
 //!                                        +-----------------> running
 //! ```
 //!
-//! * **Identity**: `(origin, id)`. The same id renews, a new id executes; an id that has ended is
-//!   never carried out again, its end is told again.
+//! * **Identity**: `(origin, id)`. The same id renews an order, a new id is executed. An id that
+//!   has ended is never executed again; the arbiter only reports its end again.
 //! * **Lease**: [`LEASE`] from the moment given with the order. Only the order's own renewals
 //!   extend it.
 //! * **Setpoints and one-shots**: a setpoint (drive, standby) is a level. A one-shot (turn, arm
 //!   step) is an event: however it ended, its id is used up.
-//! * **Nothing comes back by itself.** A person's order counts when it is given or never: if it is
-//!   not allowed then, or ends by whatever (lease, stop, mode, a board that was reset or away),
-//!   its id is used up and a renewal moves nothing. Logic, which knows what it does when it goes
-//!   on, has its setpoint taken up again once it is allowed.
-//! * **No motion unseen**: unless the steering board has reported within [`REPORT_DEADLINE`],
-//!   whatever moves ends and nobody may move anything. An original board does not report, nor has
-//!   it a limit on a command's age, so it is told standby only, unless that was accepted
-//!   ([`Arbiter::drive_original_boards`]).
+//! * **Nothing comes back by itself.** A person's order is carried out when it is given or never.
+//!   If it is not allowed then, or if it has ended for any reason (lease, stop, mode, a board that
+//!   was reset or away), its id is used up and a renewal moves nothing. Logic looks before it goes
+//!   on, so its setpoint is taken up again once it is allowed.
+//! * **No motion unseen**: unless the steering board has reported within [`REPORT_DEADLINE`], every
+//!   order that moves something ends, and no origin may move anything. An original board does not
+//!   report and has no limit on a command's age. So it gets only standby, unless the configuration
+//!   accepts the risk ([`Arbiter::drive_original_boards`]).
 //! * **The newest order takes over**, as the board's command register has it (T2). A one-shot
 //!   that is replaced while it runs is reported as aborted; queueing is the external computer's
 //!   task (C5).
@@ -38,10 +38,10 @@
 //!   drives and the operator may stop, and may move the arm while logic's order in force is a
 //!   standby with `arm_granted` (L10). Quarter turns and the drop are logic's alone (AMB-2,
 //!   AMB-27). An arm order while a wheel command moves the robot is refused (AMB-28).
-//! * **The arm waits for its profile**: until the steering board obeys the limits it was told, an
-//!   arm order is held, and refused where the board does not take them.
-//! * **Following may end**: the board gives it up by itself when it has lost its line. That is the
-//!   end of the order; only a new id follows again.
+//! * **The arm waits for its profile**: an arm order is held until the steering board has accepted
+//!   its limits, and refused where the board does not take them.
+//! * **Following may end**: the board gives it up by itself when it has lost its line. That ends
+//!   the order; only a new id follows again.
 //! * **Sequence bytes** are 1..=255; a one-shot never gets the one the board last reported as
 //!   finished. The board tells the same sequence byte from a new one, so a re-sent command renews
 //!   and does not repeat.
@@ -70,11 +70,11 @@ use ledger::Ledger;
 pub use ledger::{Ended, OrderKey};
 pub use verdict::Verdict;
 
-/// How long the steering board may be unheard before nobody may move anything, in robot time.
+/// How long the steering board may be silent before no origin may move anything, in robot time.
 pub const REPORT_DEADLINE: Duration = Duration::from_millis(200);
 
-/// Within what time of being given a person's order is begun or never, in robot time: a process
-/// that was held up for longer must not move the robot when it goes on.
+/// The time within which a person's order must begin after it was given, in robot time; later it is
+/// refused. A process that was held up for longer must not move the robot when it goes on.
 pub const STALE: Duration = Duration::from_secs(1);
 
 /// How often the command in force is written again to a version-1 board, so that its age stays
@@ -151,10 +151,10 @@ pub struct Arbiter {
     reported: Option<Duration>,
     /// The board is up and has not reported in time.
     silent: bool,
-    /// What the board has against anybody's moving, when it was last looked at.
+    /// Why the board lets no origin move anything, when it was last looked at.
     objection: Refusal,
     arm: ArmGate,
-    /// Some earlier life of this link is known, so the board knows our last sequence byte.
+    /// An earlier life of this link is known, so the board knows our last sequence byte.
     acquainted: bool,
     /// A standby to be written before anything else.
     prelude: Option<SteerCommand>,
@@ -250,7 +250,8 @@ impl Arbiter {
     }
 
     /// Lets time pass, once in each turn, after all that has come was handed in and before
-    /// [`Arbiter::poll`]: leases and the report's deadline end, and what the board's side waits for.
+    /// [`Arbiter::poll`]: leases and the report's deadline end, and what the board's side waits
+    /// for.
     pub fn advance(&mut self, now: Duration) {
         self.count_driven(now);
         self.watch_board(now);
@@ -293,7 +294,7 @@ impl Arbiter {
         self.stopped
     }
 
-    /// Why nobody may move anything at present; of the board as of the last [`Arbiter::advance`].
+    /// Why no origin may move anything now; of the board as of the last [`Arbiter::advance`].
     pub fn blocked(&self) -> Refusal {
         if self.parked {
             Refusal::ShuttingDown
@@ -320,11 +321,11 @@ impl Arbiter {
         self.last
     }
 
-    /// Grows whenever something has changed that [`Arbiter::fill`] writes, lease excepted.
+    /// Grows whenever something has changed that [`Arbiter::fill`] writes, except for the lease.
     ///
-    /// Publish before writing to the wire when it has: then a bridge that is killed between the
-    /// two finds out from the board whether the order was carried out. Only where a setpoint has
-    /// replaced a setpoint and nothing else has changed, one write may come before.
+    /// Publish before writing to the wire when it has grown: then the successor of a bridge that is
+    /// killed between the two learns from the board whether the order was carried out. Only where a
+    /// setpoint has replaced a setpoint and nothing else has changed, one write may come before.
     pub fn revision(&self) -> u32 {
         self.revision
     }

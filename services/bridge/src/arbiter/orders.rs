@@ -1,7 +1,7 @@
-//! Whose word counts: the judgement of orders.
+//! Which orders are obeyed: the judgement of orders.
 //!
-//! Apart from the arbiter's other side, the wire: nothing here knows how a command gets to a
-//! board, only who may give it, what it replaces, and that it ends with its origin.
+//! It is apart from the arbiter's other side, the wire. It does not know how a command gets to a
+//! board, only which origin may give it, what it replaces, and that it ends with its origin.
 
 use core::time::Duration;
 
@@ -20,7 +20,7 @@ impl Arbiter {
     /// Hand in everything that has arrived before asking [`Arbiter::poll`] for what to write:
     /// then of several setpoints only the last is written.
     pub fn order(&mut self, sent: Duration, given: Duration, order: &SteeringOrder) -> Verdict {
-        // It finds in force what was in force when it was sent.
+        // Judge it against the order that was in force when it was sent.
         self.expire(sent);
         let Some(origin) = order.origin.get() else {
             self.count_refused();
@@ -92,7 +92,7 @@ impl Arbiter {
         Some(Verdict::Renewed)
     }
 
-    /// What is to be said against an order that is not in force and has not ended.
+    /// Why an order that is not in force and has not ended is refused or ignored, if it is.
     fn objection(
         &mut self,
         sent: Duration,
@@ -112,7 +112,7 @@ impl Arbiter {
             Mode::Autonomous => !by_person || (is_arm && self.arm_is_granted()),
         };
         let board = self.board_objection(sent).filter(|_| command != STANDBY);
-        // What a person may not do now he must want again; logic's renewals may count later.
+        // A person must give a refused order again; logic's renewals may count later.
         let why = if logic_only && by_person {
             Refusal::LogicOnly
         } else if !in_charge {
@@ -137,8 +137,8 @@ impl Arbiter {
         })
     }
 
-    /// Whether the order in force ends when the steering board comes up again: a person's does,
-    /// unless it was taken up from an earlier life of the bridge and the board has not been reset.
+    /// Whether the order in force ends when the steering board comes up again. A person's order
+    /// does, unless it was taken over from an earlier bridge and the board has not been reset.
     pub(super) fn ends_with_the_link(&self, rebooted: bool) -> bool {
         let by_person = |running: Running| running.key.origin == Origin::Operator;
         (rebooted || self.has_met_board) && self.running.is_some_and(by_person)
@@ -154,7 +154,8 @@ impl Arbiter {
             })
     }
 
-    /// Ends what runs for the sake of a newer order, or lays logic's standby below a guest.
+    /// Ends the running order for a newer one, or keeps logic's standby below an operator's arm
+    /// order.
     fn make_way(&mut self, for_guest: bool) {
         if for_guest && self.grant.is_none() {
             if let Some(base) = self.running.take() {

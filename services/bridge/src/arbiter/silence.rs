@@ -1,5 +1,5 @@
-//! Nobody drives unseen: what follows when the steering board does not report, is not there, or is
-//! one that must not be driven.
+//! No order moves the robot unseen: what the arbiter does when the steering board does not report,
+//! is absent, or is one that must not be driven.
 //!
 //! ```text
 //!            report                     200 ms without a report
@@ -18,7 +18,7 @@ use lager_wire::Version;
 use super::{Arbiter, REPORT_DEADLINE, STANDBY};
 
 impl Arbiter {
-    /// Why the steering board keeps everybody from moving anything.
+    /// Why the steering board lets no origin move anything.
     pub(super) fn board_objection(&self, now: Duration) -> Option<Refusal> {
         match self.board {
             None => Some(Refusal::NoBoard),
@@ -32,7 +32,8 @@ impl Arbiter {
             .is_none_or(|reported| reported + REPORT_DEADLINE <= now)
     }
 
-    /// Ends what moves without a board that shows it, and notes why nobody may move.
+    /// Ends every order that moves something while no board shows it, and notes why no origin may
+    /// move.
     pub(super) fn watch_board(&mut self, now: Duration) {
         let objection = self.board_objection(now);
         self.silent = objection == Some(Refusal::BoardSilent);
@@ -40,7 +41,7 @@ impl Arbiter {
             .running
             .is_some_and(|running| running.command != STANDBY)
         {
-            // An order of an earlier life of the bridge waits as long for its board.
+            // An order taken over from an earlier bridge waits this long for its board.
             self.reported.get_or_insert(now);
             let is_over = match objection {
                 Some(Refusal::NoBoard) => self.is_unheard(now),

@@ -1,6 +1,6 @@
 //! What the arbiter says about an order.
 //!
-//! Apart from the arbiter so that it stands in one place; it holds no logic.
+//! It is apart from the arbiter so that the answers stand in one place; it holds no logic.
 
 use lager_topics::{Finish, Refusal};
 
@@ -13,7 +13,7 @@ pub enum Verdict {
     Renewed,
     /// It ended earlier; it is not carried out again.
     Ended(Finish),
-    /// It does not count now, but its renewals may later. Only logic is told so.
+    /// It is not executed now, but its renewals may be later. Only logic gets this answer.
     Ignored(Refusal),
     /// It will never be carried out.
     Refused(Refusal),

@@ -34,9 +34,9 @@ const PARKED_RESEND: Duration = Duration::from_millis(20);
 impl Arbiter {
     /// The steering board's link is up. `rebooted`: the board has lost what it was told.
     ///
-    /// Logic's setpoint goes on under a new sequence byte; a person's ends, unless it was taken up
-    /// from an earlier life of the bridge and the board has not been reset. A one-shot that was
-    /// written is not written again: it is looked for in the board's reports and is aborted if it
+    /// Logic's setpoint goes on under a new sequence byte. A person's setpoint ends, unless it was
+    /// taken over from an earlier bridge and the board has not been reset. A one-shot that was
+    /// written is not written again: it is searched for in the board's reports, and aborted if it
     /// is not there.
     pub fn board_up(&mut self, now: Duration, version: Version, rebooted: bool) {
         let ends = self.ends_with_the_link(rebooted);
@@ -48,9 +48,9 @@ impl Arbiter {
         self.halted_at = None;
         self.next_send = now;
         if (!self.acquainted || rebooted) && version == Version::One {
-            // The board may be executing any sequence byte of a bridge nobody remembers: of two
-            // different ones, at least one is new to it. One that has just started keeps its arm
-            // locked until it has been told a standby (T4).
+            // The board may be executing any sequence byte of an earlier bridge. Of two different
+            // ones at least one is new to it. A board that has just started keeps its arm locked
+            // until it gets a standby (T4).
             self.acquainted = true;
             self.prelude = Some(standby(self.next_seq()));
         }
@@ -88,7 +88,7 @@ impl Arbiter {
         if self.board.is_none() {
             return;
         }
-        // What was over before the report came is not saved by it.
+        // An order that had lapsed before the report came stays lapsed.
         self.watch_board(now);
         self.expire(now);
         self.reported = self.reported.max(Some(now));
@@ -134,8 +134,8 @@ impl Arbiter {
         }
     }
 
-    /// Lets time pass on the board's side: held arm orders are released, one-shots of an original
-    /// board are taken for done, those looked for in vain for lost.
+    /// Lets time pass on the board's side: held arm orders are released, an original board's
+    /// one-shots count as done, and one-shots that were searched for in vain as lost.
     pub(super) fn advance_board(&mut self, now: Duration) {
         let Some(running) = self.running.as_mut() else {
             return;
@@ -155,9 +155,9 @@ impl Arbiter {
     /// What to write now, if anything; ask again until there is nothing. Time has passed before, by
     /// [`Arbiter::advance`].
     ///
-    /// A version-1 board is told a change at once and the command in force every [`RESEND`]; a
-    /// version-0 board, which would carry out a repetition, is told each command once, and standby
-    /// as often as the other, since it has no other reason to stand.
+    /// A version-1 board gets a change at once, and the command in force every [`RESEND`]. An
+    /// original board would carry out a repetition, so it gets each command once. Standby it gets
+    /// as often as the other, because nothing else makes it stand.
     pub fn poll(&mut self, now: Duration) -> Option<SteerCommand> {
         let version = self.board?;
         if self.retry_at.is_some_and(|at| at > now) {
@@ -198,8 +198,8 @@ impl Arbiter {
         self.retry_at = Some(now + RETRY);
     }
 
-    /// When [`Arbiter::poll`] next has something to say, if no order or report comes before; a
-    /// moment that is past means now.
+    /// When [`Arbiter::poll`] next returns something, if no order or report comes before; a time in
+    /// the past means now.
     pub fn next_due(&self) -> Option<Duration> {
         let running = self.running.as_ref();
         let writes = self.board.is_some() && self.may_write();
@@ -280,14 +280,14 @@ impl Arbiter {
         self.idle_seq = self.next_seq();
     }
 
-    /// The standby that is over is the one that the board goes on being told.
+    /// The standby that has ended is the one that is still sent to the board.
     pub(super) fn stand_on(&mut self, over: &Running) {
         if over.command == STANDBY {
             self.idle_seq = over.seq;
         }
     }
 
-    /// The origin of an order taken up from an earlier life of the bridge has spoken.
+    /// The origin of an order that was taken over from an earlier bridge has renewed it.
     pub(super) fn claim(&mut self, received: Duration) {
         let Some(running) = self.running else {
             return;

@@ -1,6 +1,7 @@
 //! What the bridge's core wants done, one thing at a time.
 //!
-//! Apart from the core, because whoever carries the actions out needs nothing else of it.
+//! It is apart from the core, because the code that carries the actions out needs nothing else of
+//! it.
 
 use lager_topics::{ArmProfileState, AskKind, Mode, StopCause};
 use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};
@@ -11,7 +12,7 @@ use crate::events::BoardUp;
 /// One thing to do.
 #[derive(Clone, Copy, Debug)]
 pub enum Action {
-    /// Throw away what waits to be sent at a port: it would be old when it is sent.
+    /// Throw away what waits to be sent at a port: it would be too old when it is sent.
     Discard {
         /// The port, 0 or 1.
         place: usize,
@@ -28,7 +29,7 @@ pub enum Action {
         /// When the report that causes it was read, in ns of `CLOCK_MONOTONIC`.
         report_ns: Option<u64>,
     },
-    /// Tell whoever waits for a stop what the steering board has reported.
+    /// Publish for a waiting `lager stop` what the steering board has reported.
     ShowReport(ShownReport),
     /// Set a stop of the bridge's own.
     Stop(StopCause),
@@ -51,7 +52,7 @@ pub struct Write {
     pub order: Option<OrderKey>,
 }
 
-/// A report of the steering board, for whoever waits for a stop.
+/// A report of the steering board, for a waiting `lager stop`.
 #[derive(Clone, Copy, Debug)]
 pub struct ShownReport {
     /// When it was read, in ns of `CLOCK_MONOTONIC`.

@@ -1,7 +1,7 @@
 //! Requests: changes of the mode, the release of a stop, and settings of the boards.
 //!
-//! It is apart because an answer may have to wait: for a board, or for the stop word. Whoever runs
-//! the core turns it meanwhile. One request is under way at a time.
+//! It is apart because an answer may have to wait: for a board, or for the stop word. The core's
+//! turns go on meanwhile. One request is under way at a time.
 
 use core::time::Duration;
 
@@ -18,7 +18,7 @@ impl BridgeCore {
     pub fn ask(&mut self, now: Moment, ask: &Ask) {
         use Asked::Answered;
         self.asked = Some(match (ask.kind.get(), ask.mode.get()) {
-            // Whoever asked was held up, or this process was, and nobody waits for the effect.
+            // The asker or this process was held up, and no process waits for the effect any more.
             (kind, _) if ask.is_over(now.ns) => {
                 self.say(News::Late(kind));
                 Answered(Outcome::Late)
@@ -46,7 +46,7 @@ impl BridgeCore {
         });
     }
 
-    /// The answer, once it can be given and what it says is in force.
+    /// The answer, once it can be given and its content is in force.
     pub fn answer(&mut self) -> Option<Answer> {
         let Some(Asked::Answered(outcome)) = self.asked else {
             return None;

@@ -2,8 +2,8 @@
 //!
 //! It is apart from the service so that `lager simulate` runs the very same bridge: boards that
 //! come and go, the arm's profile and the settings on their way to them, requests, the stop, and
-//! what is told when. Whoever runs it owns the ports, the bus, the stop word and the clock, and
-//! decides nothing. Nothing here allocates.
+//! what is published when. The process that runs it owns the ports, the bus, the stop word and the
+//! clock, and decides nothing. Nothing here allocates.
 //!
 //! ```text
 //!   port, order, press, ask, stop ──> what is due at once ─┐
@@ -11,13 +11,15 @@
 //!   decide, once a turn ────> health, commands, settings ──┘
 //! ```
 //!
-//! One turn: hand in all that has come and carry out what [`BridgeCore::next`] gives after each
-//! event; then [`BridgeCore::decide`], and carry out the rest. Look at the stop word before each
-//! action, and hand a stop in: then nothing is written that was decided before it.
+//! One turn: hand in all that has come, and carry out what [`BridgeCore::next`] returns after each
+//! event; then call [`BridgeCore::decide`] and carry out the rest. Look at the stop word before
+//! each action and hand a stop in. Then nothing that was decided before a stop is written after it.
 //!
-//! The order of the actions matters: `link/health` goes out before the bytes are written, so that
-//! no successor can take a carried-out order for a new one. Only what may be said twice is said
-//! first: a setpoint in place of a setpoint, and the standby of a stop.
+//! The order of the actions matters. `link/health` goes out before the bytes are written, so that
+//! no successor takes an order that was carried out for a new one. Only what may be said twice is
+//! written first: a setpoint that replaces a setpoint, and the standby of a stop. For a setpoint a
+//! successor leaves out one sequence number, which may have been used. Turns and steps of the arm
+//! run once, so they go out after the state.
 //!
 //! * `asks`: requests.
 //! * `ports`: what happens at the ports.
@@ -59,7 +61,7 @@ const HEALTH_PERIOD: Duration = Duration::from_millis(100);
 /// How often a shutdown writes standby at least, if there is a board.
 const PARKING_WRITES: u32 = 3;
 
-/// More than one event can say.
+/// More news than one event can bring.
 const NEWS: usize = 8;
 
 /// What the core is told at start.
@@ -169,7 +171,7 @@ struct Told {
     state: u32,
     /// The order that ended last.
     end: Option<Ended>,
-    /// Who may drive, whether a stop is latched and why nobody may move.
+    /// Who may drive, whether a stop is latched, and why no origin may move.
     mover: Option<(Mode, bool, Refusal)>,
     /// The order in force was a setpoint.
     setpoint: bool,
@@ -178,10 +180,10 @@ struct Told {
 }
 
 impl BridgeCore {
-    /// A bridge that goes on where an earlier life of it has ended, if that was kept.
+    /// A bridge that goes on where an earlier one ended, if that bridge's state was kept.
     ///
-    /// A stop that was latched then is not taken up: the stop word decides, and whoever finds it
-    /// clear sets it.
+    /// A stop that was latched then is not taken over: the stop word decides, and the caller sets
+    /// it again if it is clear.
     pub fn new(options: CoreOptions, kept: Option<&Health>) -> Self {
         let mut arbiter = kept.map_or_else(Arbiter::new, Arbiter::resume);
         arbiter.resume_from_stop();
@@ -259,10 +261,11 @@ impl BridgeCore {
         self.stop = Some(stop);
         self.rest = Rest::default();
         self.arbiter.stop();
-        // A board of ours finds the standby behind a packet that was cut in two, by its structure,
-        // or the next one where the first was taken for the check. An original one would take the
-        // standby's first bytes for the rest of that packet and carry it out, so there the packet
-        // is finished.
+        // A board of ours finds the standby behind a packet that was cut in two, by its structure.
+        // A packet that lacks only its check value may find it in the standby's first byte, once in
+        // 256 times; the packet is then carried out until the next standby, at most 40 ms later. An
+        // original board would take the standby's first bytes for the rest of that packet and carry
+        // it out, so there the packet is finished.
         if self.boards.version(Callsign::Steering) == Some(Version::One)
             && let Some(place) = self.boards.place(Callsign::Steering)
         {
@@ -300,7 +303,7 @@ impl BridgeCore {
     /// What to do now; ask until there is nothing.
     pub fn next(&mut self, now: Moment) -> Option<Action> {
         loop {
-            // What one stage brings is done before the next.
+            // The actions of one stage are carried out before the next stage.
             if let Some(action) = self.at_once(now) {
                 return Some(action);
             }
@@ -494,7 +497,7 @@ impl BridgeCore {
         (arbiter.mode(), arbiter.is_stopped(), arbiter.blocked())
     }
 
-    /// Tells people; what does not fit they are not told.
+    /// Tells people; news that does not fit is dropped.
     fn say(&mut self, news: News) {
         let _ = self.due.news.push_back(news);
     }

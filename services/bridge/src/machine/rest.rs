@@ -5,11 +5,11 @@
 
 use lager_wire::SteerData;
 
-/// Reports with wheels at rest that prove that they are, one after the other.
+/// How many reports in a row with wheels at rest prove that they are at rest.
 const REPORTS: u8 = 2;
 
-/// A report that is read sooner after the standby was written may have been on its way before the
-/// standby came to the board, in ns.
+/// The time after the standby was written, in ns, within which a report that is read may have been
+/// sent before the standby reached the board.
 const ON_ITS_WAY_NS: u64 = 5_000_000;
 
 /// How far the board has come in obeying the stop in force.

@@ -1,6 +1,6 @@
 //! What the core tells: the state of everything, and what the steering board does.
 //!
-//! It is apart because it only tells: nothing here decides.
+//! It is apart because it only publishes: nothing here decides.
 
 use core::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::counts::Counts;
 use crate::events::Moment;
 use crate::frames::steering_report;
 
-/// A report that has waited longer to be published is not news any more, in robot time; they come
+/// A report that has waited longer to be published is out of date, in robot time; reports come
 /// every 5 ms.
 const FRESH: Duration = Duration::from_millis(20);
 
@@ -46,9 +46,9 @@ impl BridgeCore {
         self.told.setpoint = self.arbiter.has_setpoint();
     }
 
-    /// Writes `steering/state`: what the steering board does, and how old its word is, since the
-    /// end of an order goes out without a new report. Without a report that means something it is
-    /// what the board was told.
+    /// Writes `steering/state`: what the steering board does, and how old its report is, since the
+    /// end of an order is published without a new report. Without a usable report it shows the
+    /// command that the board was sent.
     pub fn fill_state(&self, now: Duration, state: &mut SteeringReport) {
         let told = SteerData {
             code: self

@@ -1,8 +1,8 @@
 //! One serial port as the boards need it: raw, 8 data bits, no parity, 1 stop bit, exclusive.
 //!
-//! It is apart so that everything the operating system can say about a port is turned into a
-//! sentence in one place. It never blocks except in [`SerialPort::read`], never allocates after
-//! opening, and knows nothing of packets.
+//! It is apart so that every error of the operating system about a port becomes a sentence in one
+//! place. It blocks only in [`SerialPort::read`], allocates nothing after opening, and knows
+//! nothing of packets.
 //!
 //! A pseudo terminal is as good as a real port: modem lines are ignored, and the driver's
 //! low-latency mode is asked for but not needed.
@@ -220,7 +220,7 @@ impl SerialPort {
 
     /// Throws away what was written and has not left the machine yet.
     pub fn discard_output(&self) {
-        // A port that cannot do it any more is found out by its reader.
+        // The reader finds out that a port no longer works.
         let _ = tcflush(&self.writing, QueueSelector::OFlush);
     }
 }
@@ -231,14 +231,14 @@ impl AsFd for SerialPort {
     }
 }
 
-/// Takes the port for this process alone, among those that ask: the lock is on the open file and
-/// dies with the process.
+/// Takes the port for this process alone, among those that ask for the lock. The lock is on the
+/// open file and ends with the process.
 fn lock(fd: &OwnedFd) -> Result<(), Errno> {
     flock(fd, FlockOperation::NonBlockingLockExclusive)
 }
 
-/// Keeps programs away that ask for no lock. On a pseudo terminal that would outlive a killed
-/// process for as long as the other end is open, and shut the restarted bridge out.
+/// Keeps programs away that ask for no lock (TIOCEXCL). On a pseudo terminal this would outlive a
+/// killed process for as long as the other end is open, and shut the restarted bridge out.
 fn shut_out_others(fd: &OwnedFd) -> Result<(), Errno> {
     let is_pty = PTY_SLAVES.contains(&major(fstat(fd)?.st_rdev));
     if !is_pty {

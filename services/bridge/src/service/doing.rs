@@ -1,6 +1,6 @@
 //! Carrying out what the core wants: writing, publishing, and the stop word.
 //!
-//! It is apart from the turn because here is all that has an effect outside this process.
+//! It is apart from the turn because everything here has an effect outside this process.
 
 use lager_ports::{Cause, Clock, Release, Stop};
 use lager_wire::{Callsign, PACKET_LENGTH, Version};
@@ -121,7 +121,7 @@ impl Service<'_> {
         let Some(device) = &port.device else {
             return false;
         };
-        // A port that has gone is found out by its reader.
+        // The reader finds out that a port has gone.
         matches!(
             port.writer.write(device, packet),
             Ok(Sent::Whole | Sent::Partly)

@@ -2,14 +2,15 @@
 //! what [`BridgeCore`] gives it to do.
 //!
 //! One turn: wait, obey the stop word, take what the readers have brought, answer requests, drain
-//! all orders, let the core decide, and carry out what it wants, in its order. The stop word is
-//! looked at before each action and after the last one, so before each packet, with one load each:
-//! nothing that was decided before a stop is written after it, also when this process was frozen
-//! meanwhile.
+//! all orders, let the core decide, and carry out its actions in its order. The stop word is read
+//! before each action and after the last one, so before each packet, with one load each. So nothing
+//! that was decided before a stop is written after it, even if this process was frozen meanwhile.
 //!
-//! Nobody is woken in vain: `link/health` rings only when it says something new to logic, who may
-//! move the robot; `steering/state` tells the order in force with the board's next report, and rings
-//! for reports and for the end of an order.
+//! Nobody is woken in vain. `link/health` rings only when it changes who may move the robot, which
+//! logic must know. The order in force shows on `steering/state` with the board's next report; that
+//! topic rings for reports and for the end of an order. A port is read asleep (`VTIME`), so a frame
+//! costs `read` and `futex` in the reader, a sleep and a ring in logic, a sleep and a `write` in
+//! the main loop, and nothing else: `tests/path` counts them with `strace`.
 //!
 //! **Safe state**: standby. It is written when nobody holds a lease, when a stop is latched, and
 //! several times at shutdown. If this process is killed, the steering board halts by itself
@@ -60,7 +61,7 @@ const PARKING: Duration = Duration::from_millis(200);
 pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), PortError> {
     let kept = if config.resume {
         bus.kept::<LinkHealth>(RESUME_WAIT).unwrap_or_else(|error| {
-            // What nobody can read is lost, and then the robot starts stopped.
+            // State that cannot be read counts as lost, and the robot then starts stopped.
             tracing::error!("{error}");
             None
         })
@@ -78,8 +79,8 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
     let mut service = Service::new(bus, config, &counts, kept.as_ref(), [first_out, second_out])?;
     let ringer = service.waiter.ringer()?;
     shutdown.wake(ringer.clone());
-    // The word decides whether the robot is stopped. That it is clear where a stop was latched can
-    // only be a release in which the bridge before ended, or a word that somebody has wiped.
+    // The word decides whether the robot is stopped. If it is clear although a stop was latched,
+    // the bridge before ended during a release, or somebody has wiped the word.
     if config.resume && kept.is_none_or(|kept| kept.stopped != 0) {
         service.page.stop(StopCause::StateLost);
     }
@@ -116,7 +117,7 @@ struct Port<'a> {
     writer: PacketWriter,
 }
 
-/// The main loop: what the core has not.
+/// The main loop: everything that the core does not have.
 struct Service<'a> {
     clock: Clock,
     config: &'a BridgeConfig,
@@ -235,7 +236,7 @@ impl<'a> Service<'a> {
         self.core.ask(now, ask);
         self.act(now);
         loop {
-            // What is answered is in force, and seen to be.
+            // An answer is given when its content is in force and published.
             self.flush();
             if let Some(answer) = self.core.answer() {
                 return answer;
@@ -278,9 +279,10 @@ impl<'a> Service<'a> {
 
     fn take_order(&mut self, order: &Sample<SteeringCommand>) {
         let received_ns = Clock::monotonic_ns();
-        // A lease counts from its origin's word, not from when it is read here.
+        // A lease counts from the moment when its origin sent the order, not from when it is read
+        // here.
         let sent_ns = order.stamp().publish_time_ns.min(received_ns);
-        // What was given in the future was not given by this machine's clock.
+        // An order from the future was not dated by this machine's clock.
         let given_ns = Some(order.given_ns).filter(|given_ns| *given_ns <= received_ns);
         let sent = self.clock.at(sent_ns);
         let given = self.clock.at(given_ns.unwrap_or(0));
@@ -321,7 +323,7 @@ impl<'a> Service<'a> {
         }
     }
 
-    /// Says what goes wrong on the bus, but not for ever.
+    /// Logs faults of the bus, but not the same one for ever.
     fn complain(&mut self, error: &dyn std::error::Error) {
         self.bus_complaints = self.bus_complaints.wrapping_add(1);
         if self.bus_complaints.is_power_of_two() {

@@ -1,6 +1,6 @@
-//! What the log says of what the core has noticed.
+//! The log's sentences for what the core has noticed.
 //!
-//! It is apart because the sentences are for people, who want to know what to do.
+//! It is apart because the sentences are for people, and tell them what to do.
 
 use lager_topics::ArmProfileState;
 use lager_wire::Callsign;

@@ -1,12 +1,16 @@
 //! Whether the services are heard, as a pure state machine.
 //!
-//! A service that lives and is silent is stopped, hangs, or cannot be reached through the bus; the
-//! process that supervises it sees none of that. Silence is counted in small pieces and by two
-//! clocks. By the real one, since a service that hangs does so in real time; a piece counts no more
-//! than [`LONGEST_PIECE`], so what this process has slept through is nobody's silence. And by the
-//! robot's, since services speak by that: while an emulated body's clock stands still, or crawls,
-//! they have nothing to say; and comm and station have none of their own. Only an emulator that has not said a word yet has no such excuse: the
-//! clock is its own.
+//! A service that lives and is silent is stopped, hangs, or cannot be reached through the bus. The
+//! supervisor sees none of that. Silence is counted in small pieces and by two clocks.
+//!
+//! By the real clock, since a service that hangs does so in real time. A piece counts no more than
+//! [`LONGEST_PIECE`], so time during which this process slept is not counted as a service's
+//! silence.
+//!
+//! By the robot's clock, since services publish by that: while an emulated body's clock stands
+//! still, or crawls, they have nothing to publish. Comm and station are not listened for, because
+//! they publish nothing that says they live. An emulator that has not published anything yet is
+//! judged by the real clock alone, because the robot's clock comes from the emulator.
 
 use std::time::Duration;
 
@@ -78,7 +82,7 @@ impl Ears {
         }
     }
 
-    /// Looks at both clocks; who has been silent for too long is told once.
+    /// Looks at both clocks. A service that has been silent for too long is reported once.
     pub fn look(&mut self, real: Duration, robot: Duration) -> Vec<Silence> {
         let (real_before, robot_before) =
             self.looked.replace((real, robot)).unwrap_or((real, robot));

@@ -2,8 +2,9 @@
 //! of the process `lager stop` until the steering board reports that its motors are off.
 //!
 //! The robot is the simulated one in real time at 500 000 Bd, behind two ptys, with the services
-//! that `lager up` starts; somebody goes on driving it while it is stopped. The moment of the
-//! report is the bridge's: when it read the second report with wheels at rest after the standby.
+//! that `lager up` starts. A process goes on driving it while it is stopped. The moment of the
+//! report comes from the bridge: when it read the second report with wheels at rest after the
+//! standby.
 
 use std::fmt;
 use std::fs;

@@ -1,4 +1,4 @@
-//! What the words of the command line mean, where clap does not know it by itself: each reader
+//! What arguments of the command line mean, where clap does not know it by itself: each reader
 //! returns the value, or the sentence that refuses it.
 //!
 //! Whatever makes no sense is refused here, before a bus is opened, so that clap ends with its

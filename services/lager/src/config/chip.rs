@@ -1,9 +1,8 @@
 //! `[chip]`: the boards' real images in their emulator, and where these are found.
 //!
-//! The emulator is a program of its own, since what it is made of is GPL-3; nothing of this
-//! program is linked with it. It and the images are looked for beside this program, as an
-//! installation may have them, and in the source tree that this program or the current folder is
-//! in.
+//! The emulator is a separate program, because it contains GPL-3 code; nothing of this program is
+//! linked with it. The emulator and the images are looked for beside this program, as in an
+//! installation, and in the source tree of this program or of the current folder.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

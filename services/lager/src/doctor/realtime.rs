@@ -1,7 +1,8 @@
-//! What `lager doctor` finds out about real time: what `lager up` would be granted, tried for
-//! real, and what in this machine's settings makes reactions late.
+//! What `lager doctor` finds out about real time: it tries what `lager up` would be granted, and
+//! looks for settings of this machine that make reactions late.
 //!
-//! What was asked for and is refused is bad; what nobody asked for is at most a hint.
+//! An option that was asked for and is refused is bad. An option that was not asked for is at most
+//! a hint.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! What is asked of the kernel for real time, and what it answers when asked what is allowed.
 //!
-//! Apart because it has this crate's only `unsafe`, and because everything here acts on the
-//! calling thread or process at once: nothing here chooses, explains or forgives.
+//! It is apart because it has this crate's only `unsafe`, and because everything here acts on the
+//! calling thread or process at once. It chooses nothing and explains nothing.
 
 #![allow(
     unsafe_code,
@@ -93,7 +93,8 @@ pub fn try_lock(bytes: usize) -> io::Result<()> {
 }
 
 /// Raises the soft limit of `resource` to the hard one, which needs no right, and returns it;
-/// `None` is no limit. A soft limit is only a default: who asks for real time wants all he may have.
+/// `None` is no limit. A soft limit is only a default: who asks for real time wants all he may
+/// have.
 pub fn whole_limit(resource: Resource) -> Option<u64> {
     let limit = getrlimit(resource);
     if limit.current != limit.maximum {

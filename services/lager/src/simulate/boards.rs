@@ -1,5 +1,5 @@
-//! Boards that fall silent and boards that reset, in the middle of a mission: the bridge in this
-//! process does what the service does, because it is the same.
+//! Boards that fall silent and boards that reset, in the middle of a mission. The bridge in this
+//! process is the service's own code, so it reacts as the service does.
 
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! Whole missions with noise on the steering board's cable in the middle of turns.
 //!
-//! What the board reports is what dead reckoning lives on: without it nobody knows how far a turn
-//! has gone. The mission must be delivered all the same. Of 1 200 that is not so in four (371, 588,
-//! 666, 1280): three stand with a lost line, because a turn ended askew, beside the tape.
+//! Dead reckoning lives on what the board reports: without reports nothing says how far a turn has
+//! gone. The mission must be delivered all the same. Four of 1 200 are not (371, 588, 666, 1280):
+//! three of them stand with a lost line, because a turn ended askew, beside the tape.
 
 use std::time::Duration;
 
@@ -30,7 +30,7 @@ const ONCE_LOST: [u64; 13] = [
 enum Trouble {
     /// Of 1000 bytes to the Pi so many arrive wrong.
     ToPi(u64),
-    /// So many bytes that nobody sent reach the board each millisecond.
+    /// This many bytes of noise reach the board each millisecond.
     ToBoard(u64),
     /// Both at once.
     Both(u64, u64),

@@ -1,5 +1,5 @@
-//! The commands about orders: `fetch` and `queue`. What the robot has understood is read from
-//! `mission/queue`, never assumed.
+//! The commands about orders: `fetch` and `queue`. They read what the robot has understood from
+//! `mission/queue` and never assume it.
 
 use std::fmt::Write;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ const GLANCE: Duration = Duration::from_millis(50);
 impl Operator {
     /// `lager fetch`: ordered until logic shows that it took the order.
     pub fn fetch(&mut self, product: i32) -> Result<String> {
-        // It would wait, and the robot would drive off when somebody else changes the mode.
+        // The order would wait, and the robot would drive off when somebody else changes the mode.
         if self.health()?.mode.get() != Some(Mode::Autonomous) {
             bail!(
                 "the robot is in manual mode and fetches nothing; `lager mode autonomous` changes that, and `lager queue add` orders for later"
@@ -111,8 +111,8 @@ impl Operator {
         }
     }
 
-    /// Says one thing about the queue, once, since not all of them may be said twice, and waits until
-    /// logic shows the effect.
+    /// Gives one command about the queue, once, since not all of them may be repeated, and waits
+    /// until logic shows the effect.
     fn say_until(
         &self,
         kind: InputKind,

@@ -1,5 +1,5 @@
-//! The commands that do what a person's hands would do: `place` and `obstacle`. A simulated world
-//! is asked for it; on a real floor a person has done it, or looks for himself.
+//! The commands that do what a person's hands would do: `place` and `obstacle`. They ask a
+//! simulated world to do it; on a real floor a person has done it.
 
 use std::fmt::Write;
 

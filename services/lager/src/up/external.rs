@@ -11,8 +11,12 @@
 //! A station of its own shows a panel, unless the robot is headless: at 127.0.0.1:7410, or at a port
 //! that is free. Everybody on this machine may drive from there, so it answers this machine alone.
 //!
-//! The socket is opened here and handed to the station as its standard output, so the port stays the
-//! same over the death of a station, and whoever connects meanwhile waits for its successor.
+//! The socket is opened here and handed to the station as its standard output, so the port stays
+//! the same when a station dies, and a robot that connects meanwhile waits for its successor.
+//!
+//! Station and comm end after bridge and logic, and no process that moves the robot waits for them.
+//! They publish nothing that says they live, so nobody checks whether they hang: a robot that is
+//! driven through them stops then, any other goes on.
 
 use std::fs;
 use std::net::{SocketAddr, TcpListener};
@@ -24,7 +28,7 @@ use crate::config::{Config, StationSection};
 use crate::runtime::RuntimeFolder;
 use crate::station;
 
-/// What was chosen, and what there is to tell of it.
+/// The choice, and what to tell people about it.
 #[derive(Debug)]
 pub struct External {
     /// Where a station of this robot's own listens.
@@ -108,7 +112,7 @@ fn station_for(config: &mut Config) -> Result<External> {
     })
 }
 
-/// Nobody can be talked to.
+/// There is no external computer.
 fn none(config: &mut Config, why: &anyhow::Error) -> External {
     config.station.wanted = false;
     External {

@@ -4,13 +4,14 @@
 //!            swept             joined the bus
 //!  attendant ------> the body ----------------> station, comm, bridge, logic
 //!     ^                                             │
-//!     +-- all ended, in order; what is left swept <-+ the bus is damaged (three times, then the end)
+//!     +-- all ended, in order; what is left swept <-+ the bus is damaged (at most three times)
 //! ```
-//! One service that ends or falls silent is started again by itself. The bus counts as damaged where
-//! that would not help: a process that hangs before its first word, or whose memory was gone, has met
-//! shared files that the next one would meet too.
+//! A service that ends or falls silent is restarted alone. The bus counts as damaged where that
+//! would not help: a process that hangs before its first sample, or whose memory was gone, has met
+//! shared files that its successor would meet too.
 //!
-//! Every wait here is one sleep that children, signals and the attendant end ([`Supervisor::wait`]).
+//! Every wait here is one sleep that children, signals and the attendant end
+//! ([`Supervisor::wait`]).
 
 use std::os::fd::{AsFd, OwnedFd};
 use std::process::Stdio;
@@ -231,7 +232,7 @@ impl Robot {
         self.begin()
     }
 
-    /// Ends everything on a bus that does not hold, and has it cleared.
+    /// Ends everything on a damaged bus, and has it cleared.
     fn leave(&mut self) {
         self.stop(HASTE);
         self.enter(Stage::Sweeping);
@@ -311,7 +312,7 @@ impl Robot {
             Word::Swept if self.stage == Stage::Sweeping => {
                 self.enter(Stage::Joining);
                 if let Some(body) = self.config.body.service() {
-                    // After a new start there is no world to go on with: nobody keeps it.
+                    // After a new start there is no world to resume: no process keeps it.
                     self.start(body, false);
                 }
             }
@@ -335,7 +336,7 @@ impl Robot {
         self.figures.take(pulse);
         self.attendant.joined |= pulse.robot_time.is_some();
         if self.attendant.joined && self.stage == Stage::Joining {
-            // What has lived before goes on where it was, or stands if nobody knows where.
+            // A service that has run before resumes, or stands if its state is lost.
             let resume = self.resets.have_been();
             // What talks goes first, so that it ends after what moves the robot.
             if self.external.listener.is_some() {
@@ -351,8 +352,8 @@ impl Robot {
         }
     }
 
-    /// A service lives and is not heard. One that was heard before hangs, and its successor may do
-    /// better; one that has not said a word does not get onto the bus.
+    /// A service lives and is silent. If it was heard before, it hangs, and its successor may do
+    /// better. If it was never heard, it cannot get onto the bus.
     fn take_silence(&mut self, silence: Silence) -> Option<String> {
         let service = silence.service;
         if self.supervisor.process(service) != Some(silence.pid) {
@@ -399,7 +400,7 @@ impl Robot {
     fn look_at_attendant(&mut self) -> Option<String> {
         let now = Instant::now();
         let attendant = &mut self.attendant;
-        // What this process has slept through is not the attendant's silence.
+        // Time during which this process slept is not the attendant's silence.
         attendant.silent += (now - attendant.looked).min(LOOK * 2);
         attendant.looked = now;
         self.supervisor.process(Service::Attendant)?;

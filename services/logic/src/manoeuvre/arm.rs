@@ -7,8 +7,8 @@
 //!              +----------------- aim elsewhere, five times ---------+----------> Failed
 //! ```
 //!
-//! The robot stands while the arm works. How far it has come is published, so that a successor goes
-//! on with the same attempt; a move that may have been made is made again.
+//! The robot stands while the arm works. Its progress is published, so that a successor goes on
+//! with the same attempt; it repeats a move that may already have been made.
 
 use lager_topics::{FailureKind, Finish};
 use lager_wire::{ArmCommand, ArmProfile, Command};
@@ -21,7 +21,8 @@ use crate::arm::{ArmSeen, BASE, ELBOW, SHOULDER};
 const NEAR: i32 = 2;
 /// Steps for one joint after which something must be wrong with the arm.
 const MOST_STEPS: u16 = 400;
-/// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either side.
+/// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either
+/// side.
 const AIMS: [i16; 5] = [0, 21, -21, 42, -42];
 /// Where the claw is around goods that stand as they should, 250 mm ahead of the axle.
 const REACH_ELBOW: u16 = 488;
@@ -62,8 +63,8 @@ static ELBOW_JOINT: Joint = Joint {
 };
 
 impl Joint {
-    /// The command that brings it nearer, `None` when it is there. A servo nobody has heard of yet
-    /// is not waited for: the first step makes it report.
+    /// The command that brings it nearer, `None` when it is there. A servo that has not reported
+    /// yet is not waited for: the first step makes it report.
     fn step_towards(&self, to: u16, arm: &ArmSeen) -> Option<ArmCommand> {
         let Some(position) = arm.position(self.servo) else {
             return Some(self.raise);

@@ -47,7 +47,7 @@ pub(crate) enum Until {
 /// What the floor promises on the way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ahead {
-    /// The edge; none on the way out, whose length nobody knows.
+    /// The edge; none on the way out, whose length is unknown.
     pub(crate) edge: Option<Edge>,
     /// Tape goes straight on at its end.
     pub(crate) goes_on: bool,
@@ -181,7 +181,7 @@ impl Follow {
         match judge(&edge, mark.sides, at_mm, tolerance) {
             Verdict::Node => {
                 if self.until == Until::Corner {
-                    // What the robot has measured itself teaches nothing of its wheels.
+                    // A way that the robot has measured itself teaches nothing about its wheels.
                     senses.odometer.forget_way();
                 }
                 senses.set_by_mark(edge.length_mm, config);
@@ -240,8 +240,8 @@ impl Follow {
         if self.step != Step::AtBar {
             return None;
         }
-        // A few frames may be noise, and goods let go of before the bar are not delivered. Those
-        // that made the mark do not say as well that the line has ended.
+        // A few frames may be noise, and goods that are released before the bar are not delivered.
+        // The frames that made up the mark do not count as the end of the line.
         self.bare = match is_no_line(state) {
             true => self.bare.saturating_add(1),
             false => 0,
@@ -273,7 +273,7 @@ impl Follow {
     }
 
     /// Whether the line has ended at the node where it should, and the node's mark may have passed
-    /// while nobody looked.
+    /// unseen.
     fn is_at_unseen_node(&self, state: LineState, senses: &Senses, config: &LogicConfig) -> bool {
         let may_be_unseen = self.watched.is_none() && !self.ahead.goes_on;
         let Some(edge) = self.sought().filter(|_| may_be_unseen) else {
@@ -324,11 +324,11 @@ impl Follow {
 
     /// Whether the corner's mark, on the way back, must have passed without being seen.
     ///
-    /// What was measured on the way out is worth less than the mark: wheels that differ are faster
-    /// round a bend to one side than to the other, and the way back is up to a quarter longer. The
-    /// sensors are that far behind the corner before the axle has come to it only on a short way;
-    /// there the robot may still be beside its line after the turn, and pass beside the mark. Where
-    /// the mark may have passed while nobody looked, what was measured counts at once.
+    /// The length measured on the way out is less reliable than the mark: wheels that differ are
+    /// faster round a bend to one side than to the other, and the way back is up to a quarter
+    /// longer. Only on a short way are the sensors that far behind the corner before the axle has
+    /// come to it; there the robot may still be beside its line after the turn, and pass beside the
+    /// mark. Where the mark may have passed unseen, the measured length counts at once.
     fn is_behind_unseen_corner(
         &self,
         length_mm: f32,

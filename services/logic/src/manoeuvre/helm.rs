@@ -1,5 +1,5 @@
-//! What every manoeuvre works with: what the robot senses of the floor and of itself, and the ways to
-//! say something.
+//! What every manoeuvre uses: what the robot senses of the floor and of itself, and the means to
+//! report.
 
 use core::time::Duration;
 

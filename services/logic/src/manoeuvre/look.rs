@@ -1,5 +1,5 @@
-//! Standing before a way and looking whether it is open, by distances that are younger than the last
-//! turn (L6).
+//! Standing before a way and looking whether it is open, by distances that are younger than the
+//! last turn (L6).
 //!
 //! ```text
 //!   none, or one from before the turn's end ---> stand and wait
@@ -12,13 +12,13 @@ use core::time::Duration;
 use super::helm::Helm;
 use super::outcome::Outcome;
 
-/// Age at which a distance says nothing of what is ahead now.
+/// Age from which a distance says nothing of what is ahead now.
 const STALE: Duration = Duration::from_millis(150);
 
 /// A look at the way ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Look {
-    /// What is nearer than this blocks the way, in cm.
+    /// A thing that is nearer than this blocks the way, in cm.
     limit_cm: u8,
     /// For how long it must be nearer.
     patience: Duration,

@@ -8,9 +8,9 @@
 //!                          +---> the command it needs now
 //! ```
 //!
-//! A manoeuvre knows the line, its marks and the odometer. It never knows what it is good for: that
-//! is the mission's. A new one is a variant here, with its arms, and a place where the mission
-//! begins it.
+//! A manoeuvre knows the line, its marks and the odometer. It does not know its purpose: only the
+//! mission does. A new manoeuvre is a variant here, with its match arms, and a place in the mission
+//! that begins it.
 
 mod arm;
 mod follow;
@@ -52,9 +52,9 @@ pub(crate) enum Manoeuvre {
     Turn(Turn),
     /// It backs away from the cross bar, far enough to turn round.
     BackUp,
-    /// It backs up until the odometer reads so many mm: to the node that it has just left, as a turn
-    /// so near to it would end on the tape that crosses there; or away from what stands so close
-    /// behind the node that a corner of the body would touch it in the turn.
+    /// It backs up until the odometer reads so many mm: to the node that it has just left, as a
+    /// turn so near to it would end on the tape that crosses there; or away from what stands so
+    /// close behind the node that a corner of the body would touch it in the turn.
     Retreat(f32),
     /// It moves the arm.
     Arm(ArmSequence),
@@ -63,8 +63,8 @@ pub(crate) enum Manoeuvre {
 }
 
 /// Turns towards the mark, as far as dead reckoning knows where that is, and on until tape is in
-/// sight. If that is the edge's own, it turns back from there; on the edge's tape once more, it has
-/// missed the mark, and ends looking along the edge.
+/// sight. If that tape is the edge's own, it turns back from there. If it meets the edge's tape
+/// once more, it has missed the mark, and ends looking along the edge.
 ///
 /// The sensors may reach no more than the mark's end, and come to rest beside it. So a turn that
 /// begins and ends near where the mark must be has met it: only tape ends a turn so early.
@@ -264,7 +264,7 @@ impl Manoeuvre {
         self.line().map_or(Step::Seeking, |follow| follow.step)
     }
 
-    /// Whether it is there to turn the wheels.
+    /// Whether it turns the wheels.
     pub(crate) fn turns_wheels(&self) -> bool {
         !matches!(self, Self::Stand | Self::Look(_) | Self::Arm(_))
     }
@@ -279,7 +279,7 @@ impl Manoeuvre {
         }
     }
 
-    /// The board was not heard and is heard again: a turn may have come to its end, or to none.
+    /// The board is heard again after a silence: a turn may have ended, or not.
     pub(crate) fn hear_again(&mut self) {
         match self {
             Self::Turn(turn) => (turn.pause, turn.tries) = (Pause::Wanted, 0),

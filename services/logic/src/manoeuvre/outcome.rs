@@ -1,4 +1,4 @@
-//! What a manoeuvre has come to: all that the mission hears of it.
+//! How a manoeuvre has ended: all that the mission learns of it.
 
 use lager_topics::FailureKind;
 
@@ -7,7 +7,7 @@ use lager_topics::FailureKind;
 pub(crate) enum Outcome {
     /// As it should.
     Done,
-    /// As it should, as far as anybody can tell: it was cut short, or nobody heard the board.
+    /// As it should, as far as can be known: it was cut short, or the board was not heard.
     Interrupted,
     /// The station's mark did not come: the robot is at the node behind it, or has turned to the
     /// station and sees no tape.

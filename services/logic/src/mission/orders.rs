@@ -1,4 +1,5 @@
-//! From an order to its delivery: what is taken on, what happens at the goods, and the way from there.
+//! From an order to its delivery: what is taken on, what happens at the goods, and the way from
+//! there.
 
 use lager_topics::{
     EventKind, Failure, FailureKind, Goal, Order, OrderQueue, Phase, Thought, ThoughtKind,
@@ -66,7 +67,7 @@ impl Mission {
         }
     }
 
-    /// Who waited at home for a way to an order, and has none left, waits for no way.
+    /// A robot that waited at home for a way to an order, and has no order left, waits no more.
     fn need_no_way(&mut self) {
         if self.phase == Phase::WaitingForOrder && self.queue.waiting().is_empty() {
             self.failure = Failure::default();

@@ -45,7 +45,7 @@ impl Mission {
         let same_floor = map.same_floor(known);
         if !(idle || same_floor && same_station) {
             out.think(ThoughtKind::MapKept);
-            // Sent again it is looked at again.
+            // If it is sent again it is judged again.
             self.published = WarehouseMap::default();
             return false;
         }
@@ -140,7 +140,7 @@ impl Mission {
         true
     }
 
-    /// A way is blocked or open now. Whether that lets the robot go on which had none.
+    /// A way is blocked or open now. Returns whether a robot that had no way can go on.
     pub(crate) fn take_way(&mut self, block: Block, open: bool, out: &mut Output) -> bool {
         let Some(map) = &self.map else { return false };
         let Block { node, heading, .. } = block;
@@ -216,7 +216,7 @@ impl Mission {
         )
     }
 
-    /// What it is called that there is no way.
+    /// The failure that means "no way".
     pub(super) fn no_way(&self) -> FailureKind {
         match self.tries {
             0 => FailureKind::NoWay,
@@ -232,8 +232,8 @@ impl Mission {
         }
     }
 
-    /// Tries the ways again that it has found blocked, if it stands for want of one and found the
-    /// last of them long ago. Whether it goes on.
+    /// Tries the ways again that it has found blocked, if it stands because it has no way and found
+    /// the last block long ago. Returns whether it goes on.
     pub(crate) fn try_again(&mut self, out: &mut Output) -> bool {
         if !matches!(self.phase, Phase::Stuck | Phase::Picking) || !self.waits_for_way() {
             return false;

@@ -36,8 +36,8 @@ impl Navigator {
                 }
             }
             News::Unheard if one_shot && self.active => self.manoeuvre.interrupt(),
-            // A setpoint ends by a stop, a lease that ran out or a board that restarted. It is
-            // given anew, but not faster than the bridge can answer.
+            // A setpoint ends by a stop, a lapsed lease or a restarted board. It is given again,
+            // but not faster than the bridge can answer.
             News::Ended(_) | News::Unheard => {
                 if self.active
                     && self

@@ -10,10 +10,10 @@
 //! It joins three things that do not know each other: the mission (what to do next), the manoeuvre
 //! (line, marks and way) and what keeps the robot standing all the same.
 //!
-//! The state is a handful of plain values, nearly all of them in the published status, because
-//! the process may be killed at any moment and the next one must end the mission. The order in
-//! force follows from the state and is never state itself: [`Navigator::handle`] changes the
-//! state and then settles what the order must be, once.
+//! The state is a handful of plain values. Nearly all of them are in the published status, because
+//! the process may be killed at any moment and its successor must finish the mission. The order in
+//! force follows from the state and is not itself state: [`Navigator::handle`] changes the state
+//! and then computes the order, once.
 //!
 //! **Invariant:** nothing here reads a clock, allocates, or knows of the bus.
 
@@ -66,8 +66,8 @@ pub struct Navigator {
     steady: Steady,
 }
 
-/// What of the status changes with a frame, a report or a tick without a new manoeuvre: compared
-/// with what it was after the input before.
+/// The parts of the status that change with a frame, a report or a tick without a new manoeuvre:
+/// compared with their values after the input before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Steady {
     order_id: u32,
@@ -101,7 +101,7 @@ impl Navigator {
         }
     }
 
-    /// A navigator in the place of one that nobody kept the state of: the robot may be anywhere.
+    /// A navigator whose predecessor left no state: the robot may be anywhere.
     pub fn lost(config: LogicConfig) -> Self {
         let mut navigator = Self::new(config);
         navigator.mission.lose_place();
@@ -188,8 +188,7 @@ impl Navigator {
         }
     }
 
-    /// Takes a line frame: what has come under the sensors and how far the axle has come are one
-    /// decision.
+    /// Takes a line frame. The mark under the sensors and the way of the axle are judged together.
     fn line(&mut self, now: Duration, state: LineState, out: &mut Output) -> Option<Outcome> {
         self.frames = self.frames.wrapping_add(1);
         let seen_before = self.senses.sight.is_some();
@@ -202,7 +201,7 @@ impl Navigator {
             return self.steer(now, out, Manoeuvre::go_on);
         }
         if self.mission.map.is_none() {
-            // A successor that is not introduced yet; the mark is judged when it is.
+            // A successor that has no map yet; the mark is judged when it has.
             self.senses.marks.hold(state);
             return self.steer(now, out, Manoeuvre::go_on);
         }
@@ -289,7 +288,7 @@ impl Navigator {
         }
     }
 
-    /// Begins what had to wait: the ways that were blocked are tried again, or the next order is.
+    /// Begins what had to wait: tries the blocked ways again, or begins the next order.
     fn begin_what_waits(&mut self, now: Duration, out: &mut Output) {
         if self.active && self.mission.try_again(out) {
             self.begin(now, out);
@@ -359,8 +358,8 @@ impl Navigator {
         }
     }
 
-    /// The orders may go out (again): a setpoint from before has ended by now, while a turn or a
-    /// drop from before is only given again once the bridge has told how it ended.
+    /// The orders may go out (again). A setpoint from before has ended by now. A turn or a drop
+    /// from before is given again only when the bridge has reported how it ended.
     fn begin_to_speak(&mut self, now: Duration) {
         self.command.listen_from(now);
         if !self.command.command().is_one_shot() {

@@ -1,8 +1,9 @@
 //! The state on its way out to `nav/status`, and back into a navigator after a restart.
 //!
 //! What is not in the status is either told again by others (map, mode), or begins anew without
-//! harm (which line state was seen last, how long the robot has stood). The ways that are blocked
-//! and the orders that wait are published beside it.
+//! harm (which line state was seen last, how long the robot has stood). A mark that ends before a
+//! successor has its map is judged when the map is there. The blocked ways and the waiting orders
+//! are published beside the status.
 
 use lager_topics::{BlockedWays, Hold, Mode, NavigatorStatus, Order, OrderQueue, Remedy};
 use lager_wire::{Command, WheelCommand};
@@ -61,7 +62,7 @@ impl Navigator {
         status
     }
 
-    /// What would end that it stands, if anything has to.
+    /// The remedy: what would make a standing robot go on, if a person has to act.
     fn remedy(&self) -> Remedy {
         let hold = self.steady.hold;
         match self.mission.failure.remedy.get() {
@@ -76,7 +77,7 @@ impl Navigator {
     /// Goes on from the last status of a navigator that was killed.
     ///
     /// The robot moved on until the lease of its order ended; that way is added. A status that
-    /// makes no sense (a foreign writer's) is as good as none: the robot may be anywhere.
+    /// makes no sense (a foreign writer's) counts as none: the robot may be anywhere.
     pub fn resume(
         config: LogicConfig,
         status: &NavigatorStatus,

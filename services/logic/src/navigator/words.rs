@@ -10,8 +10,8 @@ use crate::manoeuvre::{Manoeuvre, Outcome, STANDBY};
 use crate::node::Node;
 use crate::output::Output;
 
-/// Way of the wheels in manual mode, in mm, after which the known position is worth nothing.
-/// Rolling out after the change of mode is less.
+/// Way of the wheels in manual mode, in mm, after which the known position is useless. The robot
+/// rolls less far than this after a change of mode.
 const DISPLACED_MM: f32 = 15.0;
 
 impl Navigator {

@@ -1,5 +1,5 @@
-//! What keeps a robot standing that would drive: a silent board, an arm that is not where it is
-//! carried, an empty claw, a low battery, and that nobody knows where it is.
+//! What keeps a robot standing that would drive: a silent board, an arm that is not in the carry
+//! pose, an empty claw, a low battery, an unknown place.
 
 use std::time::Duration;
 

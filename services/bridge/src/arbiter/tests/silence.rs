@@ -1,4 +1,4 @@
-//! A steering board that does not report: nobody moves what nobody sees.
+//! A steering board that does not report: no order may move anything.
 
 use super::*;
 
