@@ -28,6 +28,12 @@ impl BridgeCore {
                 self.arbiter.set_mode(mode);
                 Answered(Outcome::Done)
             }
+            // It releases the stop that its asker knew of and none that was set after he asked.
+            (Some(AskKind::Resume), _)
+                if self.stop.is_some_and(|stop| stop.at_ns() > ask.issued_ns) =>
+            {
+                Answered(Outcome::Refused)
+            }
             (Some(AskKind::Resume), _) => {
                 self.due.release = true;
                 Asked::Releasing

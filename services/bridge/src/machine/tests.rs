@@ -188,3 +188,27 @@ fn what_the_last_stage_of_a_turn_finds_out_is_told_in_that_turn() {
     }
     panic!("the board never answered, and nobody was told");
 }
+
+#[test]
+fn a_release_that_was_asked_for_before_a_stop_does_not_end_it() {
+    let mut core = core();
+    core.stop(Stop::new(Role::Operator, StopCause::Ordered, at(2_000).ns));
+    turn(&mut core, 2_000);
+    let resume = |millis| Ask {
+        kind: AskKind::Resume.into(),
+        issued_ns: at(millis).ns,
+        lifetime_ms: 500,
+        ..Ask::default()
+    };
+    core.ask(at(2_001), &resume(1_999));
+    let did = turn(&mut core, 2_001);
+    assert!(!did.contains(&("release", None)), "{did:?}");
+    let answer = core.answer().expect("an answer");
+    assert_eq!(
+        (answer.outcome.get(), answer.stopped),
+        (Some(Outcome::Refused), 1)
+    );
+    core.ask(at(2_002), &resume(2_002));
+    let did = turn(&mut core, 2_002);
+    assert!(did.contains(&("release", None)), "{did:?}");
+}
