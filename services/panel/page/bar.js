@@ -112,7 +112,9 @@ export class Bar {
     const stopped = robot?.state.stopped === "1";
     resume.hidden = !stopped;
     if (stopped) {
-      put(resume, `${say("resume")} · ${say("stopped", span(Date.now() - (robot.stoppedSince ?? Date.now())))}`);
+      const since = robot.stoppedSince;
+      const stopped = since === null ? say("stopped_before") : say("stopped", span(Date.now() - since));
+      put(resume, `${say("resume")} · ${stopped}`);
       const moves = Number(robot.state.left_duty) || Number(robot.state.right_duty);
       resume.disabled = !this.link.mayDrive || Boolean(moves);
     } else if (this.wasStopped) {

@@ -168,7 +168,8 @@ export class Link extends EventTarget {
     const now = performance.now();
     if (word === "state") {
       const state = fields(rest);
-      if (state.stopped === "1" && robot.state.stopped !== "1") robot.stoppedSince = Date.now();
+      // Of a stop that is older than this page nobody here knows the age.
+      if (state.stopped === "1" && robot.state.stopped === "0") robot.stoppedSince = Date.now();
       if (state.stopped !== "1") robot.stoppedSince = null;
       robot.state = state;
       robot.stated = now;

@@ -9,7 +9,11 @@ const BODY = { half: 90, front: 170, rear: 90 };
 /** How long a robot takes to glide to a new pose, in ms. */
 const GLIDE_MS = 100;
 /** How far the ends of the warehouse are from the view's edge, in mm. */
-const MARGIN = 350;
+const MARGIN = 250;
+/** The bends of the way out in degrees, to the left; what lies before the first one and the bar, in mm. */
+const BENDS = { left: [90], right: [-90], s: [45, -45] };
+const STRAIGHT = 200;
+const BAR = 300;
 const SIDES = { left: [-1, 0], up: [0, 1], right: [1, 0], down: [0, -1] };
 
 /** An element of SVG with attributes. */
@@ -79,15 +83,34 @@ export class WarehouseMap {
     make("line", { class: "tape", x1: at(x1), y1: -at(y1), x2: at(x2), y2: -at(y2) }, this.floor);
   }
 
-  /** The way out of the delivery corner, and the bar at its end. */
+  /** The way out of the delivery corner, and the bar at its end, as the warehouse's file has them. */
   exit() {
+    const { curve = "straight", length_cm = 80, radius_cm = 30 } = this.warehouse.exit ?? {};
     const [x, y] = this.warehouse.delivery;
-    const away = x === 0 ? -1 : 1;
-    const length = 300;
-    const from = [x * this.side, -y * this.side];
-    const to = from[0] + away * length;
-    make("line", { class: "tape exit", x1: from[0], y1: from[1], x2: to, y2: from[1] }, this.floor);
-    make("line", { class: "bar", x1: to, y1: from[1] - 150, x2: to, y2: from[1] + 150 }, this.floor);
+    const arcs = (BENDS[curve] ?? []).map((degrees) => (degrees * Math.PI) / 180);
+    const radius = radius_cm * 10;
+    const bent = arcs.reduce((sum, arc) => sum + radius * Math.abs(arc), 0);
+    const first = arcs.length ? STRAIGHT : length_cm * 10;
+    let at = { x: x * this.side, y: y * this.side, heading: x === 0 ? Math.PI : 0 };
+    let path = `M${at.x} ${-at.y}`;
+    const go = (length) => {
+      at = { ...at, x: at.x + length * Math.cos(at.heading), y: at.y + length * Math.sin(at.heading) };
+      path += `L${at.x} ${-at.y}`;
+    };
+    go(first);
+    for (const arc of arcs) {
+      const side = Math.sign(arc);
+      const centre = at.heading + (side * Math.PI) / 2;
+      const [cx, cy] = [at.x + radius * Math.cos(centre), at.y + radius * Math.sin(centre)];
+      const end = centre + Math.PI + arc;
+      at = { x: cx + radius * Math.cos(end), y: cy + radius * Math.sin(end), heading: at.heading + arc };
+      path += `A${radius} ${radius} 0 0 ${side > 0 ? 0 : 1} ${at.x} ${-at.y}`;
+    }
+    if (arcs.length) go(length_cm * 10 - first - bent);
+    make("path", { class: "tape", d: path, fill: "none" }, this.floor);
+    const [dx, dy] = [Math.sin(at.heading) * BAR / 2, Math.cos(at.heading) * BAR / 2];
+    make("line", { class: "bar", x1: at.x + dx, y1: -at.y + dy, x2: at.x - dx, y2: -at.y - dy }, this.floor);
+    this.end = at;
   }
 
   /** A box in its square, at the side from which it is reached. */
@@ -186,7 +209,9 @@ export class WarehouseMap {
   fit() {
     if (!this.warehouse) return;
     const [width, height] = this.warehouse.size.map((squares) => squares * this.side);
-    this.view = [-MARGIN, -height - MARGIN, width + 2 * MARGIN, height + 2 * MARGIN];
+    const [left, right] = [Math.min(0, this.end.x), Math.max(width, this.end.x)];
+    const [low, high] = [Math.min(0, this.end.y), Math.max(height, this.end.y)];
+    this.view = [left - MARGIN, -high - MARGIN, right - left + 2 * MARGIN, high - low + 2 * MARGIN];
     this.stopFollowing?.();
     this.show();
   }
