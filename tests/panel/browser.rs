@@ -4,6 +4,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use lager_tests::wait_for;
@@ -24,7 +25,10 @@ impl Browser {
     /// # Panics
     /// When there is none: `tests/run` installs it.
     pub(crate) fn new() -> Self {
-        let profile = std::env::temp_dir().join(format!("lager-browser-{}", std::process::id()));
+        static BROWSERS: AtomicU32 = AtomicU32::new(0);
+        let number = BROWSERS.fetch_add(1, Ordering::Relaxed);
+        let profile = format!("lager-browser-{}-{number}", std::process::id());
+        let profile = std::env::temp_dir().join(profile);
         let mut command = Command::new("chromium");
         command
             .args([
@@ -207,6 +211,17 @@ impl Page {
         self.mouse("mouseMoved", at);
         self.mouse("mousePressed", at);
         self.mouse("mouseReleased", at);
+    }
+
+    /// Clicks at a place of the warehouse, in mm from node (0, 0).
+    pub(crate) fn click_at_mm(&mut self, right: f64, up: f64) {
+        let at = self.value(&format!(
+            "(() => {{ const map = document.querySelector('#map'); \
+             const at = new DOMPoint({right}, -{up}).matrixTransform(map.getScreenCTM()); \
+             return [at.x, at.y]; }})()"
+        ));
+        let at = (at[0].as_f64().expect("x"), at[1].as_f64().expect("y"));
+        self.click_at(at);
     }
 
     /// Puts a finger on an element, or takes it away (`touchStart`, `touchEnd`, `touchCancel`).

@@ -6,7 +6,9 @@ mod browser;
 use browser::{Browser, Page};
 use lager_ports::{Bus, Clock, Subscriber};
 use lager_tests::{Domain, Running, pid, wait_for};
-use lager_topics::{NavStatus, TruthPose};
+use lager_topics::{
+    Coded, FailureKind, Hold, Joint, NavStatus, Phase, Remedy, StopCause, ThoughtKind, TruthPose,
+};
 use rustix::process::{Signal, kill_process};
 
 /// A robot that is up with its panel, and what really happens.
@@ -122,6 +124,48 @@ impl Scene {
         drop((truth, bus, browser, up));
         domain.assert_clean();
     }
+}
+
+/// What the robot may tell is what the page has sentences for.
+#[test]
+fn every_name_that_a_robot_tells_has_its_sentence() {
+    let sentences = include_str!("../../services/panel/page/sentences.js");
+    let (_, english) = sentences.split_once("  en: {").expect("a table");
+    let (english, _) = english.split_once("  sv: {").expect("two");
+    let mut missing = Vec::new();
+    let mut look = |prefix: &str, variants: &mut dyn Iterator<Item = &str>| {
+        for variant in variants {
+            let key = format!("    {prefix}{}: \"", snake(variant));
+            if !english.contains(&key) {
+                missing.push(key);
+            }
+        }
+    };
+    look("thought", &mut names::<ThoughtKind>());
+    look("failure", &mut names::<FailureKind>());
+    look("remedy", &mut names::<Remedy>());
+    look("phase", &mut names::<Phase>());
+    look("hold", &mut names::<Hold>());
+    look("stop_cause", &mut names::<StopCause>());
+    look("joint", &mut names::<Joint>());
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+fn names<T: Coded>() -> impl Iterator<Item = &'static str> {
+    T::VARIANTS.iter().map(|(_, name)| *name)
+}
+
+/// `LineLost` as `_line_lost`.
+fn snake(name: &str) -> String {
+    name.chars()
+        .flat_map(|letter| {
+            let capital = letter.is_ascii_uppercase();
+            capital
+                .then_some('_')
+                .into_iter()
+                .chain([letter.to_ascii_lowercase()])
+        })
+        .collect()
 }
 
 #[test]
@@ -280,5 +324,40 @@ fn goods_are_queued_shown_and_delivered() {
     page.wait_until("document.querySelectorAll('#history li').length >= 1");
     drop((page, status));
     scene.wait_to_stand();
+    scene.end();
+}
+
+#[test]
+fn goods_and_obstacles_are_put_by_a_click_and_taken_back() {
+    let scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    let goods = "[...document.querySelectorAll('#goods option')].map(({ value }) => value).join()";
+    page.wait_until(&format!("{goods} === '1,2,3'"));
+
+    // While the warehouse is set up, a click in a square places goods at its nearest side.
+    page.click("#tab-setup");
+    page.click_at_mm(250.0, 420.0);
+    page.wait_until(&format!("{goods} === '1,2,3,4'"));
+    let placed = "(() => { const line = [...document.querySelectorAll('#products tr')].at(-1); \
+                  return [...line.querySelectorAll('input, select')].map(({ value }) => value).join(); })()";
+    page.wait_until(&format!("{placed} === '4,,0,0,up'"));
+    page.click("#undo");
+    page.wait_until(&format!("{goods} === '1,2,3'"));
+
+    // What cannot be is said beside it, and nothing is changed.
+    page.value(
+        "(() => { const field = document.querySelector('#goods-string'); field.value = '7,1,0,4'; \
+         field.dispatchEvent(new Event('change')); })()",
+    );
+    page.wait_for("#setup-said", "7,1,0,4");
+    assert_eq!(page.value(goods), "1,2,3");
+
+    // Otherwise a click on a way puts something there.
+    page.click("#tab-missions");
+    page.click_at_mm(750.0, 1_000.0);
+    page.wait_for("#map-said", "obstacle put");
+    page.click("#map-undo");
+    page.wait_for("#map-said", "obstacle taken away");
+    drop(page);
     scene.end();
 }

@@ -73,6 +73,7 @@
 //!                                      took at most so many microseconds
 //! truth <int> <int> <int> <prodid>     of a simulated robot: x and y in mm, heading in degrees,
 //!                                      what it holds or `-`
+//! thinks {<key>=<value>}               the `thought` that follows, in values; see `Thinks`
 //! thought <text>                       as in the document
 //!
 //! <event> ::= in_position | getting_item | item_delivered | next_node | refused
@@ -106,14 +107,18 @@
 //! );
 //! ```
 
+mod fields;
 mod hello;
 mod listed;
 mod order;
 mod report;
 mod state;
+mod thinks;
 
+pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
 pub use listed::{Edge, Listed, Queued};
 pub use order::{Action, ActionError, LeaseMs, Mode, Order, Put};
 pub use report::{Event, EventKind, Latency, Report, Truth};
-pub use state::{Degrees, Servos, State};
+pub use state::State;
+pub use thinks::Thinks;

@@ -5,12 +5,13 @@
 //! behind a slow one.
 
 use lager_lines::extension::{
-    Degrees, Edge, Event, EventKind, Latency, Listed, Mode, Queued, Report, Servos, State, Truth,
+    Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Queued, Report, Servos, State,
+    Thinks, Truth,
 };
 use lager_lines::{Coord, Name, ProductId, Text};
 use lager_topics::{
-    BlockedWays, BoardHealth, Hold, LineFrame, Mode as BusMode, OrderQueue, PathLatency, Phase,
-    Route, Tag, Truth as BusTruth,
+    BlockedWays, BoardHealth, Coded, Failure, LineFrame, Mode as BusMode, OrderQueue, PathLatency,
+    Remedy, Route, Tag, Thought, Truth as BusTruth,
 };
 use lager_wire::{Binary, LineBits};
 
@@ -89,7 +90,8 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }
-        | Report::Event(_) => None,
+        | Report::Event(_)
+        | Report::Thinks(_) => None,
     }
 }
 
@@ -129,6 +131,29 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
     }))
 }
 
+/// A thought in values. Those that its kind does not fill mean nothing.
+pub(crate) fn thinks(thought: &Thought) -> Report {
+    let failure = Some(thought.failure).filter(|failure| !failure.is_none());
+    Report::Thinks(Box::new(Thinks {
+        kind: word(thought.kind),
+        node: Some(Coord {
+            x: thought.x,
+            y: thought.y,
+        }),
+        looks: thought.heading.get().map(direction),
+        joint: word(thought.joint),
+        sides: Some(thought.sides),
+        product: ProductId::new(thought.product),
+        expected: Some(thought.expected),
+        seen: Some(thought.seen),
+        failure: failure.and_then(|failure| word(failure.kind)),
+        failure_node: failure.map(|Failure { x, y, .. }| Coord { x, y }),
+        failure_expected: failure.map(|failure| failure.expected),
+        failure_seen: failure.map(|failure| failure.seen),
+        remedy: failure.and_then(|failure| word(failure.remedy)),
+    }))
+}
+
 fn state(now: Moment, known: &Known) -> State {
     let mut state = State {
         time_ms: u64::try_from(now.robot.as_millis()).ok(),
@@ -137,6 +162,7 @@ fn state(now: Moment, known: &Known) -> State {
         ..State::default()
     };
     put_health(&mut state, known);
+    put_stop(&mut state, now, known);
     put_place(&mut state, known);
     put_mission(&mut state, known);
     put_boards(&mut state, known);
@@ -152,12 +178,32 @@ fn put_health(state: &mut State, known: &Known) {
     state.steering_lost = Some(health.steering.lost_total);
     let missed = known.status.map_or(0, |status| status.frames_lost);
     state.bus_lost = Some(health.bus_lost.saturating_add(missed));
+    // Those that were never set are not known.
+    state.gain_p = u8::try_from(health.gain_p).ok();
+    state.gain_d = u8::try_from(health.gain_d).ok();
+}
+
+fn put_stop(state: &mut State, now: Moment, known: &Known) {
+    let Some(health) = known.health.as_ref().filter(|health| health.stopped != 0) else {
+        return;
+    };
+    state.stop_cause = word(health.stop_cause);
+    state.stop_by = word(health.stop_origin);
+    let at = Some(health.stopped_at_ns).filter(|at| *at != 0);
+    state.stop_age_ms = at.map(|at| now.ns.saturating_sub(at) / 1_000_000);
 }
 
 fn put_place(state: &mut State, known: &Known) {
     let Some(status) = &known.status else { return };
-    state.phase = status.phase.get().and_then(phase_name);
-    state.hold = status.hold.get().and_then(hold_name);
+    state.phase = word(status.phase);
+    state.hold = word(status.hold);
+    let remedy = Some(status.remedy).filter(|remedy| *remedy != Remedy::None);
+    state.remedy = remedy.and_then(word);
+    if !status.failure.is_none() {
+        state.failure = word(status.failure.kind);
+        state.failure_expected = Some(status.failure.expected);
+        state.failure_seen = Some(status.failure.seen);
+    }
     let by_hand = known.health.map_or(0, |health| health.driven_by_hand);
     if !pose::is_known(status, by_hand) {
         return;
@@ -202,6 +248,8 @@ fn put_boards(state: &mut State, known: &Known) {
         state.right_duty = Some(report.right_duty);
         state.code = Some(Binary(report.code));
         state.servos = Some(Servos::new(report.servo_position.map(Some)));
+        state.loads = Some(Loads::new(report.servo_load));
+        state.servo_errors = Some(Binary(report.servo_errors));
         let battery = Some(report.battery_decivolts);
         state.battery_dv = battery.filter(|decivolts| *decivolts != 0);
     }
@@ -218,18 +266,10 @@ const fn mode(mode: BusMode) -> Mode {
     }
 }
 
-fn phase_name(phase: Phase) -> Option<Name> {
-    name(Tag::from(phase).to_string())
-}
-
-fn hold_name(hold: Hold) -> Option<Name> {
-    name(Tag::from(hold).to_string())
-}
-
 /// `WaitingForOrder` as `waiting_for_order`.
-fn name(variant: String) -> Option<Name> {
+fn word<T: Coded>(tag: Tag<T>) -> Option<Name> {
     let mut name = String::new();
-    for letter in variant.chars() {
+    for letter in tag.get()?.name().chars() {
         if letter.is_ascii_uppercase() && !name.is_empty() {
             name.push('_');
         }

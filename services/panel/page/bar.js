@@ -1,5 +1,6 @@
 // The first row: which robot, how fresh, who drives, what it does; and STOP, which never waits.
 
+import { crossing, failure, sentence } from "./sentences.js";
 import { say, span } from "./words.js";
 
 /** How long Resume is held, in ms. */
@@ -103,6 +104,7 @@ export class Bar {
 
   driverWords(robot) {
     if (!robot) return "";
+    if (!this.link.mayDrive && this.link.open) return say("viewer");
     if (robot.driver) return say("person", robot.driver === this.link.me ? `${robot.driver} ✓` : robot.driver);
     return robot.state.mode === "autonomous" ? say("station_drives") : say("nobody");
   }
@@ -113,8 +115,9 @@ export class Bar {
     resume.hidden = !stopped;
     if (stopped) {
       const since = robot.stoppedSince;
-      const stopped = since === null ? say("stopped_before") : say("stopped", span(Date.now() - since));
-      put(resume, `${say("resume")} · ${stopped}`);
+      const age = since === null ? "" : span(Date.now() - since);
+      const cause = sentence(`stop_cause_${robot.state.stop_cause}`);
+      put(resume, `${say("resume")} · ${say("stopped", age, cause ? `: ${cause}` : "")}`);
       const moves = Number(robot.state.left_duty) || Number(robot.state.right_duty);
       resume.disabled = !this.link.mayDrive || Boolean(moves);
     } else if (this.wasStopped) {
@@ -126,16 +129,16 @@ export class Bar {
 
 /** What a robot does, in words. */
 export function doing(robot) {
-  const phase = robot?.state.phase;
+  const { phase, next, product, hold, remedy } = robot?.state ?? {};
   if (!phase) return "";
-  const node = robot.state.next ? `(${robot.state.next})` : "";
-  const words = [say(`phase_${phase}`, node)];
-  if (robot.state.product !== undefined) words.push(say("fetches", robot.state.product));
-  if (robot.state.hold && robot.state.hold !== "none") words.push(say("hold", robot.state.hold));
+  const words = [sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase];
+  if (product !== undefined) words.push(say("fetches", product));
+  if (hold !== "none") words.push(sentence(`hold_${hold}`));
   for (const board of ["sensor", "steering"]) {
     if (robot.state[`${board}_up`] === "0") words.push(say("board_lost", board));
   }
-  return words.join(", ");
+  const why = failure({ ...robot.state, failure_node: robot.state.node });
+  return [words.filter(Boolean).join(", "), why, sentence(`remedy_${remedy}`)].filter(Boolean).join(". ");
 }
 
 /** Changes a text only where it is another one: a live region would say it again. */

@@ -42,8 +42,12 @@ class Robot {
     this.blocked = new Map();
     this.queue = [];
     this.events = [];
+    /** The values of the thought that comes next. */
+    this.thinks = null;
     this.history = [];
     this.past = [];
+    /** States heard in all. */
+    this.total = 0;
     this.stoppedSince = null;
   }
 
@@ -99,14 +103,16 @@ export class Link extends EventTarget {
     };
   }
 
-  /** Gives an order; resolves to {done}, {stopped: ms} or {refused: reason}. */
+  /**
+   * Gives an order, to one robot or, with `null`, to the station; resolves to {done}, {stopped: ms}
+   * or {refused: reason}.
+   */
   ask(verb, robot, rest = "") {
     const number = ++this.number;
     if (!this.open || this.socket.readyState !== WebSocket.OPEN) {
       return Promise.resolve({ refused: "lost" });
     }
-    const words = [verb, robot, number, rest].filter((word) => word !== "" && word !== null);
-    this.socket.send(words.join(" "));
+    this.socket.send([verb, robot, number, rest].filter((word) => word !== "" && word !== null).join(" "));
     return new Promise((settle) => this.waiting.set(String(number), settle));
   }
 
@@ -168,9 +174,7 @@ export class Link extends EventTarget {
     const now = performance.now();
     if (word === "state") {
       const state = fields(rest);
-      // Of a stop that is older than this page nobody here knows the age.
-      if (state.stopped === "1" && robot.state.stopped === "0") robot.stoppedSince = Date.now();
-      if (state.stopped !== "1") robot.stoppedSince = null;
+      robot.stoppedSince = state.stop_age_ms === undefined ? null : Date.now() - Number(state.stop_age_ms);
       robot.state = state;
       robot.stated = now;
       remember(robot, now);
@@ -195,8 +199,13 @@ export class Link extends EventTarget {
       const [count, p50, p90, p99] = rest.map(Number);
       // Without a command measured there is no new figure.
       if (count > 0) robot.latency = { p50, p90, p99 };
+    } else if (word === "thinks") {
+      robot.thinks = fields(rest);
     } else if (word === "event" || word === "thought") {
-      const entry = { at: Date.now(), kind: word, words: rest };
+      // A thought's values come right before it.
+      const values = word === "thought" ? robot.thinks : null;
+      robot.thinks = null;
+      const entry = { at: Date.now(), kind: word, words: rest, values };
       robot.events.push(entry);
       if (robot.events.length > 1_000) robot.events.shift();
       this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
@@ -220,6 +229,7 @@ function pairs(list, word, index) {
 
 /** Keeps what the strips and the trail show. */
 function remember(robot, now) {
+  robot.total += 1;
   const { state } = robot;
   const figure = (key) => (state[key] === undefined ? null : Number(state[key]));
   robot.past.push({

@@ -2,6 +2,7 @@
 
 import { say } from "./words.js";
 import { fill, item } from "./missions.js";
+import { crossing, thought } from "./sentences.js";
 
 export class Log {
   constructor(parts, robot) {
@@ -12,8 +13,8 @@ export class Log {
 
   draw(robot) {
     const wanted = this.parts.filter.value.toLowerCase();
-    const lines = (robot?.events ?? []).map(sentence).filter((line) => line.toLowerCase().includes(wanted));
-    fill(this.parts.entries, lines.slice(-200).reverse(), (line) => item(line));
+    const lines = (robot?.events ?? []).map(line).filter((text) => text.toLowerCase().includes(wanted));
+    fill(this.parts.entries, lines.slice(-200).reverse(), (text) => item(text));
   }
 
   save() {
@@ -30,10 +31,10 @@ export class Log {
   }
 }
 
-/** One event as a sentence with its time. */
-function sentence({ at, kind, words }) {
+/** One entry as a sentence with its time. */
+function line({ at, kind, words, values }) {
   const time = new Date(at).toLocaleTimeString();
-  if (kind === "thought") return `${time}  ${words.join(" ")}`;
-  const [what, x, y, , product, ...text] = words;
-  return [`${time} `, say(`event_${what}`, product, `(${x},${y})`), ...text].join(" ");
+  if (kind === "thought") return `${time}  ${(values && thought(values)) ?? words.join(" ")}`;
+  const [what, x, y, , product] = words;
+  return `${time}  ${say(`event_${what}`, product, crossing(`${x},${y}`))}`;
 }

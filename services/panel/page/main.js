@@ -1,5 +1,6 @@
 // Puts the page together: one link, one robot in view, everything drawn once a picture.
 
+import { Arm } from "./arm.js";
 import { Bar } from "./bar.js";
 import { Driving } from "./drive.js";
 import { Link } from "./link.js";
@@ -23,15 +24,17 @@ const bar = new Bar(link, {
   link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
   stop: at("stop"), stopSaid: at("stop-said"), resume: at("resume"),
 }, robot);
-const map = new WarehouseMap(at("map"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") }, meetEdge);
+const map = new WarehouseMap(at("map"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
 const missions = new Missions(link, {
   fetch: at("fetch"), goods: at("goods"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"),
-  said: at("missions-said"), queue: at("queue"), arm: at("arm-drawing"), history: at("history"),
+  said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
+const arm = new Arm(at("arm-drawing"));
 const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm") }, robot, now);
 const setup = new Setup(link, {
   form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
-  gains: at("gains"), calibrate: at("calibrate"), boardSaid: at("board-said"),
+  saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
+  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), calibrate: at("calibrate"), boardSaid: at("board-said"),
 }, robot);
 const strips = new Strips(at("strips"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), save: at("save-csv") }, robot);
@@ -43,9 +46,16 @@ async function meetEdge([x, y, way]) {
   if (!shown?.truth || !link.mayDrive) return;
   const edge = `${x} ${y} ${way}`;
   const put = await link.act(shown, `obstacle put ${edge}`);
-  if (put.done) return tell("obstacle_put");
-  const taken = await link.act(shown, `obstacle take ${edge}`);
-  tell(...(taken.done ? ["obstacle_taken"] : ["refused", put.refused]));
+  const done = put.done ? "put" : (await link.act(shown, `obstacle take ${edge}`)).done ? "take" : null;
+  if (!done) return tell("refused", put.refused);
+  tell(done === "put" ? "obstacle_put" : "obstacle_taken");
+  const undo = at("map-undo");
+  undo.hidden = false;
+  undo.onclick = async () => {
+    undo.hidden = true;
+    const back = await link.act(shown, `obstacle ${done === "put" ? "take" : "put"} ${edge}`);
+    tell(...(back.done ? [done === "put" ? "obstacle_taken" : "obstacle_put"] : ["refused", back.refused]));
+  };
 }
 
 function tell(...words) {
@@ -119,20 +129,35 @@ link.addEventListener("warehouse", () => {
 link.addEventListener("link", words);
 words();
 
+/** What moves is drawn some thirty times a second, all else ten times: a strip's pixel is a third of a second. */
+const PICTURE_MS = 25;
+const REST_MS = 100;
+let drawn = -Infinity;
+
 function picture() {
-  const shown = robot();
+  setTimeout(() => requestAnimationFrame(picture), PICTURE_MS);
   const time = now();
+  const shown = robot();
+  driving.pads();
+  map.move(shown, time);
+  if (time - drawn >= REST_MS) {
+    drawn = time;
+    drawRest(shown, time);
+  }
+}
+
+function drawRest(shown, time) {
   bar.draw(shown, time);
   map.draw(shown, time);
   missions.draw(shown);
+  arm.draw(shown);
   strips.draw(shown, time);
+  setup.draw(shown);
   log.draw(shown);
-  driving.pads();
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];
   put(at("control"), say(...seat));
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
-  requestAnimationFrame(picture);
 }
 requestAnimationFrame(picture);

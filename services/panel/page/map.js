@@ -26,9 +26,12 @@ export function make(name, attributes = {}, parent = null, text = null) {
 }
 
 export class WarehouseMap {
-  constructor(svg, tools, act) {
+  /** `act` is told of an edge that was clicked; while `placesGoods()`, `place` of a square's side. */
+  constructor(svg, tools, act, placesGoods, place) {
     this.svg = svg;
     this.act = act;
+    this.placesGoods = placesGoods;
+    this.place = place;
     this.warehouse = null;
     this.side = 400;
     this.view = [0, 0, 1000, 1000];
@@ -125,8 +128,8 @@ export class WarehouseMap {
     make("text", { x, y: y + 28 }, box, String(id));
   }
 
-  /** Shows a robot as it is now; called before each picture. */
-  draw(robot, now) {
+  /** Moves a robot to where it is now; called before each picture. */
+  move(robot, now) {
     const known = robot && robot.state.x_mm !== undefined;
     for (const part of [this.body, this.trail, this.route, this.next]) part.toggleAttribute("hidden", !known);
     this.ghost.toggleAttribute("hidden", !robot?.truth);
@@ -137,11 +140,16 @@ export class WarehouseMap {
     const pose = this.glide(aim, now, stale);
     place(this.body, pose);
     if (robot.truth) place(this.ghost, robot.truth);
+    if (this.following) this.centre(pose.x, -pose.y);
+  }
+
+  /** Draws what changes now and then: ways and goods. */
+  draw(robot, now) {
+    if (robot?.state.x_mm === undefined || !this.shown) return;
     this.drawTrail(robot, now);
-    this.drawWay(robot, pose);
+    this.drawWay(robot, this.shown);
     this.drawBlocked(robot);
     this.markGoods(robot);
-    if (this.following) this.centre(pose.x, -pose.y);
   }
 
   /** Where to draw between two poses. */
@@ -161,23 +169,28 @@ export class WarehouseMap {
   }
 
   drawTrail(robot, now) {
+    // One point in four, and nothing new between them.
+    const count = Math.floor(robot.total / 4);
+    if (this.trailed === count && this.trailOf === robot) return;
+    this.trailed = count;
+    this.trailOf = robot;
     const points = [];
     for (let i = robot.past.length - 1; i >= 0; i -= 4) {
       const { at, x, y } = robot.past[i];
       if (now - at > SPAN_MS) break;
       if (x !== null && y !== null) points.push(`${x},${-y}`);
     }
-    this.trail.setAttribute("points", points.join(" "));
+    set(this.trail, "points", points.join(" "));
   }
 
   drawWay(robot, pose) {
     const nodes = robot.route.map(([x, y]) => `${x * this.side},${-y * this.side}`);
-    this.route.setAttribute("points", [`${pose.x},${-pose.y}`, ...nodes].join(" "));
+    set(this.route, "points", [`${Math.round(pose.x)},${Math.round(-pose.y)}`, ...nodes].join(" "));
     const next = robot.state.next?.split(",").map(Number);
     this.next.toggleAttribute("hidden", !next);
     if (next) {
-      this.next.setAttribute("cx", next[0] * this.side);
-      this.next.setAttribute("cy", -next[1] * this.side);
+      set(this.next, "cx", next[0] * this.side);
+      set(this.next, "cy", -next[1] * this.side);
     }
   }
 
@@ -202,7 +215,7 @@ export class WarehouseMap {
     for (const box of this.goods.children) {
       const id = box.dataset.product;
       const state = robot.state.product === id ? "wanted" : robot.queue.some(({ product }) => product === id) ? "queued" : "";
-      box.setAttribute("class", `good ${state}`);
+      set(box, "class", `good ${state}`);
     }
   }
 
@@ -270,6 +283,14 @@ export class WarehouseMap {
     }, { passive: false });
   }
 
+  /** The side of a square that a click is nearest to gets goods. */
+  meetSquare([gx, gy]) {
+    const square = [Math.floor(gx), Math.floor(gy)];
+    const [width, height] = this.warehouse.size;
+    if (square[0] < 0 || square[1] < 0 || square[0] >= width || square[1] >= height) return;
+    this.place(square, nearestSide(gx - square[0], gy - square[1]));
+  }
+
   /** The edge of the grid that a click is near to, if it is near to one. */
   meetEdge([px, py]) {
     if (!this.warehouse) return;
@@ -277,11 +298,18 @@ export class WarehouseMap {
     const [width, height] = this.warehouse.size;
     const [nx, ny] = [Math.round(gx), Math.round(gy)];
     const near = 0.15;
+    if (this.placesGoods()) return this.meetSquare([gx, gy]);
     let edge = null;
     if (Math.abs(gy - ny) < near && gx > 0 && gx < width) edge = [Math.floor(gx), ny, "right"];
     else if (Math.abs(gx - nx) < near && gy > 0 && gy < height) edge = [nx, Math.floor(gy), "up"];
     if (edge && edge[0] >= 0 && edge[1] >= 0 && edge[0] <= width && edge[1] <= height) this.act(edge);
   }
+}
+
+/** The side of its square that a point is nearest to. */
+function nearestSide(x, y) {
+  const ways = { left: x, right: 1 - x, down: y, up: 1 - y };
+  return Object.keys(ways).reduce((best, side) => (ways[side] < ways[best] ? side : best));
 }
 
 function robotShape(svg, name) {
@@ -295,5 +323,10 @@ function robotShape(svg, name) {
 }
 
 function place(group, { x, y, heading }) {
-  group.setAttribute("transform", `translate(${x} ${-y}) rotate(${heading})`);
+  set(group, "transform", `translate(${x.toFixed(1)} ${(-y).toFixed(1)}) rotate(${heading.toFixed(1)})`);
+}
+
+/** Changes an attribute only where it is another one: what is as it was is not painted again. */
+function set(element, name, value) {
+  if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
 }

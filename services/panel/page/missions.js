@@ -1,7 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
 import { say, span } from "./words.js";
-import { make } from "./map.js";
 import { put } from "./bar.js";
 
 export class Missions {
@@ -48,7 +47,6 @@ export class Missions {
 
   draw(robot) {
     this.drawQueue(robot);
-    this.drawArm(robot);
     const lines = (robot?.history ?? []).map(({ product, at, took }) => `${new Date(at).toLocaleTimeString()}  ${product}  ${took}`);
     fill(this.parts.history, lines, (line) => item(line));
   }
@@ -71,23 +69,6 @@ export class Missions {
       queue.append(line);
     }
     if (!queue.children.length) queue.append(item(say("queue_empty")));
-  }
-
-  /** The servos as bars: where each of them stands. */
-  drawArm(robot) {
-    const { arm } = this.parts;
-    const positions = robot?.state.servos?.split(",") ?? [];
-    if (this.shownArm === String(positions)) return;
-    this.shownArm = String(positions);
-    arm.replaceChildren();
-    positions.forEach((position, index) => {
-      const y = 12 + index * 17;
-      make("text", { x: 0, y: y + 5 }, arm, `${say("servo")} ${index + 1}`);
-      make("rect", { class: "track", x: 70, y: y - 4, width: 180, height: 8 }, arm);
-      if (position === "-") return;
-      make("circle", { cx: 70 + (Number(position) / 1023) * 180, cy: y, r: 6 }, arm);
-      make("text", { x: 260, y: y + 5 }, arm, position);
-    });
   }
 }
 

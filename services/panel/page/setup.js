@@ -12,8 +12,14 @@ export class Setup {
     this.robot = robot;
     this.past = [];
     this.dirty = false;
+    /** The gains in force, those before the last change, and whether others are being typed. */
+    this.gainsNow = null;
+    this.gainsBefore = null;
+    this.gainsTyped = false;
     const { form } = parts;
-    form.addEventListener("input", () => {
+    form.addEventListener("input", ({ target }) => {
+      // What is pasted or loaded replaces the form's content as a whole.
+      if (!target.name) return;
       this.dirty = true;
       this.corners();
       this.check();
@@ -28,15 +34,87 @@ export class Setup {
       this.check();
     };
     parts.undo.onclick = () => this.past.length && this.save(this.past.pop(), false);
+    parts.saveFile.onclick = () => this.saveFile();
+    parts.loadFile.onchange = () => parts.loadFile.files.length && this.loadFile(parts.loadFile.files[0]);
+    parts.mapString.onchange = () => parts.mapString.value && this.pasteMap(parts.mapString.value);
+    parts.goodsString.onchange = () => parts.goodsString.value && this.pasteGoods(parts.goodsString.value);
     parts.gains.addEventListener("submit", (event) => {
       event.preventDefault();
       const { p, d } = parts.gains.elements;
-      this.act(`gains ${p.value} ${d.value}`, "saved");
+      this.setGains([p.value, d.value]);
     });
+    parts.gains.addEventListener("input", () => (this.gainsTyped = true));
+    parts.gainsBack.onclick = () => this.setGains(this.gainsBefore);
     parts.calibrate.onclick = () => {
       put(parts.boardSaid, say("calibrating"));
       this.act("calibrate", "calibrated");
     };
+  }
+
+  /** Puts goods at the side of a square, with the next number. */
+  place(square, side) {
+    this.dirty = true;
+    this.row({ id: this.freeNumber(), square, side });
+    return this.save(this.read());
+  }
+
+  saveFile() {
+    const blob = new Blob([JSON.stringify(this.read(), null, 2)], { type: "application/json" });
+    const anchor = document.createElement("a");
+    anchor.href = URL.createObjectURL(blob);
+    anchor.download = "warehouse.json";
+    anchor.click();
+    setTimeout(() => URL.revokeObjectURL(anchor.href), 1_000);
+  }
+
+  async loadFile(file) {
+    try {
+      const { size, side_length_cm, delivery = [0, 0], product = [], ...rest } = JSON.parse(await file.text());
+      if (!Array.isArray(size) || size.length !== 2 || !Array.isArray(product)) throw new Error(say("no_warehouse"));
+      await this.save({ ...rest, size, side_length_cm, delivery, product });
+    } catch (error) {
+      put(this.parts.said, `${file.name}: ${error.message}`);
+    }
+  }
+
+  /** The map as the document writes it, "X,Y,x,y" (M1). */
+  pasteMap(text) {
+    const numbers = text.split(",").map((word) => (/^\s*\d+\s*$/.test(word) ? Number(word) : NaN));
+    if (numbers.length !== 4 || numbers.some(Number.isNaN)) return put(this.parts.said, say("map_string_how"));
+    const [width, height, x, y] = numbers;
+    this.save({ ...this.read(), size: [width, height], delivery: [x, y] });
+  }
+
+  /** The goods as the document writes them, "v,x,y,s;...", s clockwise from left (M3). */
+  pasteGoods(text) {
+    const product = [];
+    for (const part of text.split(";").filter((part) => part.trim())) {
+      const words = part.split(",").map((word) => word.trim());
+      const numbers = words.map((word) => (/^\d+$/.test(word) ? Number(word) : NaN));
+      const side = SIDES[numbers[3]];
+      if (words.length !== 4 || numbers.some(Number.isNaN) || !side) return put(this.parts.said, say("goods_string_how", part));
+      product.push({ id: numbers[0], square: [numbers[1], numbers[2]], side });
+    }
+    this.save({ ...this.read(), product });
+  }
+
+  /** The gains in force stand in the fields, unless somebody types there. */
+  draw(robot) {
+    const { gain_p: p, gain_d: d } = robot?.state ?? {};
+    this.gainsNow = p === undefined || d === undefined ? null : [p, d];
+    put(this.parts.gainsNow, this.gainsNow ? say("gains_now", p, d) : say("gains_unset"));
+    put(this.parts.gainsBack, this.gainsBefore ? say("put_back", ...this.gainsBefore) : "");
+    this.parts.gainsBack.hidden = !this.gainsBefore;
+    if (this.gainsTyped || !this.gainsNow) return;
+    const { elements } = this.parts.gains;
+    [elements.p.value, elements.d.value] = this.gainsNow;
+  }
+
+  async setGains([p, d]) {
+    const before = this.gainsNow;
+    if (!(await this.act(`gains ${p} ${d}`, "saved"))) return;
+    this.gainsBefore = before;
+    this.gainsTyped = false;
   }
 
   async act(action, done) {
@@ -45,13 +123,14 @@ export class Setup {
     const answer = await this.link.act(robot, action);
     const why = answer.refused === "lost" ? say("lost") : answer.refused;
     put(this.parts.boardSaid, answer.refused ? say("refused", why) : say(done));
+    return !answer.refused;
   }
 
   async save(warehouse, undoable = true) {
     const why = this.wrong(warehouse);
     if (why) return put(this.parts.said, why);
     const before = this.link.warehouse;
-    const answer = await this.link.ask("warehouse", JSON.stringify(warehouse), null);
+    const answer = await this.link.ask("warehouse", null, JSON.stringify(warehouse));
     if (answer.refused) return put(this.parts.said, answer.refused === "lost" ? say("lost") : answer.refused);
     if (undoable && before) this.past.push(before);
     this.dirty = false;

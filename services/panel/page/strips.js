@@ -69,18 +69,20 @@ export class Strips {
     keys.forEach((key, index) => {
       pen.strokeStyle = colours[index];
       pen.beginPath();
-      let drawing = false;
+      let column = null;
+      let level = null;
       for (const point of seen) {
         const value = point[key];
         if (value === null) {
-          drawing = false;
+          column = null;
           continue;
         }
-        const x = ((point.at - from) / SPAN_MS) * width;
-        const y = height - ((Math.min(top, Math.max(low, value)) - low) / (top - low)) * (height - 2) - 1;
-        if (drawing) pen.lineTo(x, y);
-        else pen.moveTo(x, y);
-        drawing = true;
+        const x = Math.round(((point.at - from) / SPAN_MS) * width);
+        const y = Math.round(height - ((Math.min(top, Math.max(low, value)) - low) / (top - low)) * (height - 2) - 1);
+        if (column === null) pen.moveTo(x, y);
+        else if (column !== x || level !== y) pen.lineTo(x, y);
+        column = x;
+        level = y;
       }
       pen.stroke();
     });

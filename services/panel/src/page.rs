@@ -8,6 +8,7 @@ const FILES: &[(&str, &str, &str)] = &[
         "text/css; charset=utf-8",
         include_str!("../page/style.css"),
     ),
+    ("/arm.js", SCRIPT, include_str!("../page/arm.js")),
     ("/bar.js", SCRIPT, include_str!("../page/bar.js")),
     ("/drive.js", SCRIPT, include_str!("../page/drive.js")),
     ("/link.js", SCRIPT, include_str!("../page/link.js")),
@@ -15,6 +16,13 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/main.js", SCRIPT, include_str!("../page/main.js")),
     ("/map.js", SCRIPT, include_str!("../page/map.js")),
     ("/missions.js", SCRIPT, include_str!("../page/missions.js")),
+    ("/screen", HTML, include_str!("../page/screen.html")),
+    ("/screen.js", SCRIPT, include_str!("../page/screen.js")),
+    (
+        "/sentences.js",
+        SCRIPT,
+        include_str!("../page/sentences.js"),
+    ),
     ("/setup.js", SCRIPT, include_str!("../page/setup.js")),
     ("/strips.js", SCRIPT, include_str!("../page/strips.js")),
     ("/words.js", SCRIPT, include_str!("../page/words.js")),
@@ -54,12 +62,10 @@ mod tests {
         let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/page")).unwrap();
         let there: BTreeSet<String> = folder
             .map(|entry| format!("/{}", entry.unwrap().file_name().to_string_lossy()))
-            .map(|name| {
-                if name == "/index.html" {
-                    "/".into()
-                } else {
-                    name
-                }
+            .map(|name| match name.as_str() {
+                "/index.html" => "/".into(),
+                "/screen.html" => "/screen".into(),
+                _ => name,
             })
             .collect();
         let known: BTreeSet<String> = FILES.iter().map(|(name, ..)| (*name).to_owned()).collect();
@@ -93,13 +99,19 @@ mod tests {
 
     #[test]
     fn both_languages_have_the_same_words() {
-        let (_, words) = file("/words.js").unwrap();
+        for name in ["/words.js", "/sentences.js"] {
+            same_words(name);
+        }
+    }
+
+    fn same_words(file: &str) {
+        let (_, words) = super::file(file).unwrap();
         let (english, rest) = words.split_once("  sv: {").unwrap();
         let (_, english) = english.split_once("  en: {").unwrap();
         let (swedish, _) = rest.split_once("\n};").unwrap();
         let (english, swedish) = (keys(english), keys(swedish));
         assert!(english.len() > 100, "{english:?}");
         let missing: Vec<_> = english.symmetric_difference(&swedish).collect();
-        assert!(missing.is_empty(), "{missing:?}");
+        assert!(missing.is_empty(), "{file}: {missing:?}");
     }
 }

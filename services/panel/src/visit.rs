@@ -222,6 +222,7 @@ impl Visit {
             let robot = news.robot;
             let line = match news.told {
                 Told::Event(event) => Report::Event(event).to_string(),
+                Told::Thinks(thinks) => Report::Thinks(thinks).to_string(),
                 Told::Thought(text) => format!("thought {text}"),
                 Told::Replied { .. } => continue,
             };

@@ -146,6 +146,10 @@ fn the_page_comes_with_what_keeps_others_out() {
         assert!(answer.contains(header), "{header}: {answer}");
     }
     assert_eq!(
+        status(&panel.ask("/screen", &[("Host", &panel.host())])),
+        200
+    );
+    assert_eq!(
         status(&panel.ask("/nothing", &[("Host", &panel.host())])),
         404
     );

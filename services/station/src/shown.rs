@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lager_lines::extension::{Edge, Event, Latency, Listed, Queued, Report, State, Truth};
+use lager_lines::extension::{Edge, Event, Latency, Listed, Queued, Report, State, Thinks, Truth};
 use lager_lines::{Coord, Text};
 
 /// A value that a robot has told, and when.
@@ -59,6 +59,8 @@ pub enum Reply {
 pub enum Told {
     /// Something has happened on a mission.
     Event(Event),
+    /// The thought that comes next, in values.
+    Thinks(Box<Thinks>),
     /// It has thought something.
     Thought(Text),
     /// It has answered the action or the stop with this number.
@@ -82,6 +84,7 @@ impl Shown {
             Report::Queue(value) => self.queue = Some(Seen { value, at }),
             Report::Latency(value) => self.latency = Some(Seen { value, at }),
             Report::Event(event) => return Some(Told::Event(event)),
+            Report::Thinks(thinks) => return Some(Told::Thinks(thinks)),
             Report::Done { number } => return replied(number, Reply::Done),
             Report::Refused { number, reason } => return replied(number, Reply::Refused(reason)),
             Report::Stopped { number, after_ms } => {

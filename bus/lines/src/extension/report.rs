@@ -2,9 +2,11 @@
 
 use core::fmt;
 
+use super::fields::Degrees;
 use super::listed::{Edge, Listed, Queued};
 use super::order::number;
-use super::state::{Degrees, State};
+use super::state::State;
+use super::thinks::Thinks;
 use crate::misread::Misread;
 use crate::reader::Reader;
 use crate::text::Text;
@@ -42,6 +44,8 @@ pub enum Report {
     Queue(Listed<Queued>),
     /// Something has happened.
     Event(Event),
+    /// The thought that comes next, in values.
+    Thinks(Box<Thinks>),
     /// How long it takes to react.
     Latency(Latency),
     /// Where a simulated robot really is.
@@ -163,6 +167,7 @@ impl Report {
                 })
             },
             "state" => |reader: &mut Reader<'_>| Ok(Self::State(Box::new(State::read(reader)?))),
+            "thinks" => |reader: &mut Reader<'_>| Ok(Self::Thinks(Box::new(Thinks::read(reader)?))),
             "route" => |reader: &mut Reader<'_>| Ok(Self::Route(Listed::<Coord>::read(reader)?)),
             "blocked" => |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Edge>::read(reader)?)),
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
@@ -261,6 +266,7 @@ impl fmt::Display for Report {
             Self::Blocked(ways) => write!(formatter, "blocked {ways}"),
             Self::Queue(orders) => write!(formatter, "queue {orders}"),
             Self::Event(event) => write!(formatter, "event {event}"),
+            Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),
             Self::Latency(latency) => write!(formatter, "latency {latency}"),
             Self::Truth(truth) => write!(formatter, "truth {truth}"),
         }

@@ -2,7 +2,8 @@
 
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Degrees, Edge, Hello, LeaseMs, Listed, Mode, Order, Queued, Report, Servos, State,
+    Action, Degrees, Edge, Hello, LeaseMs, Listed, Loads, Mode, Order, Queued, Report, Servos,
+    State,
 };
 use lager_lines::{Coord, Direction, Name, ProductId, to_line};
 use lager_wire::{Binary, LineBits};
@@ -114,6 +115,13 @@ fn the_fullest_state_fits_in_a_line() {
         hold: name(),
         mode: Some(Mode::Autonomous),
         stopped: Some(true),
+        stop_cause: name(),
+        stop_by: name(),
+        stop_age_ms: Some(u64::MAX),
+        failure: name(),
+        failure_expected: Some(i32::MIN),
+        failure_seen: Some(i32::MIN),
+        remedy: name(),
         order: Some(u32::MAX),
         product: ProductId::new(i32::MAX),
         delivered: Some(u32::MAX),
@@ -124,16 +132,32 @@ fn the_fullest_state_fits_in_a_line() {
         right_duty: Some(255),
         code: Some(Binary(255)),
         servos: Some(Servos::new([Some(1023); 8])),
+        loads: Some(Loads::new([-1023; 8])),
+        servo_errors: Some(Binary(255)),
         battery_dv: Some(255),
         sensor_up: Some(true),
         steering_up: Some(true),
         sensor_lost: Some(u32::MAX),
         steering_lost: Some(u32::MAX),
         bus_lost: Some(u64::MAX),
+        gain_p: Some(255),
+        gain_d: Some(255),
     };
     let line = to_line(&Report::State(Box::new(full.clone()))).expect("it fits");
     let read = Report::read(line.trim_end());
     assert_eq!(read, Some(Ok(Report::State(Box::new(full)))));
+}
+
+#[test]
+fn a_thought_is_told_in_values() {
+    let line = "thinks kind=node_passed node=2,1 seen=3";
+    let Some(Ok(Report::Thinks(thinks))) = Report::read(line) else {
+        panic!("a thought");
+    };
+    assert_eq!(thinks.kind, Name::new("node_passed").ok());
+    assert_eq!(thinks.node, Some(Coord { x: 2, y: 1 }));
+    assert_eq!(Report::Thinks(thinks).to_string(), line);
+    assert!(Report::read("thinks sides=256").is_some_and(|read| read.is_err()));
 }
 
 #[test]

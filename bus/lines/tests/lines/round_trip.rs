@@ -3,8 +3,8 @@
 use lager_lines::command::Wheels;
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Mode, Order, Put,
-    Queued, Report, Servos, State, Truth,
+    Action, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Loads, Mode, Order,
+    Put, Queued, Report, Servos, State, Thinks, Truth,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
@@ -149,10 +149,10 @@ prop_compose! {
         product in of(product_id()), delivered in of(any::<u32>()),
         sensor_up in of(any::<bool>()), steering_up in of(any::<bool>()),
         sensor_lost in of(any::<u32>()), steering_lost in of(any::<u32>()),
-        bus_lost in of(any::<u64>()),
+        bus_lost in of(any::<u64>()), gain_p in of(any::<u8>()), gain_d in of(any::<u8>()),
     ) -> State {
         State {
-            stopped, order, product, delivered, sensor_up, steering_up, sensor_lost, steering_lost,
+            gain_p, gain_d, stopped, order, product, delivered, sensor_up, steering_up, sensor_lost, steering_lost,
             bus_lost,
             ..place
         }
@@ -160,15 +160,44 @@ prop_compose! {
 }
 
 prop_compose! {
+    fn trouble()(
+        work in work(), stop_cause in of(name()), stop_by in of(name()),
+        stop_age_ms in of(any::<u64>()), failure in of(name()),
+        failure_expected in of(any::<i32>()), failure_seen in of(any::<i32>()),
+        remedy in of(name()),
+    ) -> State {
+        State {
+            stop_cause, stop_by, stop_age_ms, failure, failure_expected, failure_seen, remedy,
+            ..work
+        }
+    }
+}
+
+prop_compose! {
+    fn thinks()(
+        kind in of(name()), node in of(coord()), looks in of(direction()), joint in of(name()),
+        sides in of(any::<u8>()), product in of(product_id()), expected in of(any::<i32>()),
+        seen in of(any::<i32>()), failure in of(name()), remedy in of(name()),
+    ) -> Thinks {
+        Thinks {
+            kind, node, looks, joint, sides, product, expected, seen, failure, remedy,
+            ..Thinks::default()
+        }
+    }
+}
+
+prop_compose! {
     fn state()(
-        work in work(), bits in of(any::<u16>()), line_error in of(any::<i8>()),
+        work in trouble(), bits in of(any::<u16>()), line_error in of(any::<i8>()),
         distance_cm in of(any::<u8>()), left_duty in of(any::<u8>()),
         right_duty in of(any::<u8>()), code in of(any::<u8>()),
         servos in of(any::<[Option<u16>; 8]>()), battery_dv in of(any::<u8>()),
+        loads in of(any::<[i16; 8]>()), servo_errors in of(any::<u8>()),
     ) -> State {
         State {
             line_bits: bits.map(LineBits::new), line_error, distance_cm, left_duty, right_duty,
             code: code.map(Binary), servos: servos.map(Servos::new), battery_dv,
+            loads: loads.map(Loads::new), servo_errors: servo_errors.map(Binary),
             ..work
         }
     }
@@ -183,6 +212,7 @@ fn report() -> impl Strategy<Value = Report> {
         any::<u32>().prop_map(|number| Report::Done { number }),
         (any::<u32>(), text()).prop_map(|(number, reason)| Report::Refused { number, reason }),
         state().prop_map(|state| Report::State(Box::new(state))),
+        thinks().prop_map(|thinks| Report::Thinks(Box::new(thinks))),
         prop::collection::vec(coord(), many.clone())
             .prop_map(|all| Report::Route(Listed::<Coord>::new(&all))),
         prop::collection::vec(edge(), many.clone())

@@ -115,6 +115,9 @@ impl Conversation {
 
     /// A service has thought something.
     pub fn thought(&mut self, thought: &Thought) {
+        if self.is_extended {
+            self.say_if_up(Some(RobotLine::Report(telling::thinks(thought))));
+        }
         self.think(&thought.to_string());
     }
 

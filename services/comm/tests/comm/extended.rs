@@ -4,8 +4,8 @@ use lager_comm::Senses;
 use lager_topics::{
     Answer, AskKind, BlockedWay, BlockedWays, DistanceFrame, Event, EventKind, Failure,
     FailureKind, Finish, Heading, InputKind, LineFrame, MapProduct, Mode, NavigatorStatus, Order,
-    OrderQueue, Origin, Outcome, Phase, Refusal, SteeringReport, Truth, WaitingOrder, WarehouseMap,
-    WorldAnswer, WorldAskKind, WorldRefusal,
+    OrderQueue, Origin, Outcome, Phase, Refusal, Remedy, Role, SteeringReport, StopCause, Thought,
+    ThoughtKind, Truth, WaitingOrder, WarehouseMap, WorldAnswer, WorldAskKind, WorldRefusal,
 };
 
 use crate::robot::Robot;
@@ -205,6 +205,61 @@ fn events_are_told_with_their_reason() {
         said,
         ["event failed 3 1 4 7 I have been driven by hand, 30 mm"]
     );
+}
+
+#[test]
+fn a_thought_is_told_in_values_before_it_is_told_in_words() {
+    let mut robot = extended(Mode::Autonomous);
+    let mut thought = Thought::from(ThoughtKind::OrderRefused);
+    thought.product = 9;
+    thought.failure = Failure::new(FailureKind::UnknownProduct, (3, 1), 0, 9);
+    robot.conversation.thought(&thought);
+    assert_eq!(
+        robot.done(),
+        [
+            "thinks kind=order_refused node=0,0 looks=left joint=base sides=0 product=9 expected=0 \
+             seen=0 failure=unknown_product failure_node=3,1 failure_expected=0 failure_seen=9 \
+             remedy=map",
+            "thought I cannot fetch product 9: product 9 is not on my map.",
+        ]
+    );
+    // The document has words only.
+    let mut robot = Robot::connected(Mode::Autonomous);
+    robot.conversation.thought(&thought);
+    let said = robot.done();
+    assert!(said[0].starts_with("thought I cannot"), "{said:?}");
+}
+
+#[test]
+fn a_stop_and_a_failure_are_told_with_what_is_known_of_them() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.health.stopped = 1;
+    robot.health.stop_cause = StopCause::BoardResets.into();
+    robot.health.stop_origin = Role::Bridge.into();
+    robot.health.stopped_at_ns = robot.now.ns - 30_000_000;
+    robot.health.gain_p = 20;
+    robot.health.gain_d = 3;
+    robot.told();
+    robot.status(&NavigatorStatus {
+        phase: Phase::Stuck.into(),
+        failure: Failure::new(FailureKind::LineLost, (0, 0), 90, 120),
+        remedy: Remedy::Reset.into(),
+        ..NavigatorStatus::default()
+    });
+    robot.shown.clear();
+    pass(&mut robot, 100);
+    let state = robot.shown.iter().find(|line| line.starts_with("state "));
+    let state = state.expect("one in 50 ms");
+    let (_, age) = state.split_once(" stop_age_ms=").expect("its age");
+    let age: u64 = age.split(' ').next().unwrap().parse().unwrap();
+    assert!((30..=130).contains(&age), "{state}");
+    for field in [
+        " stopped=1 stop_cause=board_resets stop_by=bridge stop_age_ms=",
+        " failure=line_lost failure_expected=90 failure_seen=120 remedy=reset ",
+        " gain_p=20 gain_d=3",
+    ] {
+        assert!(state.contains(field), "{field}: {state}");
+    }
 }
 
 #[test]

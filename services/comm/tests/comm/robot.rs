@@ -13,7 +13,7 @@ use lager_topics::{
 /// The conversation and what it has done, as a reader sees it.
 pub(crate) struct Robot {
     pub(crate) conversation: Conversation,
-    now: Moment,
+    pub(crate) now: Moment,
     pub(crate) health: Health,
     pub(crate) map: Option<Box<WarehouseMap>>,
     pub(crate) ordered: Option<Order>,

@@ -1,0 +1,87 @@
+// The arm as its servos tell it: from the side how it reaches, from above where it points, and for
+// each joint where it stands, how hard it works, and the errors they have told.
+//
+// Lengths and angles are those of the simulator's world (firmware/plant/src/arm.rs); of another arm
+// the drawing shows the right joints bent the right way.
+
+import { make } from "./map.js";
+import { say } from "./words.js";
+
+/** Radians of one unit of position, and the middle of the range. */
+const UNIT = ((300 / 1_023) * Math.PI) / 180;
+const CENTRE = 512;
+/** In mm. */
+const SHOULDER_HEIGHT = 120;
+const UPPER_ARM = 150;
+const FOREARM = 150;
+/** The claw's position at which its jaws meet, and mm for each further unit. */
+const CLOSED = 210;
+const GAP = 80 / 302;
+/** Joint: its word, its servos by index. */
+const JOINTS = [
+  ["base", [0]], ["shoulder", [1, 2]], ["elbow", [3, 4]], ["wrist", [5]], ["rotation", [6]], ["claw", [7]],
+];
+/** What the bits of an AX-12's error byte mean, the lowest first. */
+const ERRORS = ["voltage", "angle", "heat", "range", "checksum", "overload", "instruction"];
+
+export class Arm {
+  constructor(svg) {
+    this.svg = svg;
+    this.shown = null;
+  }
+
+  draw(robot) {
+    const { servos = "", loads = "", servo_errors: errors = "" } = robot?.state ?? {};
+    const shown = [servos, loads, errors, document.documentElement.lang].join(" ");
+    if (this.shown === shown) return;
+    this.shown = shown;
+    this.svg.replaceChildren();
+    const positions = servos ? servos.split(",").map((text) => (text === "-" ? null : Number(text))) : [];
+    const load = loads.split(",").map(Number);
+    if (positions.length) {
+      this.fromTheSide(positions);
+      this.fromAbove(positions);
+    }
+    JOINTS.forEach(([word, indexes], line) => this.joint(line, word, indexes, positions, load));
+    const told = ERRORS.filter((_, bit) => errors.at(-1 - bit) === "1");
+    if (told.length) make("text", { class: "wrong", x: 0, y: 212 }, this.svg, `! ${told.map((word) => say(`servo_${word}`)).join(", ")}`);
+  }
+
+  fromTheSide(positions) {
+    const upper = Math.PI / 2 + angle(positions[1]);
+    const fore = upper - Math.PI / 2 + angle(positions[3]);
+    const side = make("g", { transform: "translate(60 100) scale(0.24 -0.24)" }, this.svg);
+    const elbow = [UPPER_ARM * Math.cos(upper), SHOULDER_HEIGHT + UPPER_ARM * Math.sin(upper)];
+    const claw = [elbow[0] + FOREARM * Math.cos(fore), elbow[1] + FOREARM * Math.sin(fore)];
+    make("path", { class: "ground", d: "M-240 0H360" }, side);
+    make("path", { class: "stand", d: `M0 0V${SHOULDER_HEIGHT}` }, side);
+    make("polyline", { class: "links", points: `0,${SHOULDER_HEIGHT} ${elbow} ${claw}` }, side);
+    for (const [cx, cy] of [[0, SHOULDER_HEIGHT], elbow, claw]) make("circle", { cx, cy, r: 14 }, side);
+  }
+
+  /** Where the base points, and how far the jaws are apart. */
+  fromAbove(positions) {
+    const degrees = (-angle(positions[0]) * 180) / Math.PI;
+    const gap = Math.max(0, ((positions[7] ?? CLOSED) - CLOSED) * GAP) / 2;
+    const above = make("g", { transform: `translate(220 88) rotate(${degrees.toFixed(1)})` }, this.svg);
+    make("circle", { class: "ground", r: 8 }, above);
+    make("path", { class: "links", d: "M0 0V-44" }, above);
+    const half = gap / 4 + 2;
+    make("path", { class: "links", d: `M${-half} -60V-46H${half}V-60` }, above);
+  }
+
+  joint(line, word, [index, ...others], positions, loads) {
+    const y = 116 + line * 15;
+    make("text", { x: 0, y: y + 4 }, this.svg, say(`servo_${word}`));
+    make("rect", { class: "track", x: 84, y: y - 3, width: 100, height: 6 }, this.svg);
+    const position = positions[index] ?? null;
+    if (position === null) return;
+    make("circle", { cx: 84 + (position / 1_023) * 100, cy: y, r: 5 }, this.svg);
+    make("text", { x: 192, y: y + 4 }, this.svg, String(position));
+    const load = Math.max(...[index, ...others].map((servo) => Math.abs(loads[servo] || 0)));
+    const bar = make("rect", { class: "load", x: 224, y: y - 3, width: (load / 1_023) * 70, height: 6 }, this.svg);
+    make("title", {}, bar, say("servo_load", Math.round((load / 1_023) * 100)));
+  }
+}
+
+const angle = (position) => ((position ?? CENTRE) - CENTRE) * UNIT;
