@@ -7,7 +7,8 @@ use browser::{Browser, Page};
 use lager_ports::{Bus, Clock, Subscriber};
 use lager_tests::{Domain, Running, pid, wait_for};
 use lager_topics::{
-    Coded, FailureKind, Hold, Joint, NavStatus, Phase, Remedy, StopCause, ThoughtKind, TruthPose,
+    Coded, FailureKind, Hold, Joint, LinkHealth, NavStatus, Phase, Remedy, StopCause, ThoughtKind,
+    TruthPose,
 };
 use rustix::process::{Signal, kill_process};
 
@@ -216,6 +217,23 @@ fn whoever_lets_go_whatever_way_the_robot_stands() {
     scene.wait_to_stand();
     scene.assert_stands();
 
+    // The arm moves a step for each press, not while the robot drives, and letting go leaves it be.
+    let shoulder = "document.querySelectorAll('#arm-drawing text')[3].textContent";
+    page.wait_until(&format!("Number({shoulder}) > 0"));
+    let before = page.value(shoulder);
+    scene.hold(&mut page, "ArrowUp");
+    page.key_down("s");
+    page.wait_for("#drive-said", "The robot drives");
+    page.key_up("s");
+    page.key_up("ArrowUp");
+    scene.wait_to_stand();
+    assert_eq!(page.value(shoulder), before);
+    page.key_down("s");
+    page.key_up("s");
+    wait_for("the shoulder to move", || {
+        (page.value(shoulder) != before).then_some(())
+    });
+
     // The whole station is gone while a key is held, and the page comes back to its successor.
     scene.hold(&mut page, "ArrowUp");
     let station = scene.up.service("station").expect("it runs");
@@ -302,10 +320,13 @@ fn two_people_do_not_drive_at_once_and_either_may_stop() {
 }
 
 #[test]
-fn goods_are_queued_shown_and_delivered() {
+fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     let mut scene = Scene::new(4.0, &[]);
     let mut page = scene.page();
     let mut status = scene.bus.subscriber::<NavStatus>().expect("a topic");
+    // On the short way to product 2, while the robot fetches product 1.
+    page.click_at_mm(0.0, 750.0);
+    page.wait_for("#map-said", "obstacle put");
     page.value("document.querySelector('#goods').value = '2'");
     page.click("#fetch button");
     wait_for("it to wait or to be under way", || {
@@ -317,13 +338,58 @@ fn goods_are_queued_shown_and_delivered() {
     wait_for("the picture to move", || {
         (page.value(place) != before).then_some(())
     });
+    page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
+
+    // A page that is loaded anew in the middle of a mission knows as much.
+    page.call("Page.reload", &serde_json::json!({}));
+    page.wait_for("#link", " ms");
+    page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
     wait_for("both to be delivered", || {
         let status = status.latest().expect("readable")?;
         (status.delivered == 2).then_some(())
     });
-    page.wait_until("document.querySelectorAll('#history li').length >= 1");
+    page.wait_until("document.querySelectorAll('#history li').length === 1");
     drop((page, status));
     scene.wait_to_stand();
+    scene.end();
+}
+
+#[test]
+fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
+    let scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    let station = scene.up.output();
+    let (_, rest) = station
+        .split_once("listens at ")
+        .expect("the station's address");
+    let address = rest.split_whitespace().next().expect("an address");
+    let second = scene
+        .domain
+        .start(&["--name", "r2", "up", "--headless", "--station", address]);
+    page.wait_until("document.querySelectorAll('#robot option').length === 2");
+    page.value(
+        "(() => { const list = document.querySelector('#robot'); list.value = 'r2'; \
+         list.dispatchEvent(new Event('change')); })()",
+    );
+    page.wait_for("#link", " ms");
+    page.click("#stop");
+    page.wait_for("#stop-said", "both boards stand");
+    let stopped = |name: &str| {
+        let mut health = scene
+            .domain
+            .observe(name, 1.0)
+            .subscriber::<LinkHealth>()
+            .expect("a topic");
+        wait_for("its health", || {
+            health
+                .latest()
+                .expect("readable")
+                .map(|health| health.stopped)
+        })
+    };
+    assert_eq!((stopped("r1"), stopped("r2")), (0, 1));
+    scene.domain.done(&["--name", "r2", "resume"]);
+    drop((page, second));
     scene.end();
 }
 
@@ -351,6 +417,27 @@ fn goods_and_obstacles_are_put_by_a_click_and_taken_back() {
     );
     page.wait_for("#setup-said", "7,1,0,4");
     assert_eq!(page.value(goods), "1,2,3");
+
+    // Goods are described, too, and what is wrong is said as one types.
+    page.click("#add-product");
+    let type_in = |page: &mut Page, field: &str, value: &str| {
+        page.value(&format!(
+            "(() => {{ const field = [...document.querySelectorAll('#products [name={field}]')].at(-1); \
+             field.value = '{value}'; field.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()"
+        ));
+    };
+    type_in(&mut page, "id", "3");
+    page.wait_for("#setup-said", "two goods have the number 3");
+    type_in(&mut page, "id", "12");
+    type_in(&mut page, "x", "2");
+    page.wait_for("#setup-said", "goods 12 stand outside");
+    type_in(&mut page, "x", "1");
+    type_in(&mut page, "name", "nails");
+    page.click("#warehouse [type=submit]");
+    page.wait_until(&format!("{goods} === '1,2,3,12'"));
+    page.wait_until(
+        "document.querySelector('#map [data-product=\"12\"] title').textContent === '12 nails'",
+    );
 
     // Otherwise a click on a way puts something there.
     page.click("#tab-missions");
