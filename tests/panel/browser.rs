@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
+use data_encoding::BASE64;
 use lager_tests::wait_for;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
@@ -222,6 +223,23 @@ impl Page {
         ));
         let at = (at[0].as_f64().expect("x"), at[1].as_f64().expect("y"));
         self.click_at(at);
+    }
+
+    /// Shows the page in a theme and a size.
+    pub(crate) fn dress(&mut self, theme: &str, width: u32, height: u32, in_hand: bool) {
+        let size = json!({
+            "width": width, "height": height, "deviceScaleFactor": 1, "mobile": in_hand,
+        });
+        self.call("Emulation.setDeviceMetricsOverride", &size);
+        let theme = json!({ "features": [{ "name": "prefers-color-scheme", "value": theme }] });
+        self.call("Emulation.setEmulatedMedia", &theme);
+    }
+
+    /// What is seen now, as PNG.
+    pub(crate) fn picture(&mut self) -> Vec<u8> {
+        let said = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
+        let text = said["data"].as_str().expect("a picture");
+        BASE64.decode(text.as_bytes()).expect("base 64")
     }
 
     /// Puts a finger on an element, or takes it away (`touchStart`, `touchEnd`, `touchCancel`).

@@ -2,6 +2,8 @@
 //! the robot stands; a stop is confirmed; goods are fetched; two people do not drive at once.
 
 mod browser;
+mod figures;
+mod pictures;
 
 use browser::{Browser, Page};
 use lager_ports::{Bus, Clock, Subscriber};

@@ -64,7 +64,8 @@
 //! refused <number> <text>              why it was not done
 //! state {<key>=<value>}                20 times a second; see `State`
 //! route <int> {<coord>}                nodes of the way; how many there are, and the first of them
-//! blocked <int> {<edge>}               ways that are not taken, likewise
+//! blocked <int> {<edge> <int>}         ways that are not taken, likewise, and since when, in s of
+//!                                      the robot's clock
 //! queue <int> {<order> <prodid>}       what is fetched next, likewise
 //! event <event> <coord> <order> <prodid> [<text>]
 //!                                      at that node; `-` where there is no order or product
@@ -102,8 +103,8 @@
 //!
 //! assert_eq!(Order::read("stop 0x13"), Some(Ok(Order::Stop { number: None })));
 //! assert_eq!(
-//!     RobotLine::read("blocked 1 2 0 up").unwrap().to_string(),
-//!     "blocked 1 2 0 up",
+//!     RobotLine::read("blocked 1 2 0 up 81").unwrap().to_string(),
+//!     "blocked 1 2 0 up 81",
 //! );
 //! ```
 
@@ -117,7 +118,7 @@ mod thinks;
 
 pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
-pub use listed::{Edge, Listed, Queued};
+pub use listed::{Block, Edge, Listed, Queued};
 pub use order::{Action, ActionError, LeaseMs, Mode, Order, Put};
 pub use report::{Event, EventKind, Latency, Report, Truth};
 pub use state::State;

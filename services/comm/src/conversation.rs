@@ -203,10 +203,6 @@ impl Conversation {
         self.settle();
         self.keep_up(now);
         self.ask(now);
-        if self.is_up && self.is_extended {
-            let reports = self.telling.reports(now, &mut self.known);
-            self.actions.extend(reports.into_iter().map(Action::Show));
-        }
     }
 
     /// Lines have come, all that had arrived.

@@ -34,9 +34,6 @@ const LONGEST_WAIT: Duration = Duration::from_millis(10);
 /// How often the map is offered to late joiners, in real time.
 const MAP_PERIOD_NS: u64 = 20_000_000;
 
-/// How often what only the extension tells is looked at, in real time: as often as it is told.
-const SENSES_PERIOD_NS: u64 = 50_000_000;
-
 /// How long a predecessor's map is waited for, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
 
@@ -94,7 +91,6 @@ struct Shell {
     bridge: Asking<BridgeRequest>,
     world: Asking<WorldRequest>,
     map_ticked_ns: u64,
-    sensed_ns: u64,
     complaints: u32,
 }
 
@@ -133,7 +129,6 @@ impl Shell {
             inputs: bus.publisher()?,
             commands: bus.publisher()?,
             map_ticked_ns: 0,
-            sensed_ns: 0,
             complaints: 0,
         };
         if let Some(map) = kept {
@@ -193,10 +188,10 @@ impl Shell {
         while let Some(thought) = self.next(|shell| shell.thoughts.receive()) {
             self.conversation.thought(&thought);
         }
-        let is_due = now.ns.saturating_sub(self.sensed_ns) >= SENSES_PERIOD_NS;
-        if self.conversation.is_extended() && is_due {
-            self.sensed_ns = now.ns;
+        if self.conversation.is_to_tell(now) {
+            // As new as can be had.
             self.take_senses();
+            self.conversation.tell(now);
         }
     }
 

@@ -5,8 +5,8 @@
 //! behind a slow one.
 
 use lager_lines::extension::{
-    Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Queued, Report, Servos, State,
-    Thinks, Truth,
+    Block, Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Queued, Report, Servos,
+    State, Thinks, Truth,
 };
 use lager_lines::{Coord, Name, ProductId, Text};
 use lager_topics::{
@@ -41,11 +41,13 @@ impl Telling {
         *self = Self::default();
     }
 
+    /// Whether the state's time has come again.
+    pub(crate) const fn is_due(&self, now: Moment) -> bool {
+        now.ns >= self.next_ns
+    }
+
     /// What is to be told at this moment. What was measured is taken out of `known`.
     pub(crate) fn reports(&mut self, now: Moment, known: &mut Known) -> Vec<Report> {
-        if now.ns < self.next_ns {
-            return Vec::new();
-        }
         // A turn that comes late does not make those after it late.
         self.next_ns += PERIOD;
         if self.next_ns <= now.ns {
@@ -299,14 +301,17 @@ fn route(route: &Route) -> Report {
 }
 
 fn blocked(blocks: &BlockedWays) -> Report {
-    let edge = |way: &lager_topics::BlockedWay| {
-        Some(Edge {
-            node: Coord { x: way.x, y: way.y },
-            way: way.heading.get().map(direction)?,
+    let block = |way: &lager_topics::BlockedWay| {
+        Some(Block {
+            edge: Edge {
+                node: Coord { x: way.x, y: way.y },
+                way: way.heading.get().map(direction)?,
+            },
+            since_s: u32::try_from(way.since_ns / 1_000_000_000).unwrap_or(u32::MAX),
         })
     };
-    let ways: Vec<Edge> = blocks.ways().iter().filter_map(edge).collect();
-    Report::Blocked(Listed::<Edge>::new(&ways))
+    let ways: Vec<Block> = blocks.ways().iter().filter_map(block).collect();
+    Report::Blocked(Listed::<Block>::new(&ways))
 }
 
 fn queue(queue: &OrderQueue) -> Report {

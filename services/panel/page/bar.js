@@ -138,7 +138,9 @@ export function doing(robot) {
     if (robot.state[`${board}_up`] === "0") words.push(say("board_lost", board));
   }
   const why = failure({ ...robot.state, failure_node: robot.state.node });
-  return [words.filter(Boolean).join(", "), why, sentence(`remedy_${remedy}`)].filter(Boolean).join(". ");
+  // Stop and mode stand beside it.
+  const end = ["resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
+  return [words.filter(Boolean).join(", "), why, end].filter(Boolean).join(". ");
 }
 
 /** Changes a text only where it is another one: a live region would say it again. */

@@ -39,6 +39,7 @@ class Robot {
     this.truth = null;
     this.latency = null;
     this.route = [];
+    /** Ways that are not taken, and since when, in s of the robot's clock. */
     this.blocked = new Map();
     this.queue = [];
     this.events = [];
@@ -181,12 +182,10 @@ export class Link extends EventTarget {
     } else if (word === "route") {
       robot.route = rest.slice(1).reduce(pairs, []);
     } else if (word === "blocked") {
-      const seen = new Map();
-      for (let i = 1; i + 2 < rest.length; i += 3) {
-        const key = rest.slice(i, i + 3).join(" ");
-        seen.set(key, robot.blocked.get(key) ?? Date.now());
+      robot.blocked = new Map();
+      for (let i = 1; i + 3 < rest.length; i += 4) {
+        robot.blocked.set(rest.slice(i, i + 3).join(" "), Number(rest[i + 3]));
       }
-      robot.blocked = seen;
     } else if (word === "queue") {
       robot.queue = [];
       for (let i = 1; i + 1 < rest.length; i += 2) {

@@ -129,13 +129,22 @@ link.addEventListener("warehouse", () => {
 link.addEventListener("link", words);
 words();
 
-/** What moves is drawn some thirty times a second, all else ten times: a strip's pixel is a third of a second. */
+/** What moves is drawn for what is new and some thirty times a second, all else ten times. */
 const PICTURE_MS = 25;
 const REST_MS = 100;
 let drawn = -Infinity;
+let due = null;
+let timer = null;
+
+/** Draws in the browser's next picture. */
+function soon() {
+  clearTimeout(timer);
+  due ??= requestAnimationFrame(picture);
+}
 
 function picture() {
-  setTimeout(() => requestAnimationFrame(picture), PICTURE_MS);
+  due = null;
+  timer = setTimeout(soon, PICTURE_MS);
   const time = now();
   const shown = robot();
   driving.pads();
@@ -160,4 +169,5 @@ function drawRest(shown, time) {
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
-requestAnimationFrame(picture);
+link.addEventListener("news", soon);
+soon();

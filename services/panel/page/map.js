@@ -196,7 +196,7 @@ export class WarehouseMap {
 
   drawBlocked(robot) {
     const shown = [...robot.blocked.keys()].join(";");
-    const seconds = Math.floor(Date.now() / 1_000);
+    const seconds = Math.floor(Number(robot.state.time_ms) / 1_000);
     if (this.shownBlocked === shown && this.shownSecond === seconds) return;
     this.shownBlocked = shown;
     this.shownSecond = seconds;
@@ -207,7 +207,7 @@ export class WarehouseMap {
       const [cx, cy] = [(Number(x) + dx / 2) * this.side, -(Number(y) + dy / 2) * this.side];
       const cross = make("g", { class: "blocked" }, this.ways);
       make("path", { d: `M${cx - 60} ${cy - 60}l120 120m0 -120l-120 120` }, cross);
-      make("text", { x: cx + 75, y: cy - 40 }, cross, `${Math.floor((Date.now() - since) / 1_000)} s`);
+      make("text", { x: cx + 75, y: cy - 40 }, cross, `${Math.max(0, seconds - since)} s`);
     }
   }
 

@@ -36,6 +36,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use lager_station::Handle;
 use thiserror::Error;
+use tokio::sync::watch;
 
 pub use access::Tokens;
 use access::{Access, Rank};
@@ -79,6 +80,8 @@ pub struct Panel {
 #[derive(Debug)]
 pub(crate) struct Shared {
     pub(crate) handle: Handle,
+    /// What the station knows, as its revision; whoever tells a page waits for it.
+    pub(crate) changes: watch::Sender<u64>,
     access: Access,
     /// Numbers for the names of pages.
     pages: AtomicU32,
@@ -120,6 +123,7 @@ impl Panel {
             listener,
             shared: Arc::new(Shared {
                 handle,
+                changes: watch::Sender::new(0),
                 access: Access::new(address, tokens),
                 pages: AtomicU32::new(0),
                 open: AtomicUsize::new(0),
@@ -145,6 +149,26 @@ impl Panel {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()?;
+        let shared = Arc::clone(&self.shared);
+        let served = AtomicBool::new(true);
+        std::thread::scope(|scope| {
+            // The station's changes are waited for in a thread: it has no tasks.
+            scope.spawn(|| {
+                while served.load(Ordering::Relaxed) {
+                    let seen = *shared.changes.borrow();
+                    let revision = shared.handle.wait(seen, LOOK);
+                    if revision != seen {
+                        shared.changes.send_replace(revision);
+                    }
+                }
+            });
+            let result = self.serve(&runtime, end);
+            served.store(false, Ordering::Relaxed);
+            result
+        })
+    }
+
+    fn serve(self, runtime: &tokio::runtime::Runtime, end: &AtomicBool) -> Result<(), PanelError> {
         runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener)?;
             let router = Router::new()

@@ -9,14 +9,14 @@ use std::time::{Duration, Instant};
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::timeout;
 
 use crate::Place;
 use crate::access::Rank;
 use crate::visit::Visit;
 
-/// How often it is looked what there is to tell.
-const LOOK: Duration = Duration::from_millis(20);
+/// How often it is looked what there is to tell when the station tells nothing new.
+const LOOK: Duration = Duration::from_millis(100);
 /// How often a page is asked whether it is there.
 const PING: Duration = Duration::from_secs(1);
 /// How long a page may take to take a message in.
@@ -82,11 +82,10 @@ async fn tell(
     sink: &mut SplitSink<WebSocket, Message>,
     visit: &Mutex<Visit>,
 ) -> Option<&'static str> {
-    let mut look = interval(LOOK);
-    look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut changes = lock(visit).changes();
     let mut pinged = Instant::now();
     loop {
-        look.tick().await;
+        let _ = timeout(LOOK, changes.changed()).await;
         let news = lock(visit).news();
         if !news.is_empty() {
             send(sink, Message::text(news)).await?;

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use lager_lines::Name;
 use lager_lines::extension::{Action, Report};
 use lager_station::{Awaited, Doing, Driver, Reply, Subscription, Told, View, Warehouse};
+use tokio::sync::watch;
 
 use crate::Place;
 use crate::access::Rank;
@@ -76,6 +77,11 @@ impl Visit {
     /// The page has said something, if only that it is there.
     pub(crate) fn is_there(&mut self) {
         self.there = true;
+    }
+
+    /// Changes whenever the station knows something new.
+    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
+        self.place.shared.changes.subscribe()
     }
 
     /// Carries out a line; whether the page may go on.

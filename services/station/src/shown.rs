@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lager_lines::extension::{Edge, Event, Latency, Listed, Queued, Report, State, Thinks, Truth};
+use lager_lines::extension::{Block, Event, Latency, Listed, Queued, Report, State, Thinks, Truth};
 use lager_lines::{Coord, Text};
 
 /// A value that a robot has told, and when.
@@ -31,7 +31,7 @@ pub struct Shown {
     /// The nodes of its way. Of this and what follows only changes are told.
     pub route: Option<Seen<Listed<Coord>>>,
     /// The ways that it does not take.
-    pub blocked: Option<Seen<Listed<Edge>>>,
+    pub blocked: Option<Seen<Listed<Block>>>,
     /// What it fetches next by itself, after what it is on.
     pub queue: Option<Seen<Listed<Queued>>>,
     /// How long it takes to react, about once a second.

@@ -36,7 +36,7 @@ macro_rules! listed {
 }
 
 listed!(Coord, 120);
-listed!(Edge, 70);
+listed!(Block, 40);
 listed!(Queued, 45);
 
 impl<T> Listed<T> {
@@ -97,6 +97,31 @@ impl Edge {
 impl fmt::Display for Edge {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{} {}", self.node, self.way)
+    }
+}
+
+/// A way that is not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Block {
+    /// The way.
+    pub edge: Edge,
+    /// Since when, in s of the robot's clock, as `time_ms` of its state counts.
+    pub since_s: u32,
+}
+
+impl Block {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
+        let wanted = "a time from 0 to 4294967295 s";
+        Ok(Self {
+            edge: Edge::read(reader)?,
+            since_s: reader.word().number(wanted, 0, i64::from(u32::MAX))?,
+        })
+    }
+}
+
+impl fmt::Display for Block {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} {}", self.edge, self.since_s)
     }
 }
 

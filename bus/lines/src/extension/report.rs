@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::fields::Degrees;
-use super::listed::{Edge, Listed, Queued};
+use super::listed::{Block, Listed, Queued};
 use super::order::number;
 use super::state::State;
 use super::thinks::Thinks;
@@ -39,7 +39,7 @@ pub enum Report {
     /// The nodes of its way, the next one first.
     Route(Listed<Coord>),
     /// Ways that it does not take.
-    Blocked(Listed<Edge>),
+    Blocked(Listed<Block>),
     /// What it fetches next, in this order.
     Queue(Listed<Queued>),
     /// Something has happened.
@@ -169,7 +169,9 @@ impl Report {
             "state" => |reader: &mut Reader<'_>| Ok(Self::State(Box::new(State::read(reader)?))),
             "thinks" => |reader: &mut Reader<'_>| Ok(Self::Thinks(Box::new(Thinks::read(reader)?))),
             "route" => |reader: &mut Reader<'_>| Ok(Self::Route(Listed::<Coord>::read(reader)?)),
-            "blocked" => |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Edge>::read(reader)?)),
+            "blocked" => {
+                |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Block>::read(reader)?))
+            }
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
             "latency" => |reader: &mut Reader<'_>| Latency::read(reader).map(Self::Latency),

@@ -2,8 +2,8 @@
 
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Degrees, Edge, Hello, LeaseMs, Listed, Loads, Mode, Order, Queued, Report, Servos,
-    State,
+    Action, Block, Degrees, Edge, Hello, LeaseMs, Listed, Loads, Mode, Order, Queued, Report,
+    Servos, State,
 };
 use lager_lines::{Coord, Direction, Name, ProductId, to_line};
 use lager_wire::{Binary, LineBits};
@@ -55,7 +55,7 @@ fn every_line_of_the_robot_is_read_and_written() {
         "route 0",
         "route 2 1 0 2 0",
         "route 300 1 0 2 0",
-        "blocked 1 2 0 up",
+        "blocked 1 2 0 up 81",
         "queue 2 4 7 5 12",
         "event next_node 2 1 - -",
         "event in_position 1 0 4 7",
@@ -174,10 +174,14 @@ fn the_longest_lists_fit_in_a_line_and_tell_how_many_there_are() {
         (route.total(), route.first().len()),
         (512, Listed::<Coord>::FIT)
     );
-    let blocked = Listed::<Edge>::new(&vec![Edge { node, way }; 512]);
+    let block = Block {
+        edge: Edge { node, way },
+        since_s: u32::MAX,
+    };
+    let blocked = Listed::<Block>::new(&vec![block; 512]);
     assert_eq!(
         (blocked.total(), blocked.first().len()),
-        (512, Listed::<Edge>::FIT)
+        (512, Listed::<Block>::FIT)
     );
     let queue = Listed::<Queued>::new(&vec![queued; 46]);
     assert_eq!(

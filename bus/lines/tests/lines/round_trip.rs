@@ -3,8 +3,8 @@
 use lager_lines::command::Wheels;
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Loads, Mode, Order,
-    Put, Queued, Report, Servos, State, Thinks, Truth,
+    Action, Block, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Loads, Mode,
+    Order, Put, Queued, Report, Servos, State, Thinks, Truth,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
@@ -89,6 +89,10 @@ fn answer() -> impl Strategy<Value = Answer> {
         command().prop_map(Answer::Command),
         Just(Answer::PickupDone),
     ]
+}
+
+fn block() -> impl Strategy<Value = Block> {
+    (edge(), any::<u32>()).prop_map(|(edge, since_s)| Block { edge, since_s })
 }
 
 fn edge() -> impl Strategy<Value = Edge> {
@@ -215,8 +219,8 @@ fn report() -> impl Strategy<Value = Report> {
         thinks().prop_map(|thinks| Report::Thinks(Box::new(thinks))),
         prop::collection::vec(coord(), many.clone())
             .prop_map(|all| Report::Route(Listed::<Coord>::new(&all))),
-        prop::collection::vec(edge(), many.clone())
-            .prop_map(|all| Report::Blocked(Listed::<Edge>::new(&all))),
+        prop::collection::vec(block(), many.clone())
+            .prop_map(|all| Report::Blocked(Listed::<Block>::new(&all))),
         prop::collection::vec(queued, many)
             .prop_map(|all| Report::Queue(Listed::<Queued>::new(&all))),
         (

@@ -108,11 +108,6 @@ impl Conversation {
         known.truth = new.truth.or_else(|| known.truth.take());
     }
 
-    /// Whether a station listens that is told more than the document has.
-    pub const fn is_extended(&self) -> bool {
-        self.is_up && self.is_extended
-    }
-
     /// A service has thought something.
     pub fn thought(&mut self, thought: &Thought) {
         if self.is_extended {

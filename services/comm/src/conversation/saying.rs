@@ -32,6 +32,19 @@ impl Conversation {
         }
     }
 
+    /// Whether it is time to tell a station that speaks the extension what the robot does.
+    pub fn is_to_tell(&self, now: Moment) -> bool {
+        self.is_up && self.is_extended && self.telling.is_due(now)
+    }
+
+    /// Tells it, as far as it is known now.
+    pub fn tell(&mut self, now: Moment) {
+        if self.is_to_tell(now) {
+            let reports = self.telling.reports(now, &mut self.known);
+            self.actions.extend(reports.into_iter().map(Action::Show));
+        }
+    }
+
     /// Answers an action.
     pub(super) fn reply(&mut self, number: u32, result: Result<(), String>) {
         let report = match result {

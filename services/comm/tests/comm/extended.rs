@@ -154,6 +154,7 @@ fn lists_are_told_when_they_have_changed_and_anew_to_each_station() {
         x: 2,
         y: 0,
         heading: Heading::Up.into(),
+        since_ns: 81_999_000_000,
         ..BlockedWay::default()
     };
     robot.conversation.senses(Senses {
@@ -166,7 +167,7 @@ fn lists_are_told_when_they_have_changed_and_anew_to_each_station() {
         shown.retain(|line| !line.starts_with("state "));
         shown
     };
-    let wanted = ["blocked 1 2 0 up", "queue 2 4 7 5 7"];
+    let wanted = ["blocked 1 2 0 up 81", "queue 2 4 7 5 7"];
     assert_eq!(lists(&mut robot), wanted);
     assert_eq!(lists(&mut robot), [""; 0]);
     robot.disconnect();

@@ -142,6 +142,7 @@ impl Robot {
         self.now.ns += milliseconds * 1_000_000;
         self.now.robot += Duration::from_millis(milliseconds);
         self.conversation.turn(self.now);
+        self.conversation.tell(self.now);
     }
 
     /// The peer says lines, which arrive together.
