@@ -12,7 +12,8 @@
 //!               awaited
 //!   autonomous  side, floor or goods are not known      sidelength, karta, prodlis
 //!               it stands at the goods                  armcomm
-//!               no order is under way or waits          fetchprod
+//!               no order is under way or waits, and     fetchprod
+//!               logic knows where it is and the goods
 //!               anything else                           nothing
 //! ```
 //!
@@ -353,9 +354,14 @@ impl Conversation {
         if unknown.is_some() {
             return unknown;
         }
-        if self.known.status?.phase == Phase::Picking {
+        let phase = self.known.status?.phase.get()?;
+        if phase == Phase::Picking {
             let waits = self.driving.is_running() || self.tasks.has_picked();
             return (!waits).then_some(Query::Arm);
+        }
+        // Logic would refuse the order, and the station would have told it in vain.
+        if phase == Phase::WaitingForMap || phase.needs_reset() {
+            return None;
         }
         let queue = self.known.queue?;
         let is_idle = !self.tasks.has_order() && queue.under_way == 0 && queue.count == 0;

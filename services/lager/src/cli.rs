@@ -277,7 +277,7 @@ pub enum ModeName {
   lager up --headless --mission 1,2 --speed 5 --exit-when-done --json
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards, driven by a person
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1 --script --mission 1
-                                                          the boards, driven by the script
+                                                          the boards, driving by themselves
   lager up --body chip                                    their images in an emulator
   lager up --station 192.168.1.5:7420                     another machine is the external computer
   lager up --realtime 20 --lock-memory --core bridge=2 --core logic=3
@@ -331,14 +331,15 @@ pub struct UpArgs {
     /// Do without a panel
     #[arg(long, help_heading = "Mission")]
     pub headless: bool,
-    /// Let a script be the operator: it orders, picks and signals. A simulated or emulated robot has
-    /// it anyway; real boards need --mission beside it, and nobody in the robot's way
+    /// Let real boards carry out --mission by themselves, with nobody in their way; a simulated or
+    /// emulated robot does so anyway
     #[arg(long, help_heading = "Mission")]
     pub script: bool,
-    /// The products that the script has fetched, in this order [default: the first of the warehouse]
+    /// The products that wait to be fetched from the start, in this order [default: the first of the
+    /// warehouse]
     #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<i32>,
-    /// End when the script's mission is delivered (0) or has failed (3)
+    /// End when the mission is delivered (0) or has failed (3)
     #[arg(long, help_heading = "Mission")]
     pub exit_when_done: bool,
     /// Print one line of JSON at the end; progress goes to standard error
@@ -388,7 +389,7 @@ pub struct StationArgs {
     /// Do without a panel
     #[arg(long, conflicts_with = "panel", help_heading = "Station")]
     pub no_panel: bool,
-    /// Go on where the station before this one was; with --parent alone
+    /// Told to every service that is started again; a station goes on where the last one was anyway
     #[arg(long, hide = true)]
     pub resume: bool,
     /// End when this process, the supervisor, ends; standard output is then the socket for robots

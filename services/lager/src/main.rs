@@ -19,7 +19,7 @@ mod exit;
 mod hands;
 mod keepers;
 mod map;
-mod operator;
+mod mission;
 mod outcome;
 mod patience;
 mod realtime;

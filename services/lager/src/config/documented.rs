@@ -124,7 +124,7 @@ ranger_cm = {ranger}
 # unreachable.
 try_again_s = {try_again}
 # Who picks the goods up: \"manual\" (a person moves the arm and says when it is done) or \"auto\" (the
-# robot by itself). Where the script plays the operator the robot picks by itself.
+# robot by itself). With a mission from the start the robot picks by itself.
 pick = {pick}
 
 [simulator]
