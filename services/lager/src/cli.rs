@@ -234,13 +234,13 @@ real robot that has been put on the delivery node.")]
 
 It connects to a station for ever. In manual mode the robot carries out what the
 station answers, and stands when the link is lost; in autonomous mode it fetches what
-the station answers, and goes on without the link.")]
+the station answers, and goes on without the link unless [comm] link_lost says otherwise.")]
     Comm(CommArgs),
     /// The external computer: answers robots by TCP, and lets a GaG answer them
     #[command(after_help = "Examples:
   lager station --warehouse warehouse.toml             robots of this machine
   lager station --listen 192.168.1.5:7420 --warehouse warehouse.toml
-  socat READLINE UNIX-CONNECT:/run/lager/gag           be the GaG: answer what it asks
+  lager gag                                            be its GaG: answer what it asks
 
 It answers a robot from the warehouse file and by itself. While a GaG is connected to
 its socket, that answers instead, in the words of the document's grammar, for the robot
@@ -248,6 +248,21 @@ that has been connected for longest; what it says of the warehouse is saved. Rob
 GaG are not asked who they are: let only those reach --listen who may drive. A panel that
 others than this machine can reach asks for a token, which is printed once.")]
     Station(StationArgs),
+    /// Be the GaG of a station in this terminal: describe the warehouse, choose goods, drive
+    #[command(after_help = "Examples:
+  lager gag                                  at the station of the robot that is up, or of `lager station`
+  lager gag --socket /tmp/somebody/gag       at somebody else's
+  printf 'fetchprod 3\nfetchprod 1\n' | lager gag
+
+It shows what the station asks and what the robot says, in the document's language. Answer with the
+whole line or with what stands behind the word: to `fetchprod` with 3 or with `fetchprod 3`. What is
+typed before it is asked for waits; `styrcomm 1` stops and goes first. One GaG is connected at a time.")]
+    Gag {
+        /// The station's unix socket [default: that of the robot's own station, else gag in the folder
+        /// of the bus]
+        #[arg(long, value_name = "SOCKET", help_heading = "Station")]
+        socket: Option<PathBuf>,
+    },
     /// What `up` needs done on the bus; only `up` starts it
     #[command(hide = true)]
     Attend(ServiceArgs),
@@ -324,6 +339,13 @@ pub struct UpArgs {
     /// Do without an external computer; `up` tells the robot its warehouse
     #[arg(long, help_heading = "Station")]
     pub no_station: bool,
+    /// Where robots connect to the station that `up` starts [default: 127.0.0.1:7420, or a free port]
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
+    pub listen: Option<std::net::SocketAddr>,
+    /// Where a GaG connects to it: the path of a unix socket [default: gag in the robot's folder of
+    /// the bus]
+    #[arg(long, value_name = "SOCKET", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
+    pub gag: Option<PathBuf>,
     /// Where the operator panel answers browsers of this machine [default: 127.0.0.1:7410, or a free
     /// port]
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["headless", "no_station", "station"], help_heading = "Station")]
@@ -336,7 +358,7 @@ pub struct UpArgs {
     #[arg(long, help_heading = "Mission")]
     pub script: bool,
     /// The products that wait to be fetched from the start, in this order [default: the first of the
-    /// warehouse]
+    /// warehouse; with the station of somebody else, none]
     #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<i32>,
     /// End when the mission is delivered (0) or has failed (3)

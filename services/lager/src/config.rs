@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 pub use chip::ChipSection;
 pub use realtime::RealtimeSection;
-pub use station::StationSection;
+pub use station::{CommSection, StationSection, WithoutLink};
 
 use crate::realtime::HIGHEST_PRIORITY;
 use crate::services::Service;
@@ -77,6 +77,8 @@ pub struct Config {
     pub chip: ChipSection,
     /// The external computer.
     pub station: StationSection,
+    /// How the robot talks to it.
+    pub comm: CommSection,
 }
 
 /// What stands at the other end of the two UARTs.
@@ -231,6 +233,7 @@ impl Default for Config {
             simulator: SimulatorSection::default(),
             chip: ChipSection::default(),
             station: StationSection::default(),
+            comm: CommSection::default(),
         }
     }
 }

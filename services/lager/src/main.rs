@@ -16,6 +16,7 @@ mod diagnose;
 mod doctor;
 mod emulator;
 mod exit;
+mod gag;
 mod hands;
 mod keepers;
 mod map;
@@ -195,6 +196,10 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Station(args) => {
             station::run(&config, &args, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Gag { socket } => {
+            gag::run(&config, socket, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
         }
         Command::Topic(args) => {

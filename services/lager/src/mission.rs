@@ -102,7 +102,7 @@ impl Mission {
     pub fn outcome(&self) -> Option<Result<(), &str>> {
         match &self.failure {
             Some(why) => Some(Err(why)),
-            None => self.open.is_empty().then_some(Ok(())),
+            None => (self.begun && self.open.is_empty()).then_some(Ok(())),
         }
     }
 

@@ -144,7 +144,10 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
         // The robot's folder was removed.
         prepare(config, &[])?;
     }
-    let gag = RuntimeFolder::gag(config)?;
+    let gag = match &config.station.gag {
+        Some(gag) => gag.clone(),
+        None => RuntimeFolder::gag(config)?,
+    };
     if gag.as_os_str().len() > LONGEST_SOCKET {
         tracing::warn!("no GaG can connect: {} is too long a path", gag.display());
     }
@@ -171,7 +174,11 @@ fn name() -> Result<Name> {
     Name::new(NAME).context("the station's name")
 }
 
-fn default_gag(config: &Config) -> Result<PathBuf> {
+/// Where a GaG connects to a station that nobody has told another place.
+///
+/// # Errors
+/// The place of the bus cannot be had.
+pub fn default_gag(config: &Config) -> Result<PathBuf> {
     Ok(config.bus()?.place()?.folder().join(GAG))
 }
 

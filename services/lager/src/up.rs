@@ -68,14 +68,22 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     })
 }
 
-/// What the robot is to fetch from the start, if anything. Real boards do not move off by
+/// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move off by
 /// themselves: there somebody has to ask for it twice.
 fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
     let mission = mission(&config.warehouse()?, &args.mission)?;
-    if config.body != Body::Serial {
-        return Ok(Some(mission));
-    }
     let usage = |why: &str| exit::Usage(why.to_owned());
+    if config.body != Body::Serial {
+        let is_elsewhere = config.station.wanted && config.station.address.is_some();
+        // Whoever has the station orders there.
+        return match (is_elsewhere && args.mission.is_empty(), args.exit_when_done) {
+            (true, true) => bail!(usage(
+                "--exit-when-done waits for the end of a mission; with the station of somebody else there is one with --mission"
+            )),
+            (true, false) => Ok(Some(Vec::new())),
+            (false, _) => Ok(Some(mission)),
+        };
+    }
     match (args.script, args.mission.is_empty()) {
         (true, false) => Ok(Some(mission)),
         (true, true) => {
@@ -204,10 +212,20 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     }
     if let Some(address) = &args.station {
         config.station = StationSection {
-            wanted: true,
             address: Some(address.clone()),
-            panel: None,
+            ..StationSection::default()
         };
+    }
+    if args.listen.is_some() || args.gag.is_some() {
+        // Both are those of a station that is started here.
+        config.station.wanted = true;
+        config.station.address = None;
+    }
+    if let Some(listen) = args.listen {
+        config.station.listen = Some(listen);
+    }
+    if let Some(gag) = &args.gag {
+        config.station.gag = Some(std::path::absolute(gag)?);
     }
     if let Some(panel) = args.panel {
         config.station.panel = Some(panel);

@@ -163,6 +163,10 @@ coded! {
         OrderMovedUp = 6,
         /// No waiting order is to be carried out.
         QueueCleared = 7,
+        /// The external computer is out of reach, and the robot is to stand at the next node.
+        LinkLost = 8,
+        /// It is there again.
+        LinkBack = 9,
     }
 }
 

@@ -1,7 +1,10 @@
 //! Autonomous: what is asked, what is made of the answers, and what goes wrong.
 
+use lager_comm::LinkLost;
 use lager_lines::splitter::LineError;
-use lager_topics::{Event, EventKind, Finish, Mode, Order, Origin, Phase, SteeringReport};
+use lager_topics::{
+    Event, EventKind, Finish, Hold, Mode, NavigatorStatus, Order, Origin, Phase, SteeringReport,
+};
 
 use crate::robot::Robot;
 
@@ -94,6 +97,29 @@ fn a_robot_that_does_not_know_where_it_is_asks_for_no_product() {
         assert_eq!(robot.pass(1_000), [""; 0]);
         assert_eq!(robot.does(Phase::WaitingForOrder, None), ["fetchprod"]);
     }
+}
+
+#[test]
+fn a_robot_that_stands_without_its_link_is_told_so_until_it_is_back() {
+    let mut robot = Robot::that(Mode::Autonomous, None, LinkLost::Stand);
+    // Nobody has connected yet, and logic is told four times a second.
+    let said = robot.pass(1_000);
+    assert_eq!(said, ["[presses LinkLost]"; 4]);
+    let said = robot.connect();
+    let back = said.iter().filter(|line| *line == "[presses LinkBack]");
+    assert_eq!(back.count(), 1, "{said:?}");
+    robot.disconnect();
+    assert_eq!(robot.pass(10), ["[presses LinkLost]"]);
+    robot.connect();
+    // Logic has not heard it, or stands for a comm that was killed.
+    robot.status(&NavigatorStatus {
+        phase: Phase::Driving.into(),
+        hold: Hold::Link.into(),
+        ..NavigatorStatus::default()
+    });
+    let said = robot.pass(1_000);
+    let back = said.iter().filter(|line| *line == "[presses LinkBack]");
+    assert!(back.count() >= 3, "{said:?}");
 }
 
 #[test]
