@@ -165,6 +165,9 @@ struct Whole {
     /// How often logic has found a way blocked.
     blocked: u32,
     bytes: Vec<u8>,
+    /// What the wires carry, for the tests of repetition.
+    #[cfg(test)]
+    tape: taped::Tape,
 }
 
 impl Whole {
@@ -208,6 +211,8 @@ impl Whole {
             frames: 0,
             blocked: 0,
             bytes: Vec::new(),
+            #[cfg(test)]
+            tape: taped::Tape::default(),
         };
         whole.tell_logic(Input::Map(&map));
         Ok(whole)
@@ -279,6 +284,8 @@ impl Whole {
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.clear();
         self.robot.read(WIRES[place], &mut bytes);
+        #[cfg(test)]
+        self.tape.read(self.now, place, &mut bytes);
         let at = self.moment();
         for byte in &bytes {
             if let Some(heard) = self.ears[place].push(*byte, at, &self.counts) {
@@ -339,6 +346,8 @@ impl Whole {
         while let Some(action) = self.bridge.next(self.moment()) {
             match action {
                 Action::Write(write) => {
+                    #[cfg(test)]
+                    self.tape.wrote(self.now, write.place, &write.packet);
                     self.robot.write(WIRES[write.place], &write.packet);
                     self.bridge.wrote(&write, true, self.moment());
                 }
@@ -462,6 +471,8 @@ mod boards;
 mod disturbed;
 #[cfg(test)]
 mod obstacles;
+#[cfg(test)]
+mod taped;
 #[cfg(test)]
 mod worn;
 
