@@ -175,6 +175,11 @@ The order that is under way is not in the queue any more.")]
     },
     /// Tell the robot that it has been put on the delivery node, looking into the warehouse
     Reset,
+    /// Press a button of the robot: `reset` as `lager reset`, `switch` for the other mode
+    Press {
+        /// Which
+        button: Button,
+    },
     /// Show what stands on the ways of the simulated floor, put a thing there, or take it away
     #[command(after_help = "Examples:
   lager obstacle                  what stands where
@@ -274,6 +279,15 @@ typed before it is asked for waits; `styrcomm 1` stops and goes first. One GaG i
     Simulator(ServiceArgs),
     /// The boards' real images in their emulator, behind two pseudo terminals
     Emulator(ServiceArgs),
+}
+
+/// A button of the robot.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Button {
+    /// It has been put on the delivery node, looking into the warehouse
+    Reset,
+    /// Who steers: a person or logic
+    Switch,
 }
 
 /// `lager mode`.

@@ -53,8 +53,8 @@ use lager_topics::{Mode, Role};
 use lager_wire::OperatorCommand;
 
 use crate::cli::{
-    Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs, TopicArgs,
-    TopicCommand,
+    Button, Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs,
+    TopicArgs, TopicCommand,
 };
 use crate::config::{ChipSection, Config};
 use crate::patience::Patience;
@@ -137,6 +137,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     raw_line: config.serial.raw_line,
                     original_boards: config.serial.original_boards,
                     arm: config.arm,
+                    buttons: config.buttons.lines(),
                     waiting: config.bus.policy(),
                     resume,
                 };
@@ -255,6 +256,12 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Picked { force } => operator()?.picked(force)?,
         Command::Reset => operator()?.reset()?,
+        Command::Press {
+            button: Button::Reset,
+        } => operator()?.reset()?,
+        Command::Press {
+            button: Button::Switch,
+        } => operator()?.switch()?,
         Command::Place { place } => operator()?.place(place)?,
         Command::Obstacle { change } => {
             let operator = operator()?;

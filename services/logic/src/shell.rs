@@ -252,7 +252,12 @@ impl Shell {
                     }
                     Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
                     // The switch is the bridge's (E14): the mode comes back with its health.
-                    Some(InputKind::SwitchPressed) | None => {}
+                    Some(
+                        InputKind::SwitchPressed
+                        | InputKind::SwitchedToManual
+                        | InputKind::SwitchedToAutonomous,
+                    )
+                    | None => {}
                 }
             }
         }

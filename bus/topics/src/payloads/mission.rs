@@ -167,6 +167,10 @@ coded! {
         LinkLost = 8,
         /// It is there again.
         LinkBack = 9,
+        /// The switch of the robot has been moved to manual mode.
+        SwitchedToManual = 10,
+        /// The switch of the robot has been moved to autonomous mode.
+        SwitchedToAutonomous = 11,
     }
 }
 

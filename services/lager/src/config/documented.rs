@@ -22,6 +22,10 @@ impl Config {
                 path.as_ref().map(|path| path.to_string_lossy()).as_deref(),
             )
         };
+        let line = |name: &str, value: Option<u32>| match value {
+            Some(value) => format!("{name} = {value}"),
+            None => format!("# {name} = 17"),
+        };
         format!(
             "\
 # The robot's name: the middle part of every topic's name.
@@ -166,6 +170,17 @@ wanted = {station_wanted}
 # carries out its orders) or \"stand\" (it drives on to the next crossing and stands there until the
 # link is there again). In manual mode it stands at once.
 link_lost = {link_lost}
+
+[buttons]
+# The robot's reset button and mode switch, as lines of a GPIO chip that a closed contact pulls to
+# ground, such as /dev/gpiochip0. Unset, there are none.
+{buttons_chip}
+# The line of the reset button, by its offset: the robot has been put on the delivery node.
+{buttons_reset}
+# The line of the mode switch: open is manual, closed autonomous.
+{buttons_switch}
+# For how many ms a contact must be steady; at most 500.
+debounce_ms = {debounce}
 ",
             name = quoted(&self.name),
             speed = self.speed,
@@ -219,6 +234,10 @@ link_lost = {link_lost}
             clock = unset_path("clock", &self.chip.clock),
             station_wanted = self.station.wanted,
             station_address = unset("address", self.station.address.as_deref()),
+            buttons_chip = unset_path("chip", &self.buttons.chip),
+            buttons_reset = line("reset", self.buttons.reset),
+            buttons_switch = line("switch", self.buttons.switch),
+            debounce = self.buttons.debounce_ms,
             link_lost = match self.comm.link_lost {
                 WithoutLink::GoOn => "\"go-on\"",
                 WithoutLink::Stand => "\"stand\"",
@@ -265,7 +284,8 @@ fn pose(pose: &ArmPose) -> String {
 mod tests {
     use super::super::realtime::CoresSection;
     use super::super::{
-        BusSection, ChipSection, CommSection, LogSection, RealtimeSection, StationSection,
+        BusSection, ButtonsSection, ChipSection, CommSection, LogSection, RealtimeSection,
+        StationSection,
     };
     use super::*;
     use lager_wire::{ArmLimits, ArmProfile};
@@ -320,6 +340,12 @@ mod tests {
             },
             comm: CommSection {
                 link_lost: WithoutLink::Stand,
+            },
+            buttons: ButtonsSection {
+                chip: Some("/dev/gpiochip4".into()),
+                reset: Some(5),
+                switch: Some(6),
+                debounce_ms: 30,
             },
             ..Config::default()
         };
