@@ -253,7 +253,7 @@ fn a_stop_latches_until_it_is_resumed() {
 }
 
 #[test]
-fn a_person_can_do_by_hand_what_the_script_does() {
+fn a_person_can_do_everything_by_hand() {
     let domain = Domain::new();
     let _up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "3"]);
     let observer = domain.observe("r1", 3.0);
@@ -271,7 +271,7 @@ fn a_person_can_do_by_hand_what_the_script_does() {
         (output.status.success(), text)
     };
     let mut status = observer.subscriber::<NavStatus>().expect("a topic");
-    wait_for("the script to have taken over", || {
+    wait_for("the robot to drive", || {
         status
             .latest()
             .expect("readable")
@@ -296,8 +296,15 @@ fn a_person_can_do_by_hand_what_the_script_does() {
     assert!(!fine && text.contains("pick station"), "{text}");
     let (fine, text) = said(&["gains", "3", "1"]);
     assert!(fine && text.contains("3 and 1"), "{text}");
-    let (fine, text) = said(&["reset"]);
-    assert!(fine, "{text}");
+    for reset in [&["reset"][..], &["press", "reset"]] {
+        let (fine, text) = said(reset);
+        assert!(fine, "{text}");
+    }
+    // Each press of the switch is the other mode.
+    for mode in ["logic steers", "the operator steers"] {
+        let (fine, text) = said(&["press", "switch"]);
+        assert!(fine && text.contains(mode), "{text}");
+    }
     drop((state, status, observer));
 }
 

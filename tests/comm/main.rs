@@ -2,6 +2,9 @@
 //! with them: it follows the grammar alone.
 
 mod extended;
+mod gag;
+mod lost;
+mod peers;
 mod scene;
 
 use std::fs;
@@ -176,10 +179,17 @@ fn a_gag_at_a_station_has_goods_fetched() {
 
 /// A station of its own for robots that are told where it is.
 fn station(domain: &Domain, fetch: &[&str]) -> (Running, String) {
+    station_at(domain, "127.0.0.1:0", fetch)
+}
+
+pub(crate) fn station_at(domain: &Domain, at: &str, fetch: &[&str]) -> (Running, String) {
     let file = domain.folder().join("warehouse.toml");
     fs::write(&file, WAREHOUSE).expect("a file");
-    let file = file.to_str().expect("UTF-8");
-    let mut args = vec!["station", "--listen", "127.0.0.1:0", "--warehouse", file];
+    // A station that is killed leaves its socket behind.
+    let gag = domain.folder().join("gag");
+    let [file, gag] = [&file, &gag].map(|path| path.to_str().expect("UTF-8"));
+    let mut args = vec!["station", "--listen", at, "--warehouse", file];
+    args.extend(["--gag", gag, "--no-panel"]);
     for order in fetch {
         args.extend(["--fetch", order]);
     }
@@ -195,7 +205,6 @@ fn station(domain: &Domain, fetch: &[&str]) -> (Running, String) {
 #[test]
 fn two_robots_of_one_station_deliver_though_one_of_them_is_killed() {
     let domain = Domain::new();
-    // The script has each of them fetch product 1 as well.
     let (_station, address) = station(&domain, &["r1=2", "r2=3"]);
     let file = domain.folder().join("warehouse.toml");
     let file = file.to_str().expect("UTF-8");

@@ -66,7 +66,8 @@ impl Peer<TcpStream> {
 
 /// An external computer that the test plays, for a robot that is up and stands in manual mode.
 pub(crate) struct Scene {
-    listener: TcpListener,
+    /// `None` where another process plays it.
+    listener: Option<TcpListener>,
     truth: Subscriber<TruthPose>,
     pub(crate) up: Running,
     _body: Running,
@@ -75,7 +76,16 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new() -> Self {
-        let domain = Domain::new();
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address").to_string();
+        Self {
+            listener: Some(listener),
+            ..Self::at(Domain::new(), &address)
+        }
+    }
+
+    /// One whose external computer is played by another process at `address`.
+    pub(crate) fn at(domain: Domain, address: &str) -> Self {
         // Real boards, as far as `up` knows: it starts in manual mode and no script drives.
         let [sensor, steering] =
             ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
@@ -84,9 +94,7 @@ impl Scene {
             format!("body = \"serial\"\n[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
         fs::write(&config, text).expect("a configuration file");
         let body = domain.start(&["simulator"]);
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-        let address = listener.local_addr().expect("an address").to_string();
-        let up = domain.start(&["up", "--station", &address]);
+        let up = domain.start(&["up", "--station", address]);
         let bus = domain.observe("r1", 1.0);
         let mut health = bus.subscriber::<LinkHealth>().expect("a topic");
         wait_for("both boards to be connected, and the robot stopped", || {
@@ -99,7 +107,7 @@ impl Scene {
         });
         Self {
             truth: bus.subscriber().expect("a topic"),
-            listener,
+            listener: None,
             up,
             _body: body,
             domain,
@@ -108,15 +116,24 @@ impl Scene {
 
     /// Where the robot connects, for a station that listens there itself.
     pub(crate) fn listener(&self) -> TcpListener {
-        self.listener.try_clone().expect("a socket")
+        let listener = self.listener.as_ref().expect("it is played here");
+        listener.try_clone().expect("a socket")
     }
 
     /// The robot's next connection.
     pub(crate) fn robot(&self) -> Peer<TcpStream> {
-        let (stream, _) = self.listener.accept().expect("it connects");
+        let (stream, _) = self.listener().accept().expect("it connects");
         stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
         stream.set_nodelay(true).expect("a socket");
         Peer(BufReader::new(stream))
+    }
+
+    /// Where the middle of the axle is, in mm.
+    pub(crate) fn place(&mut self) -> (f64, f64) {
+        wait_for("the truth", || {
+            let truth = self.truth.latest().expect("readable")?;
+            Some((truth.x_mm, truth.y_mm))
+        })
     }
 
     /// The duties at the motors, as the world has them now.

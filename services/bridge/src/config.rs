@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use lager_ports::Policy;
 use lager_wire::ArmProfile;
 
+use crate::buttons::ButtonsConfig;
+
 /// What the bridge is told at start.
 #[derive(Clone, Debug)]
 pub struct BridgeConfig {
@@ -24,6 +26,8 @@ pub struct BridgeConfig {
     pub original_boards: bool,
     /// What the arm may do, as the steering board is told. Its owner has validated it.
     pub arm: ArmProfile,
+    /// The reset button and the mode switch, where the robot has any.
+    pub buttons: Option<ButtonsConfig>,
     /// How to wait for orders and reports.
     pub waiting: Policy,
 }
@@ -40,6 +44,7 @@ impl Default for BridgeConfig {
             raw_line: false,
             original_boards: false,
             arm: ArmProfile::default(),
+            buttons: None,
             waiting: Policy::default(),
         }
     }

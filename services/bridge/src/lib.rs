@@ -17,8 +17,9 @@
 //! * [`listener`]: the receiving end of one port, pure too. `lager simulate` runs both.
 //! * [`serial`]: a port, and what to do when it cannot be opened.
 //! * [`frames`], [`settings`], [`profile`]: pure helpers between packets and samples.
+//! * [`buttons`]: the reset button and the mode switch of the robot.
 //! * `path`: how long sensor frames take to become commands, for `latency/path`.
-//! * [`run`]: the shell with its three threads.
+//! * [`run`]: the shell with its three threads, and one more where there are buttons.
 //!
 //! **Invariants:** no other process opens the ports. A reader thread never writes, and the main
 //! loop never reads. Everything that is written was decided by the arbiter, except for handshakes
@@ -29,6 +30,7 @@
 
 pub mod arbiter;
 mod boards;
+pub mod buttons;
 mod calibration;
 mod config;
 mod counts;

@@ -12,7 +12,8 @@
 //!               awaited
 //!   autonomous  side, floor or goods are not known      sidelength, karta, prodlis
 //!               it stands at the goods                  armcomm
-//!               no order is under way or waits          fetchprod
+//!               no order is under way or waits, and     fetchprod
+//!               logic knows where it is and the goods
 //!               anything else                           nothing
 //! ```
 //!
@@ -27,8 +28,9 @@
 //!   ms without a word while something is carried out are a lost link. A peer that speaks only the
 //!   document's language may be silent as long as it likes, so there only the end of its connection
 //!   counts, which the kernel finds some 3 s after the last sign of the peer's machine.
-//! - In autonomous mode a lost link changes nothing: the order is carried out (AMB-49 leaves it
-//!   open).
+//! - In autonomous mode the document leaves open what a lost link means (AMB-49), so it is configured
+//!   ([`LinkLost`]): the order is carried out all the same, or logic is told to stand at the next node
+//!   until the link is there again.
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
 //!   commands among these are dropped.
 //! - What cannot be done is told in a `thought`, and asked again a little later.
@@ -52,6 +54,7 @@ use crate::action::Action;
 use crate::driving::{Driving, For};
 use crate::ids::Ids;
 use crate::known::Known;
+use crate::lost::{LinkLost, Standing};
 use crate::map::Described;
 use crate::moment::Moment;
 use crate::speech::Told;
@@ -108,6 +111,8 @@ pub struct Conversation {
     driving: Driving,
     /// Stops that are to be confirmed, and when they came.
     stops: Vec<(u32, u64)>,
+    /// What a lost link means in autonomous mode.
+    standing: Standing,
     /// A stop has come while its release was asked for: it is set again after that.
     stops_again: bool,
 }
@@ -118,7 +123,7 @@ impl Conversation {
     pub const LONGEST_PAUSE: Duration = Duration::from_millis(200);
 
     /// A conversation of the robot `name`; `kept` is the map that an earlier one has published.
-    pub fn new(name: Name, kept: Option<WarehouseMap>) -> Self {
+    pub fn new(name: Name, kept: Option<WarehouseMap>, link_lost: LinkLost) -> Self {
         let warehouse = kept.as_ref().map(Described::floor_of);
         Self {
             name,
@@ -143,6 +148,7 @@ impl Conversation {
             tasks: Tasks::default(),
             driving: Driving::default(),
             stops: Vec::new(),
+            standing: Standing::new(link_lost),
             stops_again: false,
         }
     }
@@ -201,6 +207,10 @@ impl Conversation {
         self.actions.extend(renewed.map(Action::Steer));
         self.tasks.turn(now);
         self.settle();
+        let told = self
+            .standing
+            .tell(now, self.is_up, &self.known, &mut self.ids);
+        self.actions.extend(told.map(Action::Press));
         self.keep_up(now);
         self.ask(now);
     }
@@ -349,9 +359,14 @@ impl Conversation {
         if unknown.is_some() {
             return unknown;
         }
-        if self.known.status?.phase == Phase::Picking {
+        let phase = self.known.status?.phase.get()?;
+        if phase == Phase::Picking {
             let waits = self.driving.is_running() || self.tasks.has_picked();
             return (!waits).then_some(Query::Arm);
+        }
+        // Logic would refuse the order, and the station would have told it in vain.
+        if phase == Phase::WaitingForMap || phase.needs_reset() {
+            return None;
         }
         let queue = self.known.queue?;
         let is_idle = !self.tasks.has_order() && queue.under_way == 0 && queue.count == 0;

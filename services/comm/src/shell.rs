@@ -24,6 +24,7 @@ use crate::asking::Asking;
 use crate::conversation::Conversation;
 use crate::known::Senses;
 use crate::link::{Link, News};
+use crate::lost::LinkLost;
 use crate::moment::Moment;
 use crate::telling;
 
@@ -47,6 +48,8 @@ pub struct CommConfig {
     pub station: String,
     /// What the robot calls itself towards it.
     pub name: Name,
+    /// What a lost link means in autonomous mode.
+    pub link_lost: LinkLost,
     /// Whether a predecessor's map is taken up.
     pub resume: bool,
 }
@@ -110,7 +113,7 @@ impl Shell {
             bridge: Asking::new(bus, waiter.ringer()?)?,
             world: Asking::new(bus, waiter.ringer()?)?,
             waiter,
-            conversation: Conversation::new(config.name.clone(), kept),
+            conversation: Conversation::new(config.name.clone(), kept, config.link_lost),
             stop_word: bus.place().folder_of(bus.robot()).join(StopPage::FILE),
             health: bus.subscriber()?,
             status: bus.subscriber()?,

@@ -3,9 +3,9 @@
 //! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file was cut
 //! short ends the process. So the supervisor stays away from the bus. This child of it keeps each
 //! service's last state for a successor, sweeps what dead processes leave, listens whether every
-//! service is heard, prints what the robot does, and plays the operator. Where there is no external
+//! service is heard, prints what the robot does, and watches its mission. Where there is no external
 //! computer it tells the robot its warehouse. If this process fails, the supervisor starts another
-//! one, and the script goes on where it was.
+//! one, and the mission is watched on where it was.
 //!
 //! It decides nothing about processes: it reports what it hears (`words.rs`), and the supervisor
 //! acts.
@@ -23,7 +23,7 @@ use crate::config::Config;
 use crate::hands::Hands;
 use crate::keepers::Keepers;
 use crate::map::bus_map;
-use crate::operator::{Script, ScriptedOperator};
+use crate::mission::{Mission, Watch};
 use crate::report::Narrator;
 use crate::supervisor;
 use crate::words::{Begin, Line, Pulse, Request, Sweep, Word};
@@ -114,8 +114,8 @@ struct Attendant {
     hands: Hands,
     /// The warehouse, where comm does not tell it.
     map: Option<Publisher<NavMap>>,
-    operator: Option<ScriptedOperator>,
-    told: Option<Script>,
+    watch: Option<Watch>,
+    told: Option<Mission>,
     ears: Ears,
     inventory: Inventory,
     complaints: Complaints,
@@ -146,7 +146,7 @@ impl Attendant {
             narrator,
             hands,
             map,
-            operator: (begin.script).map(|script| ScriptedOperator::new(script, Hands::fresh_id())),
+            watch: begin.mission.map(Watch::new),
             told: None,
             ears: Ears::default(),
             inventory: Inventory::default(),
@@ -187,7 +187,7 @@ impl Attendant {
         Ok(())
     }
 
-    /// Looks at everything, and does at most one thing of the script.
+    /// Looks at everything, and does at most one thing for the mission.
     fn look(&mut self) -> Result<()> {
         self.hand_over()?;
         let remembered = self.keepers.remember();
@@ -200,7 +200,7 @@ impl Attendant {
         }
         // Late joiners get it, too.
         self.map.iter().for_each(Publisher::tick);
-        self.play()?;
+        self.watch_mission()?;
         self.listen()?;
         for note in self.narrator.take_notes() {
             self.line.send(&Word::Note(note))?;
@@ -241,16 +241,16 @@ impl Attendant {
         Ok(())
     }
 
-    /// Plays the operator.
-    fn play(&mut self) -> Result<()> {
-        let Some(operator) = &mut self.operator else {
+    /// Sees to the mission.
+    fn watch_mission(&mut self) -> Result<()> {
+        let Some(watch) = &mut self.watch else {
             return Ok(());
         };
-        let act = operator.step(self.clock.now(), self.narrator.seen());
-        if self.told.as_ref() != Some(operator.script()) {
+        let act = watch.step(self.clock.now(), self.narrator.seen());
+        if self.told.as_ref() != Some(watch.mission()) {
             // Report it before it is done: a successor must know of an order that was given.
-            self.told = Some(operator.script().clone());
-            self.line.send(&Word::Script(operator.script().clone()))?;
+            self.told = Some(watch.mission().clone());
+            self.line.send(&Word::Mission(watch.mission().clone()))?;
         }
         if let Some(act) = act {
             let done = self.hands.carry_out(act);
@@ -292,12 +292,9 @@ impl Attendant {
     fn last_words(mut self) -> Result<()> {
         let looked = self.narrator.look(self.clock.now() - self.robot_start);
         self.complain(looked);
-        let delivered = self
-            .operator
-            .as_ref()
-            .map_or(&[][..], ScriptedOperator::delivered);
-        let misplaced = delivered.iter().copied();
-        let misplaced = misplaced.filter(|id| self.narrator.truly_delivered(*id) == Some(false));
+        let mission = self.watch.iter().map(Watch::mission);
+        let delivered = mission.flat_map(Mission::delivered).copied();
+        let misplaced = delivered.filter(|id| self.narrator.truly_delivered(*id) == Some(false));
         self.line.send(&Word::Misplaced(misplaced.collect()))?;
         self.pulse()?;
         for note in self.narrator.take_notes() {

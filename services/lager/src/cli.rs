@@ -175,6 +175,11 @@ The order that is under way is not in the queue any more.")]
     },
     /// Tell the robot that it has been put on the delivery node, looking into the warehouse
     Reset,
+    /// Press a button of the robot: `reset` as `lager reset`, `switch` for the other mode
+    Press {
+        /// Which
+        button: Button,
+    },
     /// Show what stands on the ways of the simulated floor, put a thing there, or take it away
     #[command(after_help = "Examples:
   lager obstacle                  what stands where
@@ -234,13 +239,13 @@ real robot that has been put on the delivery node.")]
 
 It connects to a station for ever. In manual mode the robot carries out what the
 station answers, and stands when the link is lost; in autonomous mode it fetches what
-the station answers, and goes on without the link.")]
+the station answers, and goes on without the link unless [comm] link_lost says otherwise.")]
     Comm(CommArgs),
     /// The external computer: answers robots by TCP, and lets a GaG answer them
     #[command(after_help = "Examples:
   lager station --warehouse warehouse.toml             robots of this machine
   lager station --listen 192.168.1.5:7420 --warehouse warehouse.toml
-  socat READLINE UNIX-CONNECT:/run/lager/gag           be the GaG: answer what it asks
+  lager gag                                            be its GaG: answer what it asks
 
 It answers a robot from the warehouse file and by itself. While a GaG is connected to
 its socket, that answers instead, in the words of the document's grammar, for the robot
@@ -248,6 +253,21 @@ that has been connected for longest; what it says of the warehouse is saved. Rob
 GaG are not asked who they are: let only those reach --listen who may drive. A panel that
 others than this machine can reach asks for a token, which is printed once.")]
     Station(StationArgs),
+    /// Be the GaG of a station in this terminal: describe the warehouse, choose goods, drive
+    #[command(after_help = "Examples:
+  lager gag                                  at the station of the robot that is up, or of `lager station`
+  lager gag --socket /tmp/somebody/gag       at somebody else's
+  printf 'fetchprod 3\nfetchprod 1\n' | lager gag
+
+It shows what the station asks and what the robot says, in the document's language. Answer with the
+whole line or with what stands behind the word: to `fetchprod` with 3 or with `fetchprod 3`. What is
+typed before it is asked for waits; `styrcomm 1` stops and goes first. One GaG is connected at a time.")]
+    Gag {
+        /// The station's unix socket [default: that of the robot's own station, else gag in the folder
+        /// of the bus]
+        #[arg(long, value_name = "SOCKET", help_heading = "Station")]
+        socket: Option<PathBuf>,
+    },
     /// What `up` needs done on the bus; only `up` starts it
     #[command(hide = true)]
     Attend(ServiceArgs),
@@ -259,6 +279,15 @@ others than this machine can reach asks for a token, which is printed once.")]
     Simulator(ServiceArgs),
     /// The boards' real images in their emulator, behind two pseudo terminals
     Emulator(ServiceArgs),
+}
+
+/// A button of the robot.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Button {
+    /// It has been put on the delivery node, looking into the warehouse
+    Reset,
+    /// Who steers: a person or logic
+    Switch,
 }
 
 /// `lager mode`.
@@ -277,7 +306,7 @@ pub enum ModeName {
   lager up --headless --mission 1,2 --speed 5 --exit-when-done --json
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1  the boards, driven by a person
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1 --script --mission 1
-                                                          the boards, driven by the script
+                                                          the boards, driving by themselves
   lager up --body chip                                    their images in an emulator
   lager up --station 192.168.1.5:7420                     another machine is the external computer
   lager up --realtime 20 --lock-memory --core bridge=2 --core logic=3
@@ -324,6 +353,13 @@ pub struct UpArgs {
     /// Do without an external computer; `up` tells the robot its warehouse
     #[arg(long, help_heading = "Station")]
     pub no_station: bool,
+    /// Where robots connect to the station that `up` starts [default: 127.0.0.1:7420, or a free port]
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
+    pub listen: Option<std::net::SocketAddr>,
+    /// Where a GaG connects to it: the path of a unix socket [default: gag in the robot's folder of
+    /// the bus]
+    #[arg(long, value_name = "SOCKET", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
+    pub gag: Option<PathBuf>,
     /// Where the operator panel answers browsers of this machine [default: 127.0.0.1:7410, or a free
     /// port]
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["headless", "no_station", "station"], help_heading = "Station")]
@@ -331,14 +367,15 @@ pub struct UpArgs {
     /// Do without a panel
     #[arg(long, help_heading = "Mission")]
     pub headless: bool,
-    /// Let a script be the operator: it orders, picks and signals. A simulated or emulated robot has
-    /// it anyway; real boards need --mission beside it, and nobody in the robot's way
+    /// Let real boards carry out --mission by themselves, with nobody in their way; a simulated or
+    /// emulated robot does so anyway
     #[arg(long, help_heading = "Mission")]
     pub script: bool,
-    /// The products that the script has fetched, in this order [default: the first of the warehouse]
+    /// The products that wait to be fetched from the start, in this order [default: the first of the
+    /// warehouse; with the station of somebody else, none]
     #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<i32>,
-    /// End when the script's mission is delivered (0) or has failed (3)
+    /// End when the mission is delivered (0) or has failed (3)
     #[arg(long, help_heading = "Mission")]
     pub exit_when_done: bool,
     /// Print one line of JSON at the end; progress goes to standard error
@@ -388,7 +425,7 @@ pub struct StationArgs {
     /// Do without a panel
     #[arg(long, conflicts_with = "panel", help_heading = "Station")]
     pub no_panel: bool,
-    /// Go on where the station before this one was; with --parent alone
+    /// Told to every service that is started again; a station goes on where the last one was anyway
     #[arg(long, hide = true)]
     pub resume: bool,
     /// End when this process, the supervisor, ends; standard output is then the socket for robots

@@ -26,6 +26,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
             .or_else(|| joined.station.address.clone())
             .unwrap_or_else(|| StationSection::USUAL.to_owned()),
         name,
+        link_lost: joined.comm.link_lost.into(),
         resume: args.service.resume,
     };
     Ok((joined, wanted))

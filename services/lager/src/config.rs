@@ -4,6 +4,7 @@
 //! child process the effective configuration on its standard input, so a flag reaches all of them
 //! or none. An unknown key is an error, never ignored.
 
+mod buttons;
 mod chip;
 mod documented;
 mod realtime;
@@ -20,9 +21,10 @@ use lager_ports::{BusConfig, Policy, RobotName};
 use lager_wire::ArmProfile;
 use serde::{Deserialize, Serialize};
 
+pub use buttons::ButtonsSection;
 pub use chip::ChipSection;
 pub use realtime::RealtimeSection;
-pub use station::StationSection;
+pub use station::{CommSection, StationSection, WithoutLink};
 
 use crate::realtime::HIGHEST_PRIORITY;
 use crate::services::Service;
@@ -77,6 +79,10 @@ pub struct Config {
     pub chip: ChipSection,
     /// The external computer.
     pub station: StationSection,
+    /// How the robot talks to it.
+    pub comm: CommSection,
+    /// The robot's own buttons.
+    pub buttons: ButtonsSection,
 }
 
 /// What stands at the other end of the two UARTs.
@@ -231,6 +237,8 @@ impl Default for Config {
             simulator: SimulatorSection::default(),
             chip: ChipSection::default(),
             station: StationSection::default(),
+            comm: CommSection::default(),
+            buttons: ButtonsSection::default(),
         }
     }
 }
@@ -337,6 +345,7 @@ impl Config {
                 self.simulator.obstacles
             );
         }
+        self.buttons.validate()?;
         // Not a number is in no range.
         for (key, value, range) in [
             (

@@ -1,4 +1,5 @@
-//! The operator's hands on the bus: everything that a person, or the script, can do to the robot.
+//! The operator's hands on the bus: everything that a person can do to the robot, and what is done
+//! for a mission.
 //!
 //! One set of ports for `up` and for the one-shot commands, so that both act the same way. It
 //! decides nothing.
@@ -13,12 +14,12 @@ use lager_topics::{
     SteeringOrder,
 };
 
-use crate::operator::Act;
+use crate::mission::Act;
 
 /// How long the bridge may take to answer, in real time.
 const ANSWER: Duration = Duration::from_millis(500);
 
-/// How long the script waits for an answer before it looks at the robot again, in real time.
+/// How long a mission waits for an answer before the robot is looked at again, in real time.
 const GLANCE: Duration = Duration::from_millis(100);
 
 /// Publishers and the client of one operator.
@@ -52,8 +53,7 @@ impl Hands {
             .max(1)
     }
 
-    /// Does one thing of the script. A bridge that does not answer is no error: the script asks
-    /// again.
+    /// Does one thing for a mission. A bridge that does not answer is no error: it is asked again.
     pub fn carry_out(&self, act: Act) -> Result<()> {
         match act {
             Act::Ask(ask) => {

@@ -16,10 +16,11 @@ mod diagnose;
 mod doctor;
 mod emulator;
 mod exit;
+mod gag;
 mod hands;
 mod keepers;
 mod map;
-mod operator;
+mod mission;
 mod outcome;
 mod patience;
 mod realtime;
@@ -52,8 +53,8 @@ use lager_topics::{Mode, Role};
 use lager_wire::OperatorCommand;
 
 use crate::cli::{
-    Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs, TopicArgs,
-    TopicCommand,
+    Button, Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs,
+    TopicArgs, TopicCommand,
 };
 use crate::config::{ChipSection, Config};
 use crate::patience::Patience;
@@ -136,6 +137,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     raw_line: config.serial.raw_line,
                     original_boards: config.serial.original_boards,
                     arm: config.arm,
+                    buttons: config.buttons.lines(),
                     waiting: config.bus.policy(),
                     resume,
                 };
@@ -197,6 +199,10 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             station::run(&config, &args, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
         }
+        Command::Gag { socket } => {
+            gag::run(&config, socket, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         Command::Topic(args) => {
             topic(&config, args, cli.global.name.is_none(), &patience()?)?;
             return Ok(ExitCode::SUCCESS);
@@ -250,6 +256,12 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Picked { force } => operator()?.picked(force)?,
         Command::Reset => operator()?.reset()?,
+        Command::Press {
+            button: Button::Reset,
+        } => operator()?.reset()?,
+        Command::Press {
+            button: Button::Switch,
+        } => operator()?.switch()?,
         Command::Place { place } => operator()?.place(place)?,
         Command::Obstacle { change } => {
             let operator = operator()?;

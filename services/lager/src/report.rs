@@ -6,12 +6,13 @@ use std::time::Duration;
 use anyhow::Result;
 use lager_ports::{Bus, Subscriber};
 use lager_topics::{
-    Event, EventKind, GoodState, Health, LinkHealth, LogThought, MissionEvent, Mode, NavStatus,
-    NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, StopCause, TruthPose,
+    Event, EventKind, GoodState, Health, LinkHealth, LogThought, MissionEvent, MissionQueue, Mode,
+    NavStatus, NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, StopCause,
+    TruthPose,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::operator::Seen;
+use crate::mission::Seen;
 use crate::stop::describe;
 
 /// The observer behind the terminal's lines.
@@ -21,6 +22,7 @@ pub struct Narrator {
     state: Subscriber<SteeringState>,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
+    queue: Subscriber<MissionQueue>,
     event: Subscriber<MissionEvent>,
     thought: Subscriber<LogThought>,
     truth: Subscriber<TruthPose>,
@@ -54,6 +56,7 @@ impl Narrator {
             state: bus.subscriber()?,
             health: bus.subscriber()?,
             status: bus.subscriber()?,
+            queue: bus.subscriber()?,
             event: bus.subscriber()?,
             thought: bus.subscriber()?,
             truth: bus.subscriber()?,
@@ -87,6 +90,9 @@ impl Narrator {
             self.seen.status = Some(status);
             self.tell_status(&status);
         }
+        if let Some(queue) = self.queue.latest()? {
+            self.seen.queue = Some(*queue);
+        }
         while let Some(event) = self.event.receive()?.map(|event| *event) {
             self.tell_event(&event);
         }
@@ -106,7 +112,7 @@ impl Narrator {
         Ok(())
     }
 
-    /// What the operator sees.
+    /// What a mission is judged by.
     pub fn seen(&self) -> &Seen {
         &self.seen
     }
@@ -243,7 +249,7 @@ impl Narrator {
             }
             Some(EventKind::Refused) => {
                 let why = event.failure;
-                self.seen.refused = Some((event.order_id, why));
+                self.seen.refused = Some((event.order_id, product, why));
                 self.note(
                     "robot",
                     &format!("refuses to fetch product {product}: {why}"),

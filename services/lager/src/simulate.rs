@@ -23,14 +23,14 @@ use crate::cli::SimulateArgs;
 use crate::config::{self, Config};
 use crate::exit;
 use crate::map::bus_map;
-use crate::operator::{Act, Script, ScriptedOperator, Seen};
+use crate::mission::{Act, Mission, Seen, Watch};
 use crate::up::mission;
 
 /// How far time moves at each turn of the loop.
 const TICK: Duration = Duration::from_millis(1);
 /// How often logic's order is renewed, as its shell does.
 const RENEW: Duration = Duration::from_millis(40);
-/// How often the operator looks.
+/// How often the mission is looked at.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// One run's line.
@@ -94,7 +94,7 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
             let line = Line {
                 warehouse: name,
                 seed,
-                delivered: whole.operator.delivered().to_vec(),
+                delivered: whole.watch.mission().delivered().to_vec(),
                 sim_seconds,
                 wall_seconds,
                 times_real: sim_seconds / wall_seconds,
@@ -143,7 +143,7 @@ fn tell(line: &Line<'_>, as_json: bool) -> Result<()> {
 /// The ends of the cables on the Pi, in the order of the ports.
 const WIRES: [Wire; 2] = [Wire::Sensor, Wire::Steering];
 
-/// Robot, bridge, logic and operator.
+/// Robot, bridge, logic and the mission.
 struct Whole {
     now: Duration,
     robot: Robot,
@@ -157,7 +157,7 @@ struct Whole {
     /// Something has come to the bridge since it last decided.
     stirred: bool,
     navigator: Navigator,
-    operator: ScriptedOperator,
+    watch: Watch,
     seen: Seen,
     renewed: Duration,
     looked: Duration,
@@ -165,6 +165,9 @@ struct Whole {
     /// How often logic has found a way blocked.
     blocked: u32,
     bytes: Vec<u8>,
+    /// What the wires carry, for the tests of repetition.
+    #[cfg(test)]
+    tape: taped::Tape,
 }
 
 impl Whole {
@@ -201,13 +204,15 @@ impl Whole {
                 pick: Pick::Auto,
                 ..config.navigator()
             }),
-            operator: ScriptedOperator::new(Script::new(mission.to_vec()), 0),
+            watch: Watch::new(Mission::of_robot(mission, 1)),
             seen: Seen::default(),
             renewed: Duration::ZERO,
             looked: Duration::ZERO,
             frames: 0,
             blocked: 0,
             bytes: Vec::new(),
+            #[cfg(test)]
+            tape: taped::Tape::default(),
         };
         whole.tell_logic(Input::Map(&map));
         Ok(whole)
@@ -220,7 +225,7 @@ impl Whole {
         Ok(())
     }
 
-    /// Runs until the operator's script has ended; the reason if it failed.
+    /// Runs until the mission has ended; the reason if it failed.
     fn run(&mut self, limit: Duration) -> Option<String> {
         while self.now < limit {
             if let Some(outcome) = self.turn() {
@@ -230,7 +235,7 @@ impl Whole {
         Some(format!("not delivered within {} s", limit.as_secs()))
     }
 
-    /// One tick; `Some` once the operator's script has ended, with the reason if it failed.
+    /// One tick; `Some` once the mission has ended, with the reason if it failed.
     fn turn(&mut self) -> Option<Result<(), String>> {
         self.now += TICK;
         self.robot.advance_to(self.now);
@@ -243,10 +248,10 @@ impl Whole {
         }
         if self.now - self.looked >= LOOK {
             self.looked = self.now;
-            self.operate();
+            self.see_to_mission();
         }
         self.run_bridge();
-        match self.operator.outcome()? {
+        match self.watch.mission().outcome()? {
             Ok(()) => Some(self.not_at_the_bar().map_or(Ok(()), Err)),
             Err(why) => Some(Err(why.to_owned())),
         }
@@ -266,7 +271,8 @@ impl Whole {
                 .iter()
                 .any(|good| good.id == product && good.state == GoodState::Delivered)
         };
-        self.operator
+        self.watch
+            .mission()
             .delivered()
             .iter()
             .find(|product| !lies_there(**product))
@@ -278,6 +284,8 @@ impl Whole {
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.clear();
         self.robot.read(WIRES[place], &mut bytes);
+        #[cfg(test)]
+        self.tape.read(self.now, place, &mut bytes);
         let at = self.moment();
         for byte in &bytes {
             if let Some(heard) = self.ears[place].push(*byte, at, &self.counts) {
@@ -338,6 +346,8 @@ impl Whole {
         while let Some(action) = self.bridge.next(self.moment()) {
             match action {
                 Action::Write(write) => {
+                    #[cfg(test)]
+                    self.tape.wrote(self.now, write.place, &write.packet);
                     self.robot.write(WIRES[write.place], &write.packet);
                     self.bridge.wrote(&write, true, self.moment());
                 }
@@ -410,7 +420,7 @@ impl Whole {
         for event in &said.events {
             match event.kind.get() {
                 Some(EventKind::Refused) => {
-                    self.seen.refused = Some((event.order_id, event.failure));
+                    self.seen.refused = Some((event.order_id, event.product, event.failure));
                 }
                 Some(EventKind::WayBlocked) => self.blocked += 1,
                 _ => {}
@@ -436,10 +446,11 @@ impl Whole {
         self.stirred = true;
     }
 
-    /// What the operator sees and does.
-    fn operate(&mut self) {
+    /// What a person would see, and what is done for the mission.
+    fn see_to_mission(&mut self) {
         self.seen.status = Some(self.navigator.status());
-        match self.operator.step(self.now, &self.seen) {
+        self.seen.queue = Some(self.navigator.queue());
+        match self.watch.step(self.now, &self.seen) {
             Some(Act::Ask(ask)) => self.ask(&ask),
             Some(Act::Order(order)) => self.tell_logic(Input::Order(&order)),
             None => {}
@@ -461,6 +472,8 @@ mod disturbed;
 #[cfg(test)]
 mod obstacles;
 #[cfg(test)]
+mod taped;
+#[cfg(test)]
 mod worn;
 
 #[cfg(test)]
@@ -468,24 +481,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_script_that_is_taken_over_again_and_again_is_delivered_once() {
+    fn a_mission_that_is_taken_over_again_and_again_is_delivered_once() {
         let warehouse = Warehouse::builtin("small").expect("built in");
         let mission = [1, 2];
-        // A successor sees nothing of what was before, not even the ids that were given.
         for every in [700, 1_900, 5_300, 13_700] {
             let mut whole =
                 Whole::new(&Config::default(), &warehouse, &mission, 1, 0).expect("a robot");
             let every = Duration::from_millis(every);
             let mut due = every;
-            while whole.operator.outcome().is_none() {
+            while whole.watch.mission().outcome().is_none() {
                 let failure = whole.run(due);
                 due += every;
                 assert!(due < Duration::from_secs(600), "{failure:?}");
-                let heir = whole.operator.script().clone();
-                whole.operator = ScriptedOperator::new(heir, due.as_millis() as u32 * 100);
+                whole.watch = Watch::new(whole.watch.mission().clone());
             }
-            assert_eq!(whole.operator.outcome(), Some(Ok(())), "every {every:?}");
-            assert_eq!(whole.operator.delivered(), mission, "every {every:?}");
+            let taken_over = whole.watch.mission();
+            assert_eq!(taken_over.outcome(), Some(Ok(())), "every {every:?}");
+            assert_eq!(taken_over.delivered(), mission, "every {every:?}");
             let delivered = whole.seen.status.map(|status| status.delivered);
             assert_eq!(delivered, Some(2), "every {every:?}");
             assert_eq!(whole.not_at_the_bar(), None, "every {every:?}");

@@ -3,8 +3,7 @@
 //! Alone it listens where it is told. As a child of `lager up` its standard output is the socket at
 //! which robots connect, and what it keeps lies in the robot's folder.
 
-use std::fs;
-use std::io::ErrorKind;
+use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
@@ -37,7 +36,7 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
     let (server, panel) = match args.parent {
         Some(parent) => {
             supervisor::adopt(parent, shutdown)?;
-            let server = Server::open(supervised(config, args.resume)?)?;
+            let server = Server::open(supervised(config)?)?;
             let panel = config.station.panel.and_then(|address| {
                 // Robots are served, whoever looks.
                 let panel = Panel::open(address, None, server.handle());
@@ -124,19 +123,31 @@ pub fn usual_panel() -> Result<SocketAddr> {
     Ok(socket.local_addr()?)
 }
 
-/// As `lager up` has started it. The first one begins with the robot's warehouse, a successor with
-/// what the one before it has saved.
-fn supervised(config: &Config, resume: bool) -> Result<ServerConfig> {
+/// Writes what the station that `lager up` starts begins with: the robot's warehouse, and what the
+/// robot is to fetch.
+///
+/// # Errors
+/// The robot's folder does not take it.
+pub fn prepare(config: &Config, products: &[i32]) -> Result<()> {
+    let kept = RuntimeFolder::warehouse(config)?;
+    save(&kept, &described(config)?)?;
+    let queue = BTreeMap::from([(config.name.clone(), products.to_vec())]);
+    Queues(queue).save(&Queues::beside(&kept))?;
+    Ok(())
+}
+
+/// As `lager up` has started it: with what was prepared, or what the one before it has saved.
+fn supervised(config: &Config) -> Result<ServerConfig> {
     let robots = std::io::stdout().as_fd().try_clone_to_owned()?;
     let kept = RuntimeFolder::warehouse(config)?;
-    if !(resume && kept.exists()) {
-        save(&kept, &described(config)?)?;
-        match fs::remove_file(Queues::beside(&kept)) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
-            _ => {}
-        }
+    if !kept.exists() {
+        // The robot's folder was removed.
+        prepare(config, &[])?;
     }
-    let gag = RuntimeFolder::gag(config)?;
+    let gag = match &config.station.gag {
+        Some(gag) => gag.clone(),
+        None => RuntimeFolder::gag(config)?,
+    };
     if gag.as_os_str().len() > LONGEST_SOCKET {
         tracing::warn!("no GaG can connect: {} is too long a path", gag.display());
     }
@@ -163,7 +174,11 @@ fn name() -> Result<Name> {
     Name::new(NAME).context("the station's name")
 }
 
-fn default_gag(config: &Config) -> Result<PathBuf> {
+/// Where a GaG connects to a station that nobody has told another place.
+///
+/// # Errors
+/// The place of the bus cannot be had.
+pub fn default_gag(config: &Config) -> Result<PathBuf> {
     Ok(config.bus()?.place()?.folder().join(GAG))
 }
 

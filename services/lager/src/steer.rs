@@ -172,6 +172,29 @@ impl Operator {
         Ok("the robot takes it that it stands on the delivery node".into())
     }
 
+    /// `lager press switch`: the other mode. A press toggles, so it is made once.
+    pub fn switch(&mut self) -> Result<String> {
+        let before = self.health()?.mode;
+        self.hands.press(Input {
+            kind: InputKind::SwitchPressed.into(),
+            id: Hands::fresh_id(),
+            ..Input::default()
+        })?;
+        let give_up = Instant::now() + PATIENCE;
+        while Instant::now() < give_up {
+            if let Some(health) = self.health.latest()?
+                && health.mode != before
+            {
+                return Ok(match health.mode.get() {
+                    Some(Mode::Autonomous) => "logic steers".into(),
+                    _ => "the operator steers".into(),
+                });
+            }
+            self.patience.pause(Duration::from_millis(20))?;
+        }
+        bail!("the bridge does not react")
+    }
+
     /// Presses a button until logic shows the effect.
     fn press_until(
         &self,

@@ -17,11 +17,14 @@ use lager_topics::Role;
 use crate::cli::UpArgs;
 use crate::config::{Body, ChipSection, Config, PickBy, StationSection};
 use crate::exit;
-use crate::operator::Script;
+use crate::hands::Hands;
+use crate::mission::Mission;
 use crate::runtime::RuntimeFolder;
 use crate::signals::Signals;
+use crate::station;
 use crate::stop;
 use crate::terminal::Terminal;
+use external::External;
 use robot::Robot;
 
 /// Runs until Ctrl-C, or until the mission has ended when that was asked for.
@@ -29,9 +32,9 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let signals = Signals::listen()?;
     apply(&mut config, args)?;
     config.validate()?;
-    let script = script(&config, args)?;
-    if script.is_some() {
-        // The script only orders.
+    let products = products(&config, args)?;
+    if products.is_some() {
+        // Nobody is there who would move the arm.
         config.logic.pick = PickBy::Auto;
     }
     rehearse(&config)?;
@@ -50,10 +53,11 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     }
     let external = external::choose(&mut config, args.headless)?;
     folder.write_config(&config)?;
+    let mission = ordered(&config, &external, products)?;
 
     stop::at_start(&config)?;
     let terminal = Terminal::new(args.json)?;
-    let mut robot = Robot::new(config, lock, external, script, signals, terminal)?;
+    let mut robot = Robot::new(config, lock, external, mission, signals, terminal)?;
     let ran = robot.run(args.exit_when_done);
     let outcome = robot.finish(args.exit_when_done, args.json);
     ran?;
@@ -64,29 +68,52 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     })
 }
 
-/// The script that is the operator, if there is to be one. Real boards do not move off by
-/// themselves: there somebody has to ask for the script, and to say what it is to do.
-fn script(config: &Config, args: &UpArgs) -> Result<Option<Script>> {
+/// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move off by
+/// themselves: there somebody has to ask for it twice.
+fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
     let mission = mission(&config.warehouse()?, &args.mission)?;
-    if config.body != Body::Serial {
-        return Ok(Some(Script::new(mission)));
-    }
     let usage = |why: &str| exit::Usage(why.to_owned());
+    if config.body != Body::Serial {
+        let is_elsewhere = config.station.wanted && config.station.address.is_some();
+        // Whoever has the station orders there.
+        return match (is_elsewhere && args.mission.is_empty(), args.exit_when_done) {
+            (true, true) => bail!(usage(
+                "--exit-when-done waits for the end of a mission; with the station of somebody else there is one with --mission"
+            )),
+            (true, false) => Ok(Some(Vec::new())),
+            (false, _) => Ok(Some(mission)),
+        };
+    }
     match (args.script, args.mission.is_empty()) {
-        (true, false) => Ok(Some(Script::new(mission))),
+        (true, false) => Ok(Some(mission)),
         (true, true) => {
             bail!(usage(
                 "on real boards --script needs --mission: say what it is to fetch"
             ))
         }
         (false, false) => bail!(usage(
-            "on real boards --mission needs --script: then a script drives the robot, and nobody may be in its way"
+            "on real boards --mission needs --script: then the robot drives by itself, and nobody may be in its way"
         )),
         (false, true) if args.exit_when_done => bail!(usage(
-            "--exit-when-done waits for a script's end; on real boards there is one with --script and --mission"
+            "--exit-when-done waits for the end of a mission; on real boards there is one with --script and --mission"
         )),
         (false, true) => Ok(None),
     }
+}
+
+/// Puts what is to be fetched into the queue of the robot's own station. Where there is none, the
+/// robot's own queue is given it.
+fn ordered(
+    config: &Config,
+    external: &External,
+    products: Option<Vec<i32>>,
+) -> Result<Option<Mission>> {
+    if external.listener.is_none() {
+        let first_id = Hands::fresh_id();
+        return Ok(products.map(|products| Mission::of_robot(&products, first_id)));
+    }
+    station::prepare(config, products.as_deref().unwrap_or_default())?;
+    Ok(products.map(|products| Mission::of_station(&products)))
 }
 
 /// Refuses before anything runs what the services would be refused, again and again, at every
@@ -124,6 +151,12 @@ pub fn mission(warehouse: &Warehouse, wanted: &[i32]) -> Result<Vec<i32>> {
     if let Some(unknown) = wanted.iter().find(|id| !known.contains(id)) {
         bail!(exit::Usage(format!(
             "--mission: the warehouse has no product {unknown}; it has {known:?}"
+        )));
+    }
+    if wanted.len() > lager_station::Robot::MOST_PRODUCTS {
+        bail!(exit::Usage(format!(
+            "--mission: at most {} products wait in a queue",
+            lager_station::Robot::MOST_PRODUCTS
         )));
     }
     if wanted.is_empty() {
@@ -179,10 +212,20 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     }
     if let Some(address) = &args.station {
         config.station = StationSection {
-            wanted: true,
             address: Some(address.clone()),
-            panel: None,
+            ..StationSection::default()
         };
+    }
+    if args.listen.is_some() || args.gag.is_some() {
+        // Both are those of a station that is started here.
+        config.station.wanted = true;
+        config.station.address = None;
+    }
+    if let Some(listen) = args.listen {
+        config.station.listen = Some(listen);
+    }
+    if let Some(gag) = &args.gag {
+        config.station.gag = Some(std::path::absolute(gag)?);
     }
     if let Some(panel) = args.panel {
         config.station.panel = Some(panel);

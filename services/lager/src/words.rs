@@ -5,13 +5,13 @@
 //!
 //! ```text
 //!   supervisor                                        attendant
-//!       │  begin (robot's start, script, what to sweep)   │
+//!       │  begin (robot's start, mission, what to sweep)  │
 //!       │ ───────────────────────────────────────────────>│ sweeps the bus
 //!       │ <───────────────────────────────────────── swept│
 //!       │  (starts the body)                              │ joins the bus
 //!       │ <───────────── pulse, from then on 5 times a second, ready = 1 once it has joined
 //!       │  started (bridge, its process) …                │ listens for it
-//!       │ <────────────────── notes, the script's progress, silence, damage
+//!       │ <────────────────── notes, the mission's progress, silence, damage
 //!       │  hand-over (bridge)                             │ publishes what is kept
 //!       │ <─────────────────────────── handed-over (bridge)
 //!       │  SIGTERM                                        │
@@ -29,11 +29,11 @@ use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::operator::Script;
+use crate::mission::Mission;
 use crate::report::Note;
 use crate::services::Service;
 
-/// The longest message. A script with all products of a large warehouse has some hundreds of bytes.
+/// The longest message. A mission with all products of a large warehouse has some hundreds of bytes.
 const LONGEST: usize = 32 * 1_024;
 
 /// From the supervisor to the attendant.
@@ -53,8 +53,8 @@ pub enum Request {
 pub struct Begin {
     /// The robot's time at its start, once a clock has shown it.
     pub robot_start: Option<Duration>,
-    /// The operator's script, if it is to be played.
-    pub script: Option<Script>,
+    /// The mission, if there is one.
+    pub mission: Option<Mission>,
     /// What is to be removed first.
     pub sweep: Sweep,
 }
@@ -88,9 +88,9 @@ pub enum Word {
     Silent(Silence),
     /// The bus cannot be used any more, and why.
     Damaged(String),
-    /// How far the script has come.
-    Script(Script),
-    /// Products that the script has delivered and that do not lie at the delivery station.
+    /// How far the mission has come.
+    Mission(Mission),
+    /// Products that the mission has delivered and that do not lie at the delivery station.
     Misplaced(Vec<i32>),
 }
 

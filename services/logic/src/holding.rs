@@ -1,10 +1,12 @@
 //! Why the robot stands although its phase would turn the wheels: the steering board is unheard,
-//! the arm is not in the carry pose, the battery is low, or no line frames come.
+//! the arm is not in the carry pose, the battery is low, the external computer is out of reach, or no
+//! line frames come.
 //!
 //! ```text
 //!   no report for 200 ms ------> Unheard ---- a report; a turn that was under way is judged --->
 //!   goods, a joint elsewhere --> Arm -------- all joints are where they are carried ---------->
 //!   low for a while, a node ---> Battery ---- charged for a while, or a person's reset ------->
+//!   told so, a node -----------> Link ------- told that the link is there again -------------->
 //!   no line frame for 120 ms --> Blind ------ a line frame ----------------------------------->
 //! ```
 //!
@@ -21,7 +23,7 @@ use crate::arm::ArmSeen;
 use crate::config::LogicConfig;
 use crate::output::Output;
 
-/// What keeps the robot standing, but for the battery, which is the mission's.
+/// What keeps the robot standing, but for battery and link, which are the mission's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Holding {
     /// When the steering board last reported; before its first report, when it was first missed.

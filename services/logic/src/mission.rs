@@ -83,7 +83,9 @@ pub(crate) struct Mission {
     /// The operator was believed although the claw does not feel the goods.
     pub(crate) forced: bool,
     pub(crate) battery: Battery,
-    /// It stands at the node because the battery is low.
+    /// It is to do nothing without the external computer, which is out of reach.
+    pub(crate) link_lost: bool,
+    /// It stands at the node because of either.
     pub(crate) parked: bool,
     /// Why it cannot go on.
     pub(crate) failure: Failure,
@@ -113,6 +115,7 @@ impl Mission {
             tries: 0,
             forced: false,
             battery: Battery::default(),
+            link_lost: false,
             parked: false,
             failure: Failure::default(),
             route: Route::default(),
@@ -455,11 +458,20 @@ impl Mission {
         }
     }
 
-    /// Stands at the node just reached if the battery is low; whether it does.
+    /// Whether no new way may be begun.
+    pub(crate) fn must_park(&self) -> bool {
+        self.battery.forbids() || self.link_lost
+    }
+
+    /// Stands at the node just reached if no new way may be begun; whether it does.
     fn parks(&mut self, out: &mut Output) -> bool {
-        if self.battery.forbids() {
+        if self.must_park() {
             self.parked = true;
-            out.think_of(ThoughtKind::Parked, self.place.node);
+            let kind = match self.battery.forbids() {
+                true => ThoughtKind::Parked,
+                false => ThoughtKind::ParkedWithoutLink,
+            };
+            out.think_of(kind, self.place.node);
         }
         self.parked
     }

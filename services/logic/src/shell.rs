@@ -246,9 +246,18 @@ impl Shell {
                         self.decide(Input::MoveUp(input.order_id), cause);
                     }
                     Some(InputKind::QueueCleared) => self.decide(Input::ClearQueue, cause),
+                    Some(kind @ (InputKind::LinkLost | InputKind::LinkBack)) => {
+                        let lost = kind == InputKind::LinkLost;
+                        self.decide(Input::Link { lost }, cause);
+                    }
                     Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
                     // The switch is the bridge's (E14): the mode comes back with its health.
-                    Some(InputKind::SwitchPressed) | None => {}
+                    Some(
+                        InputKind::SwitchPressed
+                        | InputKind::SwitchedToManual
+                        | InputKind::SwitchedToAutonomous,
+                    )
+                    | None => {}
                 }
             }
         }

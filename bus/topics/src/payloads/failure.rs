@@ -106,6 +106,8 @@ coded! {
         Resume = 10,
         /// The robot is given the autonomous mode.
         Mode = 11,
+        /// The external computer is there again.
+        Link = 12,
     }
 }
 
@@ -315,6 +317,7 @@ impl fmt::Display for Remedy {
             Self::Charge => "Charge the battery, or put me down anew and press reset.",
             Self::Resume => "Release the stop.",
             Self::Mode => "Give me the autonomous mode.",
+            Self::Link => "I go on when the external computer is there again.",
         })
     }
 }

@@ -119,6 +119,12 @@ coded! {
         QueueCleared = 50,
         /// The turn to the station has passed its mark.
         StationPassed = 51,
+        /// The external computer is out of reach; the robot stands at the next node.
+        LinkLost = 52,
+        /// It is there again.
+        LinkBack = 53,
+        /// It stands at the node (`x`, `y`) until the external computer is there again.
+        ParkedWithoutLink = 54,
     }
 }
 
@@ -277,6 +283,15 @@ impl fmt::Display for Thought {
                 to,
                 "I stand at crossing ({x}, {y}): the battery is low. Charge it, or put me down \
                  anew and press reset."
+            ),
+            ThoughtKind::LinkLost => write!(
+                to,
+                "The external computer is out of reach. I stand at the next crossing."
+            ),
+            ThoughtKind::LinkBack => write!(to, "The external computer is there again."),
+            ThoughtKind::ParkedWithoutLink => write!(
+                to,
+                "I stand at crossing ({x}, {y}) until the external computer is there again."
             ),
             ThoughtKind::JointUnheard => write!(
                 to,

@@ -163,6 +163,14 @@ coded! {
         OrderMovedUp = 6,
         /// No waiting order is to be carried out.
         QueueCleared = 7,
+        /// The external computer is out of reach, and the robot is to stand at the next node.
+        LinkLost = 8,
+        /// It is there again.
+        LinkBack = 9,
+        /// The switch of the robot has been moved to manual mode.
+        SwitchedToManual = 10,
+        /// The switch of the robot has been moved to autonomous mode.
+        SwitchedToAutonomous = 11,
     }
 }
 

@@ -95,6 +95,8 @@ coded! {
         Arm = 3,
         /// The battery is low.
         Battery = 4,
+        /// The external computer is out of reach, and the robot is to stand then.
+        Link = 5,
     }
 }
 
@@ -107,6 +109,7 @@ impl Hold {
             Self::Unheard => Remedy::Report,
             Self::Arm => Remedy::Arm,
             Self::Battery => Remedy::Charge,
+            Self::Link => Remedy::Link,
         }
     }
 }

@@ -255,6 +255,14 @@ impl BridgeCore {
         }
     }
 
+    /// The switch was moved to `mode`.
+    pub fn switch(&mut self, mode: Mode) {
+        if self.arbiter.mode() != mode {
+            self.say(News::Pressed(mode));
+            self.arbiter.set_mode(mode);
+        }
+    }
+
     /// The stop word has been set: standby is due before everything else.
     #[cold]
     pub fn stop(&mut self, stop: Stop) {

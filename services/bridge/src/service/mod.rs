@@ -25,14 +25,15 @@ use std::time::Duration;
 
 use heapless::spsc::{Consumer, Queue};
 use lager_ports::{
-    Bus, Clock, PortError, Publisher, ReceiveError, Sample, Server, Shutdown, StopPage, Subscriber,
-    Waiter,
+    Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, Server, Shutdown, StopPage,
+    Subscriber, Waiter,
 };
 use lager_topics::{
-    Answer, Ask, BridgeRequest, Health, InputKind, LatencyPath, LinkHealth, OperatorInput,
-    SteeringCommand, SteeringState, StopCause, Topic,
+    Answer, Ask, BridgeRequest, Health, Input, InputKind, LatencyPath, LinkHealth, Mode,
+    OperatorInput, SteeringCommand, SteeringState, StopCause, Topic,
 };
 
+use crate::buttons::{self, Touch};
 use crate::config::BridgeConfig;
 use crate::counts::Counts;
 use crate::events::{Moment, PortEvent};
@@ -47,6 +48,9 @@ const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
 /// How long an earlier bridge's state is waited for, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
+
+/// Touches of the buttons that can wait for the main loop.
+const TOUCHES: usize = 16;
 
 /// How long a shutdown waits for the wheels to stand, in robot time.
 const PARKING: Duration = Duration::from_millis(200);
@@ -74,9 +78,12 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
     let [first, second] = &mut queues;
     let (first_in, first_out) = first.split();
     let (second_in, second_out) = second.split();
+    let mut touches: Queue<Touch, TOUCHES> = Queue::new();
+    let (mut touched, touches) = touches.split();
 
     let server = bus.server::<BridgeRequest>()?;
-    let mut service = Service::new(bus, config, &counts, kept.as_ref(), [first_out, second_out])?;
+    let events = [first_out, second_out];
+    let mut service = Service::new(bus, config, &counts, kept.as_ref(), events, touches)?;
     let ringer = service.waiter.ringer()?;
     shutdown.wake(ringer.clone());
     // The word decides whether the robot is stopped. If it is clear although a stop was latched,
@@ -98,6 +105,24 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
                 .map_err(|error| PortError::Transport {
                     topic: "link/health".to_owned(),
                     detail: format!("no thread for a serial port: {error}"),
+                })
+                .inspect_err(|_| end.store(true, Ordering::Release))?;
+        }
+        if let Some(config) = &config.buttons {
+            let (ringer, end, resume) = (ringer.clone(), &end, kept.is_some());
+            let watch = move || {
+                buttons::watch(config, resume, end, |touch| {
+                    // A main loop that has not taken so many hangs, and will be replaced.
+                    let _ = touched.enqueue(touch);
+                    ringer.ring();
+                });
+            };
+            std::thread::Builder::new()
+                .name("buttons".to_owned())
+                .spawn_scoped(scope, watch)
+                .map_err(|error| PortError::Transport {
+                    topic: "operator/input".to_owned(),
+                    detail: format!("no thread for the buttons: {error}"),
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;
         }
@@ -125,6 +150,9 @@ struct Service<'a> {
     waiter: Waiter,
     orders: Subscriber<SteeringCommand>,
     inputs: Subscriber<OperatorInput>,
+    touches: Consumer<'a, Touch>,
+    /// Where the buttons are told, where there are any.
+    touched: Option<Publisher<OperatorInput>>,
     state: Publisher<SteeringState>,
     health: Publisher<LinkHealth>,
     latency: Publisher<LatencyPath>,
@@ -143,6 +171,7 @@ impl<'a> Service<'a> {
         counts: &'a Counts,
         kept: Option<&Health>,
         events: [Consumer<'a, FromReader>; 2],
+        touches: Consumer<'a, Touch>,
     ) -> Result<Self, PortError> {
         let port = |events| Port {
             events,
@@ -173,6 +202,11 @@ impl<'a> Service<'a> {
             waiter,
             orders: bus.subscriber()?,
             inputs: bus.subscriber()?,
+            touches,
+            touched: match config.buttons {
+                Some(_) => Some(bus.publisher()?),
+                None => None,
+            },
             state: bus.publisher()?,
             health: bus.publisher()?,
             latency: bus.publisher()?,
@@ -189,6 +223,7 @@ impl<'a> Service<'a> {
     fn turn(&mut self, server: &Server<BridgeRequest>) {
         self.wait();
         self.take_events();
+        self.take_touches();
         if self.waiter.has_request::<BridgeRequest>()
             && let Err(error) = server.serve(|ask| self.answer(ask))
         {
@@ -226,6 +261,28 @@ impl<'a> Service<'a> {
                 if matches!(event, PortEvent::Lost) {
                     self.ports[place].device = None;
                 }
+            }
+        }
+    }
+
+    /// Takes what people have done to the buttons, and tells logic and observers.
+    fn take_touches(&mut self) {
+        while let Some(touch) = self.touches.dequeue() {
+            let kind = match touch {
+                Touch::Reset => InputKind::ResetPressed,
+                Touch::Switched(Mode::Manual) => InputKind::SwitchedToManual,
+                Touch::Switched(Mode::Autonomous) => InputKind::SwitchedToAutonomous,
+            };
+            if let Touch::Switched(mode) = touch {
+                self.core.switch(mode);
+            }
+            let input = Input {
+                kind: kind.into(),
+                ..Input::default()
+            };
+            let told = self.touched.as_ref().map(|to| to.send(Cause::OWN, input));
+            if let Some(Err(error)) = told {
+                self.complain(&error);
             }
         }
     }

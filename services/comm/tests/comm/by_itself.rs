@@ -1,7 +1,10 @@
 //! Autonomous: what is asked, what is made of the answers, and what goes wrong.
 
+use lager_comm::LinkLost;
 use lager_lines::splitter::LineError;
-use lager_topics::{Event, EventKind, Finish, Mode, Order, Origin, Phase, SteeringReport};
+use lager_topics::{
+    Event, EventKind, Finish, Hold, Mode, NavigatorStatus, Order, Origin, Phase, SteeringReport,
+};
 
 use crate::robot::Robot;
 
@@ -24,7 +27,8 @@ fn a_product_is_fetched_picked_and_delivered() {
     assert_eq!(robot.hears(&["sidelength 40"]), ["karta"]);
     assert_eq!(robot.hears(&["karta 4 3 0 0"]), ["prodlis"]);
     let said = robot.hears(&["prodlist 1 7 1 0 down"]);
-    assert_eq!(said, ["[map 4x3]", "fetchprod"]);
+    assert_eq!(said, ["[map 4x3]"], "logic does not know it yet");
+    assert_eq!(robot.does(Phase::WaitingForOrder, None), ["fetchprod"]);
     let map = robot.map.take().expect("it is published");
     assert_eq!((map.side_length_cm, map.products()[0].id), (40, 7));
 
@@ -79,6 +83,43 @@ fn an_order_goes_on_without_its_link_and_is_not_asked_for_again() {
     let said = robot.hears(&["prodlis 2 7 1 0 down 12 0 1 left"]);
     assert_eq!(said, [""; 0]);
     assert_eq!(robot.does(Phase::Dropping, None), ["fetchprod"]);
+}
+
+#[test]
+fn a_robot_that_does_not_know_where_it_is_asks_for_no_product() {
+    for phase in [Phase::Lost, Phase::Stuck] {
+        let mut robot = Robot::connected(Mode::Autonomous);
+        robot.does(phase, None);
+        robot.hears(&["sidelength 40"]);
+        robot.hears(&["karta 4 3 0 0"]);
+        let said = robot.hears(&["prodlis 2 7 1 0 down 12 0 1 left"]);
+        assert_eq!(said, ["[map 4x3]"]);
+        assert_eq!(robot.pass(1_000), [""; 0]);
+        assert_eq!(robot.does(Phase::WaitingForOrder, None), ["fetchprod"]);
+    }
+}
+
+#[test]
+fn a_robot_that_stands_without_its_link_is_told_so_until_it_is_back() {
+    let mut robot = Robot::that(Mode::Autonomous, None, LinkLost::Stand);
+    // Nobody has connected yet, and logic is told four times a second.
+    let said = robot.pass(1_000);
+    assert_eq!(said, ["[presses LinkLost]"; 4]);
+    let said = robot.connect();
+    let back = said.iter().filter(|line| *line == "[presses LinkBack]");
+    assert_eq!(back.count(), 1, "{said:?}");
+    robot.disconnect();
+    assert_eq!(robot.pass(10), ["[presses LinkLost]"]);
+    robot.connect();
+    // Logic has not heard it, or stands for a comm that was killed.
+    robot.status(&NavigatorStatus {
+        phase: Phase::Driving.into(),
+        hold: Hold::Link.into(),
+        ..NavigatorStatus::default()
+    });
+    let said = robot.pass(1_000);
+    let back = said.iter().filter(|line| *line == "[presses LinkBack]");
+    assert!(back.count() >= 3, "{said:?}");
 }
 
 #[test]

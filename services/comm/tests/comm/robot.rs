@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use lager_comm::{Action, Conversation, Moment};
+use lager_comm::{Action, Conversation, LinkLost, Moment};
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
 use lager_topics::{
@@ -36,9 +36,13 @@ impl Robot {
     }
 
     pub(crate) fn with_map(mode: Mode, kept: Option<WarehouseMap>) -> Self {
+        Self::that(mode, kept, LinkLost::GoOn)
+    }
+
+    pub(crate) fn that(mode: Mode, kept: Option<WarehouseMap>, link_lost: LinkLost) -> Self {
         let name = Name::new("r1").expect("a name");
         let mut robot = Self {
-            conversation: Conversation::new(name, kept),
+            conversation: Conversation::new(name, kept, link_lost),
             now: Moment {
                 robot: Duration::from_secs(1),
                 ns: 1_000_000_000,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use lager_wire::{ArmPose, JointLimits};
 
-use super::{Body, Config, PickBy, Waiting};
+use super::{Body, Config, PickBy, Waiting, WithoutLink};
 use crate::realtime::CoreSet;
 
 impl Config {
@@ -21,6 +21,10 @@ impl Config {
                 name,
                 path.as_ref().map(|path| path.to_string_lossy()).as_deref(),
             )
+        };
+        let line = |name: &str, value: Option<u32>| match value {
+            Some(value) => format!("{name} = {value}"),
+            None => format!("# {name} = 17"),
         };
         format!(
             "\
@@ -124,7 +128,7 @@ ranger_cm = {ranger}
 # unreachable.
 try_again_s = {try_again}
 # Who picks the goods up: \"manual\" (a person moves the arm and says when it is done) or \"auto\" (the
-# robot by itself). Where the script plays the operator the robot picks by itself.
+# robot by itself). With a mission from the start the robot picks by itself.
 pick = {pick}
 
 [simulator]
@@ -153,9 +157,30 @@ wanted = {station_wanted}
 # Host and port of one that runs already. Unset, `lager up` starts one at 127.0.0.1:7420, or at
 # another port where that is taken.
 {station_address}
+# Where robots connect to the one that `lager up` starts, instead.
+{station_listen}
+# The path of the socket at which a GaG connects to it. Unset, it is in the robot's folder of the bus.
+{station_gag}
 # Where the operator panel of such a station answers browsers of this machine. Unset, 127.0.0.1:7410,
 # or another port where that is taken.
 {station_panel}
+
+[comm]
+# What the robot does in autonomous mode while the external computer is out of reach: \"go-on\" (it
+# carries out its orders) or \"stand\" (it drives on to the next crossing and stands there until the
+# link is there again). In manual mode it stands at once.
+link_lost = {link_lost}
+
+[buttons]
+# The robot's reset button and mode switch, as lines of a GPIO chip that a closed contact pulls to
+# ground, such as /dev/gpiochip0. Unset, there are none.
+{buttons_chip}
+# The line of the reset button, by its offset: the robot has been put on the delivery node.
+{buttons_reset}
+# The line of the mode switch: open is manual, closed autonomous.
+{buttons_switch}
+# For how many ms a contact must be steady; at most 500.
+debounce_ms = {debounce}
 ",
             name = quoted(&self.name),
             speed = self.speed,
@@ -209,6 +234,19 @@ wanted = {station_wanted}
             clock = unset_path("clock", &self.chip.clock),
             station_wanted = self.station.wanted,
             station_address = unset("address", self.station.address.as_deref()),
+            buttons_chip = unset_path("chip", &self.buttons.chip),
+            buttons_reset = line("reset", self.buttons.reset),
+            buttons_switch = line("switch", self.buttons.switch),
+            debounce = self.buttons.debounce_ms,
+            link_lost = match self.comm.link_lost {
+                WithoutLink::GoOn => "\"go-on\"",
+                WithoutLink::Stand => "\"stand\"",
+            },
+            station_listen = unset(
+                "listen",
+                self.station.listen.map(|listen| listen.to_string()).as_deref()
+            ),
+            station_gag = unset_path("gag", &self.station.gag),
             station_panel = unset(
                 "panel",
                 self.station.panel.map(|panel| panel.to_string()).as_deref()
@@ -245,7 +283,10 @@ fn pose(pose: &ArmPose) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::realtime::CoresSection;
-    use super::super::{BusSection, ChipSection, LogSection, RealtimeSection, StationSection};
+    use super::super::{
+        BusSection, ButtonsSection, ChipSection, CommSection, LogSection, RealtimeSection,
+        StationSection,
+    };
     use super::*;
     use lager_wire::{ArmLimits, ArmProfile};
 
@@ -293,7 +334,18 @@ mod tests {
             station: StationSection {
                 wanted: false,
                 address: Some("192.168.1.5:7420".into()),
+                listen: Some("127.0.0.1:7421".parse().expect("an address")),
+                gag: Some("/run/gag".into()),
                 panel: Some("127.0.0.1:7411".parse().expect("an address")),
+            },
+            comm: CommSection {
+                link_lost: WithoutLink::Stand,
+            },
+            buttons: ButtonsSection {
+                chip: Some("/dev/gpiochip4".into()),
+                reset: Some(5),
+                switch: Some(6),
+                debounce_ms: 30,
             },
             ..Config::default()
         };

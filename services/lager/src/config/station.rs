@@ -1,7 +1,9 @@
-//! `[station]`: the external computer that the robot talks to.
+//! `[station]`: the external computer that the robot talks to, and `[comm]`: how.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
+use lager_comm::LinkLost;
 use serde::{Deserialize, Serialize};
 
 /// `[station]`: the external computer that the robot talks to.
@@ -13,6 +15,12 @@ pub struct StationSection {
     /// Host and port of one that runs already; unset, `up` starts one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
+    /// Where robots connect to a station that `up` starts; unset, `up` chooses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub listen: Option<SocketAddr>,
+    /// The socket at which a GaG connects to it; unset, it is in the robot's folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gag: Option<PathBuf>,
     /// Where a station that `up` starts shows its panel; unset, `up` chooses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panel: Option<SocketAddr>,
@@ -30,7 +38,37 @@ impl Default for StationSection {
         Self {
             wanted: true,
             address: None,
+            listen: None,
+            gag: None,
             panel: None,
+        }
+    }
+}
+
+/// `[comm]`: how the robot talks to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CommSection {
+    /// What it does in autonomous mode while it is out of reach.
+    pub link_lost: WithoutLink,
+}
+
+/// What a robot does in autonomous mode without its external computer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WithoutLink {
+    /// It goes on with its orders.
+    #[default]
+    GoOn,
+    /// It ends the edge and stands until the link is there again.
+    Stand,
+}
+
+impl From<WithoutLink> for LinkLost {
+    fn from(wanted: WithoutLink) -> Self {
+        match wanted {
+            WithoutLink::GoOn => Self::GoOn,
+            WithoutLink::Stand => Self::Stand,
         }
     }
 }

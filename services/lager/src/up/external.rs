@@ -3,6 +3,7 @@
 //! ```text
 //!   --no-station            none: `up` tells the robot its warehouse
 //!   --station HOST:PORT     that one
+//!   --listen HOST:PORT      one of this robot's own, there
 //!   127.0.0.1:7420 is free  one of this robot's own, there
 //!   it is taken             by this user's station for the same warehouse: that one
 //!                           by anything else: one of this robot's own, at a port that is free
@@ -89,13 +90,25 @@ fn station_for(config: &mut Config) -> Result<External> {
         });
     }
     if let Err(error) = station::described(config) {
+        if config.station.listen.is_some() || config.station.gag.is_some() {
+            return Err(error);
+        }
         return Ok(none(config, &error));
+    }
+    if let Some(wanted) = config.station.listen {
+        let listener = TcpListener::bind(wanted).with_context(|| {
+            format!("robots cannot connect to {wanted}; --listen takes another address")
+        })?;
+        return Ok(own(config, listener, ""));
     }
     let taken = match TcpListener::bind(StationSection::USUAL) {
         Ok(listener) => return Ok(own(config, listener, "")),
         Err(error) => error,
     };
-    if let Some((robot, panel)) = neighbour(config)? {
+    // Who wants a GaG of this robot's own wants a station of its own.
+    if config.station.gag.is_none()
+        && let Some((robot, panel)) = neighbour(config)?
+    {
         let address = StationSection::USUAL.to_owned();
         let told = format!("the external computer is that of robot `{robot}`, at {address}");
         config.station.address = Some(address);
@@ -146,7 +159,10 @@ fn neighbour(config: &Config) -> Result<Option<(String, Option<SocketAddr>)>> {
             ..config.clone()
         });
         let theirs = theirs.ok().flatten()?;
-        let gag = RuntimeFolder::gag(&theirs);
+        let gag = match &theirs.station.gag {
+            Some(gag) => Ok(gag.clone()),
+            None => RuntimeFolder::gag(&theirs),
+        };
         let serves = gag
             .and_then(|gag| Ok(fs::symlink_metadata(gag)?.file_type().is_socket()))
             .unwrap_or(false);

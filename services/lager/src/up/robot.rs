@@ -22,7 +22,7 @@ use anyhow::{Result, bail};
 use super::external::External;
 use super::resets::{MOST, Remedy, Resets};
 use crate::config::Config;
-use crate::operator::Script;
+use crate::mission::Mission;
 use crate::outcome::Outcome;
 use crate::report::Note;
 use crate::runtime::NameLock;
@@ -57,7 +57,7 @@ pub struct Robot {
     owed: Vec<Owed>,
     /// The external computer, and where it listens if it is this robot's own.
     external: External,
-    script: Option<Script>,
+    mission: Option<Mission>,
     /// Products that were delivered and do not lie where they should.
     misplaced: Vec<i32>,
     figures: Figures,
@@ -116,7 +116,7 @@ impl Robot {
         config: Config,
         lock: NameLock,
         external: External,
-        script: Option<Script>,
+        mission: Option<Mission>,
         signals: Signals,
         terminal: Terminal,
     ) -> Result<Self> {
@@ -128,7 +128,7 @@ impl Robot {
             attendant: Attendant::absent(),
             owed: Vec::new(),
             external,
-            script,
+            mission,
             misplaced: Vec::new(),
             figures: Figures::new(now),
             signals,
@@ -140,7 +140,7 @@ impl Robot {
         })
     }
 
-    /// Runs until a signal asks for the end, or with `exit_when_done` the script has ended.
+    /// Runs until a signal asks for the end, or with `exit_when_done` the mission has ended.
     ///
     /// # Errors
     /// The robot does not start, or the bus does not hold.
@@ -154,7 +154,7 @@ impl Robot {
             if let Some(why) = self.turn()? {
                 self.begin_again(&why)?;
             }
-            let ended = self.script.as_ref().and_then(Script::outcome).is_some();
+            let ended = self.mission.as_ref().and_then(Mission::outcome).is_some();
             let over = ended || self.supervisor.hopeless().is_some();
             // A damaged bus is swept before the end, too.
             if exit_when_done && over && self.stage != Stage::Sweeping {
@@ -173,8 +173,8 @@ impl Robot {
         let hopeless = self.supervisor.hopeless();
         // The robot is stopped before anything else is looked at.
         self.stop(PATIENCE);
-        let script = self.script.take().unwrap_or_default();
-        let failure = match script.outcome() {
+        let mission = self.mission.take().unwrap_or_default();
+        let failure = match mission.outcome() {
             Some(Err(why)) => Some(why.to_owned()),
             None if exit_when_done => Some(match hopeless {
                 Some(service) => format!("the {service} ends at every start"),
@@ -184,7 +184,7 @@ impl Robot {
                 .map(|product| format!("product {product} does not lie at the delivery station")),
         };
         let outcome = Outcome {
-            delivered: script.delivered,
+            delivered: mission.delivered().to_vec(),
             sim_seconds: self.figures.robot_time.as_secs_f64(),
             wall_seconds: self.figures.started.elapsed().as_secs_f64(),
             frames: self.figures.frames,
@@ -223,8 +223,8 @@ impl Robot {
             }
         }
         self.stop(HASTE);
-        if let Some(script) = &mut self.script {
-            script.give_up(&format!(
+        if let Some(mission) = &mut self.mission {
+            mission.give_up(&format!(
                 "the robot was started again in the middle of it: {why}"
             ));
         }
@@ -326,7 +326,7 @@ impl Robot {
             }
             Word::Silent(silence) => return self.take_silence(silence),
             Word::Damaged(why) => return Some(why),
-            Word::Script(script) => self.script = Some(script),
+            Word::Mission(mission) => self.mission = Some(mission),
             Word::Misplaced(products) => self.misplaced = products,
         }
         None
@@ -466,7 +466,7 @@ impl Robot {
         self.attendant.line = Some(line);
         self.tell(&Request::Begin(Begin {
             robot_start: self.figures.robot_start,
-            script: self.script.clone(),
+            mission: self.mission.clone(),
             sweep,
         }));
         for (service, pid) in self.supervisor.running() {

@@ -102,7 +102,7 @@ impl Mission {
     /// Begins the first of the waiting orders that can be reached from the node it stands on. Those
     /// before it are put off; where none can be reached, it stands until the ways are others.
     pub(crate) fn begin_next(&mut self, out: &mut Output) -> bool {
-        if self.queue.waiting().is_empty() || self.battery.forbids() {
+        if self.queue.waiting().is_empty() || self.must_park() {
             return false;
         }
         self.forget_old_blocks(out);

@@ -100,7 +100,12 @@ impl Navigator {
             seen: decivolts.into(),
             ..kind.into()
         });
-        if !is_low && core::mem::take(&mut self.mission.parked) {
+        self.leave_park(now, out);
+    }
+
+    /// Sets out again from the node at which it has stood, if nothing keeps it there any more.
+    pub(super) fn leave_park(&mut self, now: Duration, out: &mut Output) {
+        if !self.mission.must_park() && core::mem::take(&mut self.mission.parked) {
             self.mission.set_out(out);
             self.begin(now, out);
         }

@@ -53,6 +53,11 @@ pub enum Input<'a> {
         /// Who says so.
         source: BlockSource,
     },
+    /// Whether the robot is to stand at the next node, since the external computer is out of reach.
+    Link {
+        /// It is.
+        lost: bool,
+    },
     /// Who may drive, and whether a stop is latched, as the bridge has it.
     Mode {
         /// Who may drive.

@@ -347,8 +347,10 @@ impl Navigator {
     fn hold(&self) -> Hold {
         if self.holding.unheard {
             Hold::Unheard
-        } else if self.mission.parked {
+        } else if self.mission.parked && self.mission.battery.forbids() {
             Hold::Battery
+        } else if self.mission.parked {
+            Hold::Link
         } else if self.holding.joint_off.is_some() {
             Hold::Arm
         } else if self.holding.blind && self.manoeuvre.line().is_some() || self.misses_distances() {

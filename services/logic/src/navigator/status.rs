@@ -113,6 +113,9 @@ impl Navigator {
             mission.parked = true;
             mission.battery = Battery::LOW;
         }
+        if status.hold == Hold::Link {
+            (mission.parked, mission.link_lost) = (true, true);
+        }
         navigator.frames = status.frames;
         navigator.by_hand = ByHand::from_status(status.driven_by_hand);
         let senses = &mut navigator.senses;

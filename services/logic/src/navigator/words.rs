@@ -21,6 +21,7 @@ impl Navigator {
         out.status_changed |= match input {
             Input::DrivenByHand(_) => false,
             Input::Mode { mode, stopped } => (self.mode, self.stopped) != (Some(mode), stopped),
+            Input::Link { lost } => self.mission.link_lost != lost,
             _ => true,
         };
         match input {
@@ -49,6 +50,7 @@ impl Navigator {
                     self.begin(now, out);
                 }
             }
+            Input::Link { lost } => self.take_link(now, lost, out),
             Input::Mode { mode, stopped } => self.set_mode(mode, stopped),
             Input::Line(_) | Input::Distance(_) | Input::Steering(_) | Input::Tick => {}
         }
@@ -62,6 +64,17 @@ impl Navigator {
         self.mode = Some(mode);
         self.stopped = stopped;
         self.learn_whether_active();
+    }
+
+    fn take_link(&mut self, now: Duration, lost: bool, out: &mut Output) {
+        if core::mem::replace(&mut self.mission.link_lost, lost) == lost {
+            return;
+        }
+        out.think(match lost {
+            true => ThoughtKind::LinkLost,
+            false => ThoughtKind::LinkBack,
+        });
+        self.leave_park(now, out);
     }
 
     fn learn_whether_active(&mut self) {

@@ -1,5 +1,5 @@
 //! What keeps a robot standing that would drive: a silent board, an arm that is not in the carry
-//! pose, an empty claw, a low battery, an unknown place.
+//! pose, an empty claw, a low battery, a lost link, an unknown place.
 
 use std::time::Duration;
 
@@ -265,6 +265,48 @@ fn with_a_low_battery_the_robot_ends_at_the_next_node_and_goes_on_when_it_is_cha
         trial.body.battery = 111;
         trial.deliver(1);
     }
+}
+
+#[test]
+fn without_its_link_the_robot_ends_the_edge_and_goes_on_when_it_is_back() {
+    for phase in [Phase::Driving, Phase::Leaving, Phase::Exiting] {
+        let mut trial = run_to(phase);
+        trial.tell(Input::Link { lost: true });
+        assert!(
+            trial.run_until(SECOND * 60, |trial| hold(trial) == Some(Hold::Link)),
+            "{}",
+            trial.story()
+        );
+        let side = 450.0;
+        let off = [trial.body.x, trial.body.y].map(|mm| (mm - (mm / side).round() * side).abs());
+        assert!(off.iter().all(|off| *off < 25.0), "at a node: {off:?}");
+        trial.run_for(SECOND);
+        assert_stands(&mut trial, SECOND * 5);
+        // Its successor stands too, before anybody tells it.
+        trial.kill(Duration::from_millis(200));
+        assert_stands(&mut trial, SECOND * 5);
+        trial.tell(Input::Link { lost: false });
+        trial.deliver(1);
+    }
+}
+
+#[test]
+fn without_its_link_no_order_is_begun_and_a_robot_that_stands_for_two_reasons_waits_for_both() {
+    let mut trial = mission();
+    trial.deliver(1);
+    trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::WaitingForOrder);
+    trial.tell(Input::Link { lost: true });
+    trial.order(2, 2);
+    trial.run_for(SECOND * 5);
+    let waits = (Phase::WaitingForOrder, 1);
+    assert_eq!((trial.phase(), trial.status.waiting), waits);
+    trial.body.battery = 90;
+    trial.run_for(SECOND * 5);
+    trial.tell(Input::Link { lost: false });
+    trial.run_for(SECOND * 5);
+    assert_eq!((trial.phase(), trial.status.waiting), waits);
+    trial.body.battery = 111;
+    trial.deliver(2);
 }
 
 #[test]

@@ -56,8 +56,18 @@ impl Running {
         Peer(BufReader::new(stream))
     }
 
-    fn gag(&self) -> Peer<UnixStream> {
+    pub(crate) fn folder(&self) -> &std::path::Path {
+        &self.folder
+    }
+
+    /// A GaG that has been let in, or that is refused because there is one.
+    pub(crate) fn gag(&self) -> Peer<UnixStream> {
         let stream = UnixStream::connect(self.folder.join("gag")).expect("it listens");
+        let start = std::time::Instant::now();
+        while !self.handle.look(lager_station::Station::has_gag) {
+            assert!(start.elapsed() < WATCHDOG, "it is not let in");
+            std::thread::yield_now();
+        }
         stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
         Peer(BufReader::new(stream))
     }
@@ -97,6 +107,12 @@ impl<S: Read> Peer<S> {
             Err(error) if error.kind() == ErrorKind::ConnectionReset => None,
             Err(error) => panic!("nothing came: {error}"),
         }
+    }
+}
+
+impl Peer<TcpStream> {
+    pub(crate) fn stream(&self) -> &TcpStream {
+        self.0.get_ref()
     }
 }
 

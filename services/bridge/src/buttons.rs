@@ -1,0 +1,220 @@
+//! The robot's reset button and mode switch (B1, E14), as lines of a GPIO chip that a closed contact
+//! pulls to ground.
+//!
+//! ```text
+//!   reset    open -> closed    the robot has been put on the delivery node
+//!   switch   open              manual mode
+//!            closed            autonomous mode
+//! ```
+//! - A switch's position is a mode and no toggle. What is seen first is the mode of a robot that has
+//!   just been started; a bridge that takes up an earlier one's state keeps that mode until somebody
+//!   moves the switch. Others may change the mode meanwhile, and the next movement of the switch
+//!   counts again.
+//! - A press that is read a second late is not taken: whoever pressed has given it up.
+//! - The kernel debounces the lines, and dates each change by `CLOCK_MONOTONIC`.
+//! - A chip that cannot be had is no reason to end. It is tried again for ever, and the log says so.
+
+use core::time::Duration;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use gpiocdev::Request;
+use gpiocdev::line::{Bias, EdgeDetection, EdgeKind, Value};
+use lager_ports::Clock;
+use lager_topics::Mode;
+
+/// How often the wish to end is looked at.
+const LOOK: Duration = Duration::from_millis(100);
+/// How many looks pass before a chip that could not be had is tried again.
+const LOOKS: u32 = 20;
+/// A press that is older than this no longer counts, in real ns.
+const LONGEST_NS: u64 = 1_000_000_000;
+
+/// Which lines they are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ButtonsConfig {
+    /// The chip, such as `/dev/gpiochip0`.
+    pub chip: PathBuf,
+    /// The offset of the reset button's line.
+    pub reset: Option<u32>,
+    /// The offset of the mode switch's line.
+    pub switch: Option<u32>,
+    /// How long a contact must be steady.
+    pub debounce: Duration,
+}
+
+/// What a person has done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touch {
+    /// Pressed the reset button.
+    Reset,
+    /// Moved the switch to a mode.
+    Switched(Mode),
+}
+
+/// What follows from contacts. It is pure.
+#[derive(Clone, Copy, Debug)]
+struct Contacts {
+    /// The position of the switch that was seen last.
+    switch: Option<bool>,
+    /// The first position is the mode.
+    is_first: bool,
+}
+
+impl Contacts {
+    const fn new(resume: bool) -> Self {
+        Self {
+            switch: None,
+            is_first: !resume,
+        }
+    }
+
+    /// The switch is seen in this position.
+    fn switch(&mut self, is_closed: bool) -> Option<Touch> {
+        let before = self.switch.replace(is_closed);
+        let counts = match before {
+            Some(before) => before != is_closed,
+            None => self.is_first,
+        };
+        let mode = match is_closed {
+            true => Mode::Autonomous,
+            false => Mode::Manual,
+        };
+        counts.then_some(Touch::Switched(mode))
+    }
+
+    /// The reset button has moved.
+    fn reset(is_closed: bool, moved_ns: u64, now_ns: u64) -> Option<Touch> {
+        let is_fresh = moved_ns.abs_diff(now_ns) < LONGEST_NS;
+        (is_closed && is_fresh).then_some(Touch::Reset)
+    }
+}
+
+/// Hands on what people do, until `end`.
+pub fn watch(
+    config: &ButtonsConfig,
+    resume: bool,
+    end: &AtomicBool,
+    mut touched: impl FnMut(Touch),
+) {
+    let mut contacts = Contacts::new(resume);
+    let mut complaints = 0_u32;
+    while !end.load(Ordering::Acquire) {
+        let watched = open(config)
+            .and_then(|lines| watch_lines(config, &lines, &mut contacts, end, &mut touched));
+        let Err(error) = watched else { return };
+        complaints = complaints.wrapping_add(1);
+        if complaints.is_power_of_two() {
+            let chip = config.chip.display();
+            tracing::error!(
+                "no button is heard: {chip}: {error}; `gpioinfo` of libgpiod shows which chips and \
+                 lines there are, and who uses them"
+            );
+        }
+        for _ in 0..LOOKS {
+            if end.load(Ordering::Acquire) {
+                return;
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+fn open(config: &ButtonsConfig) -> gpiocdev::Result<Request> {
+    let lines: Vec<u32> = config.reset.into_iter().chain(config.switch).collect();
+    Request::builder()
+        .on_chip(&config.chip)
+        .with_consumer("lager")
+        .with_lines(&lines)
+        .as_input()
+        .as_active_low()
+        .with_bias(Bias::PullUp)
+        .with_edge_detection(EdgeDetection::BothEdges)
+        .with_debounce_period(config.debounce)
+        .request()
+}
+
+fn watch_lines(
+    config: &ButtonsConfig,
+    lines: &Request,
+    contacts: &mut Contacts,
+    end: &AtomicBool,
+    touched: &mut impl FnMut(Touch),
+) -> gpiocdev::Result<()> {
+    if let Some(line) = config.switch {
+        let is_closed = lines.value(line)? == Value::Active;
+        contacts
+            .switch(is_closed)
+            .into_iter()
+            .for_each(&mut *touched);
+    }
+    while !end.load(Ordering::Acquire) {
+        if !lines.wait_edge_event(LOOK)? {
+            continue;
+        }
+        let edge = lines.read_edge_event()?;
+        // A line that is active low rises when its contact closes.
+        let is_closed = edge.kind == EdgeKind::Rising;
+        let touch = match Some(edge.offset) == config.switch {
+            true => contacts.switch(is_closed),
+            false => Contacts::reset(is_closed, edge.timestamp_ns, Clock::monotonic_ns()),
+        };
+        touch.into_iter().for_each(&mut *touched);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_position_of_the_switch_is_the_mode_and_only_its_movements_count() {
+        let mut contacts = Contacts::new(false);
+        let manual = Some(Touch::Switched(Mode::Manual));
+        let autonomous = Some(Touch::Switched(Mode::Autonomous));
+        assert_eq!(
+            contacts.switch(false),
+            manual,
+            "where it stands at the start"
+        );
+        assert_eq!(contacts.switch(false), None, "as when the chip was away");
+        assert_eq!(contacts.switch(true), autonomous);
+        assert_eq!(contacts.switch(true), None);
+        assert_eq!(contacts.switch(false), manual);
+    }
+
+    #[test]
+    fn a_bridge_that_resumes_keeps_its_mode_until_the_switch_is_moved() {
+        let mut contacts = Contacts::new(true);
+        assert_eq!(contacts.switch(true), None);
+        assert_eq!(contacts.switch(false), Some(Touch::Switched(Mode::Manual)));
+    }
+
+    #[test]
+    fn a_press_counts_when_it_is_made_and_not_when_it_ends_or_is_old() {
+        let now = 5_000_000_000;
+        assert_eq!(Contacts::reset(true, now, now), Some(Touch::Reset));
+        assert_eq!(Contacts::reset(false, now, now), None);
+        assert_eq!(Contacts::reset(true, now - LONGEST_NS, now), None);
+    }
+
+    #[test]
+    fn a_chip_that_is_not_there_ends_nothing_and_the_wish_to_end_is_heard() {
+        let config = ButtonsConfig {
+            chip: "/dev/null".into(),
+            reset: Some(0),
+            switch: Some(1),
+            debounce: Duration::from_millis(20),
+        };
+        assert!(open(&config).is_err());
+        let end = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let watching = scope.spawn(|| watch(&config, false, &end, |touch| panic!("{touch:?}")));
+            std::thread::sleep(LOOK * 3);
+            assert!(!watching.is_finished());
+            end.store(true, Ordering::Release);
+            watching.join().expect("it ends");
+        });
+    }
+}

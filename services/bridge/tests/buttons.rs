@@ -1,0 +1,109 @@
+//! The buttons on lines of a simulated chip of the kernel (gpio-sim). Where the kernel has none, or
+//! this is not root, the test says that it is ignored and why.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use lager_bridge::buttons::{ButtonsConfig, Touch, watch};
+use lager_topics::Mode;
+
+const SIMULATOR: &str = "/sys/kernel/config/gpio-sim";
+/// How long a touch is waited for before the test has failed.
+const WATCHDOG: Duration = Duration::from_secs(20);
+const RESET: u32 = 0;
+const SWITCH: u32 = 1;
+
+/// A simulated chip with two lines; it is gone when this is dropped.
+struct Chip {
+    config: PathBuf,
+    lines: PathBuf,
+    device: PathBuf,
+}
+
+impl Chip {
+    fn new() -> std::io::Result<Self> {
+        let config = Path::new(SIMULATOR).join(format!("lager-{}", std::process::id()));
+        let bank = config.join("bank");
+        fs::create_dir(&config)?;
+        fs::create_dir(&bank)?;
+        fs::write(bank.join("num_lines"), "2")?;
+        fs::write(config.join("live"), "1")?;
+        let name =
+            |path: PathBuf| Ok::<_, std::io::Error>(fs::read_to_string(path)?.trim().to_owned());
+        let chip = name(bank.join("chip_name"))?;
+        let device = name(config.join("dev_name"))?;
+        Ok(Self {
+            lines: Path::new("/sys/devices/platform").join(device).join(&chip),
+            device: Path::new("/dev").join(chip),
+            config,
+        })
+    }
+
+    /// Closes a contact to ground, or opens it.
+    fn contact(&self, line: u32, is_closed: bool) {
+        let pull = self.lines.join(format!("sim_gpio{line}/pull"));
+        let to = if is_closed { "pull-down" } else { "pull-up" };
+        fs::write(pull, to).expect("a line of the simulated chip");
+    }
+}
+
+impl Drop for Chip {
+    fn drop(&mut self) {
+        let _ = fs::write(self.config.join("live"), "0");
+        let _ = fs::remove_dir(self.config.join("bank"));
+        let _ = fs::remove_dir(&self.config);
+    }
+}
+
+/// A session at both buttons.
+fn people_touch(chip: &Chip) {
+    chip.contact(RESET, false);
+    chip.contact(SWITCH, true);
+    let config = ButtonsConfig {
+        chip: chip.device.clone(),
+        reset: Some(RESET),
+        switch: Some(SWITCH),
+        debounce: Duration::from_millis(5),
+    };
+    let end = AtomicBool::new(false);
+    let (to, touches) = mpsc::channel();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            watch(&config, false, &end, |touch| {
+                to.send(touch).expect("it is waited for");
+            });
+        });
+        let next = || touches.recv_timeout(WATCHDOG).expect("a touch");
+        assert_eq!(next(), Touch::Switched(Mode::Autonomous), "where it stands");
+        chip.contact(SWITCH, false);
+        assert_eq!(next(), Touch::Switched(Mode::Manual));
+        chip.contact(RESET, true);
+        assert_eq!(next(), Touch::Reset);
+        chip.contact(RESET, false);
+        chip.contact(SWITCH, true);
+        assert_eq!(
+            next(),
+            Touch::Switched(Mode::Autonomous),
+            "letting go is no press"
+        );
+        end.store(true, Ordering::Release);
+    });
+}
+
+fn main() {
+    let name = "test what_people_do_to_the_lines_of_a_chip_is_heard";
+    if !Path::new(SIMULATOR).is_dir() {
+        println!("{name} ... ignored, this kernel has no gpio-sim: {SIMULATOR} is not there");
+        return;
+    }
+    match Chip::new() {
+        Ok(chip) => {
+            people_touch(&chip);
+            println!("{name} ... ok");
+        }
+        Err(error) => println!("{name} ... ignored, no chip can be made in {SIMULATOR}: {error}"),
+    }
+}

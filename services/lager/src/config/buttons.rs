@@ -1,0 +1,108 @@
+//! `[buttons]`: the robot's own reset button and mode switch, as GPIO lines.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Result, bail};
+use lager_bridge::buttons::ButtonsConfig;
+use serde::{Deserialize, Serialize};
+
+/// The longest time for which a contact may have to be steady, in ms.
+const LONGEST_DEBOUNCE_MS: u64 = 500;
+
+/// `[buttons]`: the robot's own reset button and mode switch, as GPIO lines.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ButtonsSection {
+    /// The chip; unset, there are no buttons.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chip: Option<PathBuf>,
+    /// The line of the reset button.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reset: Option<u32>,
+    /// The line of the mode switch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub switch: Option<u32>,
+    /// For how long a contact must be steady, in ms.
+    pub debounce_ms: u64,
+}
+
+impl Default for ButtonsSection {
+    fn default() -> Self {
+        Self {
+            chip: None,
+            reset: None,
+            switch: None,
+            debounce_ms: 20,
+        }
+    }
+}
+
+impl ButtonsSection {
+    /// The lines for the bridge, where there are any.
+    pub fn lines(&self) -> Option<ButtonsConfig> {
+        Some(ButtonsConfig {
+            chip: self.chip.clone()?,
+            reset: self.reset,
+            switch: self.switch,
+            debounce: Duration::from_millis(self.debounce_ms),
+        })
+    }
+
+    /// Refuses what cannot be.
+    ///
+    /// # Errors
+    /// The sentence names the key.
+    pub fn validate(&self) -> Result<()> {
+        let has_line = self.reset.is_some() || self.switch.is_some();
+        if self.chip.is_some() != has_line {
+            bail!(
+                "[buttons] needs a chip and the line of a button on it: reset, switch or both; or none of them"
+            );
+        }
+        if has_line && self.reset == self.switch {
+            bail!("[buttons] reset and switch are the same line; each has one of its own");
+        }
+        if self.debounce_ms > LONGEST_DEBOUNCE_MS {
+            bail!(
+                "[buttons] debounce_ms is {}; at most {LONGEST_DEBOUNCE_MS} can be felt",
+                self.debounce_ms
+            );
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_button_has_a_chip_and_a_line_of_its_own() {
+        let chip = Some(PathBuf::from("/dev/gpiochip0"));
+        let section = |chip: &Option<PathBuf>, reset, switch| ButtonsSection {
+            chip: chip.clone(),
+            reset,
+            switch,
+            ..ButtonsSection::default()
+        };
+        for (good, reset, switch) in [
+            (&None, None, None),
+            (&chip, Some(5), None),
+            (&chip, Some(5), Some(6)),
+        ] {
+            assert!(section(good, reset, switch).validate().is_ok());
+        }
+        for (bad, reset, switch) in [
+            (&None, Some(5), None),
+            (&chip, None, None),
+            (&chip, Some(5), Some(5)),
+        ] {
+            let error = section(bad, reset, switch).validate().expect_err("refused");
+            assert!(error.to_string().contains("[buttons]"), "{error}");
+        }
+        assert_eq!(section(&None, None, None).lines(), None);
+        let lines = section(&chip, Some(5), Some(6)).lines().expect("lines");
+        assert_eq!(lines.debounce, Duration::from_millis(20));
+    }
+}
