@@ -31,9 +31,6 @@ use crate::telling;
 /// further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
-/// How often the map is offered to late joiners, in real time.
-const MAP_PERIOD_NS: u64 = 20_000_000;
-
 /// How often what only the extension tells is looked at, in real time: as often as it is told.
 const SENSES_PERIOD_NS: u64 = 50_000_000;
 
@@ -93,7 +90,6 @@ struct Shell {
     commands: Publisher<SteeringCommand>,
     bridge: Asking<BridgeRequest>,
     world: Asking<WorldRequest>,
-    map_ticked_ns: u64,
     sensed_ns: u64,
     complaints: u32,
 }
@@ -132,7 +128,6 @@ impl Shell {
             orders: bus.publisher()?,
             inputs: bus.publisher()?,
             commands: bus.publisher()?,
-            map_ticked_ns: 0,
             sensed_ns: 0,
             complaints: 0,
         };
@@ -156,10 +151,6 @@ impl Shell {
         self.take_lines(now);
         self.act();
         self.link.write();
-        if now.ns.saturating_sub(self.map_ticked_ns) >= MAP_PERIOD_NS {
-            self.map_ticked_ns = now.ns;
-            self.map.tick();
-        }
     }
 
     fn now(&self) -> Moment {

@@ -41,6 +41,7 @@ use word::Sleeper;
 
 use crate::bus::Bus;
 use crate::error::PortError;
+use crate::fault::{Difference, TransportFault};
 use crate::name::RobotName;
 use crate::place::Place;
 
@@ -217,11 +218,11 @@ fn error(role: Role, fault: Fault) -> PortError {
     match fault {
         Fault::OtherLayout => PortError::OtherLayout {
             topic,
-            detail: "its board in shared memory differs".to_owned(),
+            difference: Difference::Board,
         },
         Fault::Busy => PortError::Busy {
             topic,
-            detail: "its board in shared memory stays locked".to_owned(),
+            fault: TransportFault::InMotion,
         },
         Fault::NoSeat => PortError::TooManyWaiters {
             role,
@@ -232,7 +233,7 @@ fn error(role: Role, fault: Fault) -> PortError {
         }
         Fault::File(error) => PortError::Transport {
             topic,
-            detail: error.to_string(),
+            fault: error.into(),
         },
     }
 }

@@ -97,7 +97,7 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
                 })
                 .map_err(|error| PortError::Transport {
                     topic: "link/health".to_owned(),
-                    detail: format!("no thread for a serial port: {error}"),
+                    fault: error.into(),
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;
         }
