@@ -9,7 +9,7 @@
 //!
 //! | file | what it is |
 //! |---|---|
-//! | `word` | the ring and sleep protocol; `model` runs it under every interleaving |
+//! | `word` | the ring and sleep protocol; `model` runs it under all interleavings with at most three preemptions |
 //! | `futex` | the word as a futex |
 //! | `board` | the shared memory: who is rung for what, who may spin |
 //! | `segment`, `locks` | its file: joining, leaving, seats, what killed processes leave |
