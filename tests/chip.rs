@@ -118,15 +118,12 @@ fn emulator(up: &Running) -> u32 {
 #[test]
 fn a_mission_on_the_real_images_is_delivered_even_if_they_are_held_up() {
     // Other work on the machine may keep a reader from its core for longer than its queue lasts, a
-    // quarter of a second, and that is a loss. Where the chips keep up with real time, one of
-    // three missions must be without; where they do not, there is no such machine to ask.
+    // quarter of a second, and that is a loss. One of three missions must be without, also where
+    // the chips are slower than real time: their frames are then as much slower.
     let mut lossy = Vec::new();
     while lossy.len() < 3 {
         let told = held_up_mission();
-        let seconds = |key: &str| told[key].as_f64().expect("seconds");
-        let real = seconds("wall_seconds") - HELD_UP.as_secs_f64();
-        let kept_up = seconds("sim_seconds") > 0.95 * real;
-        if told["lost"] == 0 || !kept_up {
+        if told["lost"] == 0 {
             return;
         }
         lossy.push(told);

@@ -77,14 +77,11 @@ fn assert_broken(said: &Said, figures: &[&str]) {
 }
 
 #[test]
+#[ignore = "needs the compiler of benches/limits.toml, as other compilers' counts get more room than an allocation takes; `tests/run` runs it where it has that"]
 fn an_allocation_beside_each_sample_is_noticed() {
     let said = slowed("allocation", "instructions", "1");
-    if said.everything.contains("limits were measured with rustc") {
-        // The checked-in counts are another compiler's and leave room for more than an
-        // allocation, so they say nothing here. `.ci/run` has the compiler they are for.
-        eprintln!("not judged: {}", said.everything);
-        return;
-    }
+    let other = said.everything.contains("limits were measured with rustc");
+    assert!(!other, "not judged: {}", said.everything);
     assert_broken(&said, &["publish/to-1", "receive/sample"]);
 }
 

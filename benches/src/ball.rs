@@ -2,7 +2,7 @@
 //! the topics they travel on when the typed ports carry them.
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_topics::{Field, FieldInfo, Payload, Qos, Role, Schema, SensorLine, Topic};
+use lager_topics::{Field, FieldInfo, Make, Payload, Qos, Role, Schema, SensorLine, Topic};
 use serde::{Deserialize, Serialize};
 
 /// A payload of 64 bytes.
@@ -72,7 +72,13 @@ unsafe impl ZeroCopySend for Ball {
     }
 }
 
-impl Field for Ball {
+// SAFETY: eight words, of which any bits are one, without padding.
+#[allow(unsafe_code)]
+unsafe impl Field for Ball {
+    const MAKE: Make = Make::Record {
+        name: "Ball",
+        fields: <Self as Schema>::FIELDS,
+    };
     const SHAPE: u64 = <Self as Schema>::HASH;
     const BLANK: Self = Self {
         number: 0,
@@ -90,12 +96,14 @@ impl Schema for Ball {
             type_name: "u64",
             offset: 0,
             size: 8,
+            make: u64::MAKE,
         },
         FieldInfo {
             name: "rest",
             type_name: "[u64; 7]",
             offset: 8,
             size: 56,
+            make: <[u64; 7]>::MAKE,
         },
     ];
 }

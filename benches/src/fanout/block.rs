@@ -1,7 +1,7 @@
 //! What is published: blocks of several sizes, and a topic for each.
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_topics::{Field, FieldInfo, Payload, Qos, Schema, SensorLine, Topic};
+use lager_topics::{Field, FieldInfo, Make, Payload, Qos, Schema, SensorLine, Topic};
 use serde::{Deserialize, Serialize};
 
 /// A payload of `WORDS` words of eight bytes.
@@ -21,7 +21,13 @@ unsafe impl<const WORDS: usize> ZeroCopySend for Block<WORDS> {
     }
 }
 
-impl<const WORDS: usize> Field for Block<WORDS> {
+// SAFETY: words, of which any bits are one, without padding.
+#[allow(unsafe_code)]
+unsafe impl<const WORDS: usize> Field for Block<WORDS> {
+    const MAKE: Make = Make::Record {
+        name: "Block",
+        fields: <Self as Schema>::FIELDS,
+    };
     const SHAPE: u64 = <Self as Schema>::HASH;
     const BLANK: Self = Self { words: [0; WORDS] };
 }
@@ -41,6 +47,7 @@ impl<const WORDS: usize> Schema for Block<WORDS> {
         type_name: "[u64]",
         offset: 0,
         size: 8 * WORDS,
+        make: <[u64; WORDS]>::MAKE,
     }];
 }
 

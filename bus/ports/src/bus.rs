@@ -15,6 +15,7 @@ use crate::clock::{self, Clock};
 use crate::config::BusConfig;
 use crate::doorbell::{self, Board};
 use crate::error::{IntrospectError, OpenError, PortError};
+use crate::found::Found;
 use crate::introspect::{self, NodeInfo, TopicInfo};
 use crate::keeper::Keeper;
 use crate::kept::{self, KeptError};
@@ -141,6 +142,15 @@ impl Bus {
         Subscriber::new(self)
     }
 
+    /// A reader of the topic called `name`, which this process need not know; `None` if no process
+    /// has the topic open. To be used in this thread.
+    ///
+    /// # Errors
+    /// As for a subscriber, or the topic does not describe its samples.
+    pub fn found(&self, name: &str) -> Result<Option<Found>, PortError> {
+        Found::new(self, name)
+    }
+
     /// A waiter, which wakes this process when a topic that it acts on has samples; to be used in
     /// this thread.
     ///
@@ -255,7 +265,7 @@ fn make_node(
             match failure {
                 NodeCreationFailure::InsufficientPermissions => OpenError::Permission { folder },
                 other => OpenError::Transport {
-                    detail: format!("{other:?}"),
+                    fault: other.into(),
                     folder,
                 },
             }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use lager_topics::Role;
 
+use crate::fault::{Difference, TransportFault};
 use crate::shortage::Shortage;
 use crate::stop::StopError;
 
@@ -101,11 +102,11 @@ pub enum OpenError {
     },
     /// The transport failed.
     #[error(
-        "the bus could not be opened ({detail}); check that /dev/shm and {folder} exist and are not full, then try again"
+        "the bus could not be opened ({fault}); check that /dev/shm and {folder} exist and are not full, then try again"
     )]
     Transport {
-        /// What the transport says.
-        detail: String,
+        /// What went wrong.
+        fault: TransportFault,
         /// The bus's folder.
         folder: PathBuf,
     },
@@ -167,13 +168,13 @@ pub enum PortError {
     },
     /// A running process uses another layout or other limits.
     #[error(
-        "`{topic}` is in use with another layout or other limits ({detail}): a process of another build of lager is running; stop all processes of this robot, bring them to one build and start them again"
+        "`{topic}` is in use with another layout or other limits ({difference}): a process of another build of lager is running; stop all processes of this robot, bring them to one build and start them again"
     )]
     OtherLayout {
         /// The topic or request.
         topic: String,
         /// Which property differs.
-        detail: String,
+        difference: Difference,
     },
     /// A running process uses another version of the transport.
     #[error(
@@ -201,13 +202,13 @@ pub enum PortError {
     },
     /// Others kept creating and removing it.
     #[error(
-        "`{topic}` is being created or removed by other processes and did not settle ({detail}); try again"
+        "`{topic}` is being created or removed by other processes and did not settle ({fault}); try again"
     )]
     Busy {
         /// The topic or request.
         topic: String,
         /// What was met last.
-        detail: String,
+        fault: TransportFault,
     },
     /// This process or this machine has run out of something.
     #[error("`{topic}` could not be opened: {shortage}")]
@@ -225,13 +226,13 @@ pub enum PortError {
     },
     /// The transport failed.
     #[error(
-        "the port of `{topic}` could not be made ({detail}); check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
+        "the port of `{topic}` could not be made ({fault}); check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
     )]
     Transport {
         /// The topic or request.
         topic: String,
-        /// What the transport says.
-        detail: String,
+        /// What went wrong.
+        fault: TransportFault,
     },
 }
 
@@ -246,7 +247,7 @@ pub enum SendError {
     },
     /// The transport failed; the sample is counted as lost by its readers.
     #[error("the sample could not be sent ({0}); if it happens again, restart this service")]
-    Transport(String),
+    Transport(#[from] TransportFault),
 }
 
 /// Why a sample could not be received.
@@ -260,7 +261,7 @@ pub enum ReceiveError {
     },
     /// The transport failed.
     #[error("the writer could not be reached ({0}); the next attempt may succeed")]
-    Transport(String),
+    Transport(#[from] TransportFault),
 }
 
 /// Why a request was not answered.
@@ -283,12 +284,12 @@ pub enum CallError {
         actor: Role,
     },
     /// The transport failed.
-    #[error("`{request}` could not be sent ({detail}); try again")]
+    #[error("`{request}` could not be sent ({fault}); try again")]
     Transport {
         /// The request.
         request: &'static str,
-        /// What the transport says.
-        detail: String,
+        /// What went wrong.
+        fault: TransportFault,
     },
 }
 
@@ -300,5 +301,5 @@ pub enum IntrospectError {
     Config(#[from] OpenError),
     /// The transport failed.
     #[error("the bus's files could not be listed ({0}); check the permissions of the bus's folder")]
-    Transport(String),
+    Transport(#[from] TransportFault),
 }

@@ -6,15 +6,16 @@ use iceoryx2::prelude::{
     CallbackProgression, Node, NodeState as IpcNodeState, PortFactory, Service,
 };
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
-use lager_topics::{Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
+use lager_topics::{Description, Role, TOPICS, Topic, TopicEntry, TopicVisitor, visit};
 
 use crate::bus::Bus;
 use crate::config::BusConfig;
 use crate::doorbell;
 use crate::error::IntrospectError;
+use crate::fault::TransportFault;
 use crate::mend;
 use crate::name::{self, RobotName};
-use crate::service;
+use crate::service::{self, TopicService};
 use crate::sweep;
 use crate::transport::Ipc;
 use crate::untyped::Kind;
@@ -28,7 +29,9 @@ pub enum Layout {
     Ours,
     /// The name is in the table, but the processes that use it are of another build.
     Other,
-    /// The name is not in the table.
+    /// The name is not in the table, and the topic describes its samples itself.
+    Described,
+    /// The name is not in the table, and nobody says what its samples are.
     Unknown,
 }
 
@@ -62,8 +65,11 @@ pub struct TopicInfo {
     pub name: String,
     /// The line of this build's table.
     pub entry: Option<&'static TopicEntry>,
-    /// How the topic in use compares with it. Ends are only known if it is [`Layout::Ours`].
+    /// How the topic in use compares with it. Ends are only known if it is [`Layout::Ours`] or
+    /// [`Layout::Described`].
     pub layout: Layout,
+    /// What a topic says of itself that is not in the table.
+    pub description: Option<Description>,
     /// Number of writers. A killed one counts until it is swept.
     pub publishers: usize,
     /// Number of readers. A killed one counts until it is swept.
@@ -74,7 +80,8 @@ pub struct TopicInfo {
     pub writers: Vec<Peer>,
     /// The readers.
     pub readers: Vec<Peer>,
-    /// The waiters that each sample wakes, once for each; a killed one is not among them.
+    /// The waiters that each sample wakes, once for each; a killed one is not among them. Known of
+    /// topics of the table only.
     pub woken: Vec<Peer>,
 }
 
@@ -85,6 +92,7 @@ impl TopicInfo {
             name: name.to_owned(),
             entry: TOPICS.iter().find(|entry| entry.name == name),
             layout,
+            description: None,
             publishers: 0,
             subscribers: 0,
             observers: 0,
@@ -92,6 +100,25 @@ impl TopicInfo {
             readers: Vec::new(),
             woken: Vec::new(),
         }
+    }
+}
+
+impl TopicInfo {
+    fn look_at_ends(&mut self, service: &TopicService) {
+        let ends = service.dynamic_config();
+        ends.list_publishers(|details| {
+            self.writers.push(Peer::of(details.publisher_name.as_str()));
+            CallbackProgression::Continue
+        });
+        ends.list_subscribers(|details| {
+            self.readers
+                .push(Peer::of(details.subscriber_name.as_str()));
+            CallbackProgression::Continue
+        });
+        self.publishers = self.writers.len();
+        self.subscribers = self.readers.len();
+        let observes = |peer: &&Peer| peer.role.is_some_and(Role::is_observer);
+        self.observers = self.readers.iter().filter(observes).count();
     }
 }
 
@@ -140,8 +167,7 @@ pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> 
     let place = config.place()?;
     let config = config.transport(&place)?;
     mend::unfinished(&place);
-    let removed = sweep::dead_nodes(&config)
-        .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    let removed = sweep::dead_nodes(&config).map_err(TransportFault::from)?;
     doorbell::sweep_all(&place);
     place.sweep_locks();
     Ok(removed)
@@ -171,7 +197,7 @@ pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
         });
         CallbackProgression::Continue
     })
-    .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    .map_err(TransportFault::from)?;
     found.sort_by(|a, b| (&a.name, a.pid).cmp(&(&b.name, b.pid)));
     Ok(found)
 }
@@ -189,7 +215,7 @@ pub(crate) fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
         }
         CallbackProgression::Continue
     })
-    .map_err(|error| IntrospectError::Transport(format!("{error:?}")))?;
+    .map_err(TransportFault::from)?;
     in_use.sort();
     Ok(in_use
         .iter()
@@ -213,8 +239,17 @@ fn place(topic: &str) -> usize {
 }
 
 fn look(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
-    visit(topic, Look { bus, robot })
-        .unwrap_or_else(|_| TopicInfo::without_ends(robot, topic, Layout::Unknown))
+    visit(topic, Look { bus, robot }).unwrap_or_else(|_| look_at_other(bus, robot, topic))
+}
+
+fn look_at_other(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
+    let Ok(Some((service, description))) = service::found(bus, robot, topic) else {
+        return TopicInfo::without_ends(robot, topic, Layout::Unknown);
+    };
+    let mut info = TopicInfo::without_ends(robot, topic, Layout::Described);
+    info.description = Some(description);
+    info.look_at_ends(&service);
+    info
 }
 
 struct Look<'a> {
@@ -233,16 +268,7 @@ impl TopicVisitor for Look<'_> {
             Err(_) => return without_ends(Layout::Other),
         };
         let mut info = without_ends(Layout::Ours);
-        let ends = service.dynamic_config();
-        ends.list_publishers(|details| {
-            info.writers.push(Peer::of(details.publisher_name.as_str()));
-            CallbackProgression::Continue
-        });
-        ends.list_subscribers(|details| {
-            info.readers
-                .push(Peer::of(details.subscriber_name.as_str()));
-            CallbackProgression::Continue
-        });
+        info.look_at_ends(&service);
         for actor in T::QOS.actors {
             let pids = doorbell::woken(self.bus.place(), self.robot, *actor);
             info.woken.extend(pids.into_iter().map(|pid| Peer {
@@ -250,13 +276,6 @@ impl TopicVisitor for Look<'_> {
                 pid,
             }));
         }
-        info.publishers = info.writers.len();
-        info.subscribers = info.readers.len();
-        info.observers = info
-            .readers
-            .iter()
-            .filter(|peer| peer.role.is_some_and(Role::is_observer))
-            .count();
         info
     }
 }

@@ -9,7 +9,8 @@ use std::time::Instant;
 use lager_topics::Topic;
 
 use crate::bus::Bus;
-use crate::error::PortError;
+use crate::error::{PortError, ReceiveError};
+use crate::fault::TransportFault;
 use crate::subscriber::Subscriber;
 
 /// Why it is not known whether a value was kept.
@@ -20,13 +21,13 @@ pub enum KeptError {
     Port(#[from] PortError),
     /// It could not be read.
     #[error(
-        "what an earlier process left on `{topic}` cannot be read ({detail}), so where it was is not known; check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
+        "what an earlier process left on `{topic}` cannot be read ({fault}), so where it was is not known; check that /dev/shm is not full and that the limit of open files (ulimit -n) is not reached"
     )]
     Unreadable {
         /// The topic.
         topic: &'static str,
         /// What was met last.
-        detail: String,
+        fault: TransportFault,
     },
 }
 
@@ -35,9 +36,9 @@ impl From<KeptError> for PortError {
     fn from(error: KeptError) -> Self {
         match error {
             KeptError::Port(error) => error,
-            KeptError::Unreadable { topic, detail } => Self::Transport {
+            KeptError::Unreadable { topic, fault } => Self::Transport {
                 topic: topic.to_owned(),
-                detail,
+                fault,
             },
         }
     }
@@ -79,18 +80,18 @@ fn look_for<T: Topic>(
 ) -> Result<Option<T::Payload>, KeptError> {
     let mut subscriber = Subscriber::<T>::new(bus)?;
     loop {
-        let unreadable = |detail| KeptError::Unreadable {
+        let unreadable = |fault| KeptError::Unreadable {
             topic: T::NAME,
-            detail,
+            fault,
         };
         match subscriber.latest() {
             Ok(Some(sample)) => return Ok(Some(*sample)),
             Ok(None) => (),
-            Err(error) => return Err(unreadable(error.to_string())),
+            Err(ReceiveError::Transport(fault)) => return Err(unreadable(fault)),
+            Err(ReceiveError::TooManyHeld { .. }) => return Err(unreadable(TransportFault::Limit)),
         }
-        let writers = subscriber.unreached();
-        if writers > 0 {
-            return Err(unreadable(format!("{writers} writers cannot be reached")));
+        if subscriber.unreached() > 0 {
+            return Err(unreadable(TransportFault::NoConnection));
         }
         if start.elapsed() >= timeout {
             return Ok(None);

@@ -7,27 +7,26 @@
 //! ```no_run
 //! use std::time::Duration;
 //! use lager_ports::{Bus, BusConfig, Policy};
-//! use lager_topics::{Role, SensorLine, SteeringCommand, SteeringOrder};
+//! use lager_topics::{MissionEvent, Role};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let bus = Bus::open(&BusConfig::default(), Role::Logic)?;
-//! let mut line = bus.subscriber::<SensorLine>()?;
-//! let orders = bus.publisher::<SteeringCommand>()?;
+//! let bus = Bus::open(&BusConfig::default(), Role::Comm)?;
 //! let waiter = bus.waiter(Policy::Block)?;
+//! let mut events = bus.subscriber::<MissionEvent>()?;
 //! loop {
-//!     // A wake is a hint: drain what it was for until that is empty.
-//!     waiter.wait(Duration::from_millis(20));
-//!     if waiter.has::<SensorLine>() {
-//!         while let Some(frame) = line.receive()? {
-//!             let mut order = orders.loan()?;
-//!             order.code = 2;
-//!             order.cause(frame.cause());
-//!             order.send()?;
-//!         }
+//!     // What came before this process could be rung is there already, so drain before waiting.
+//!     while let Some(event) = events.receive()? {
+//!         println!("number {}: {:?}", event.stamp().sequence, *event);
 //!     }
+//!     // A wake is a hint. The time-out finds samples that came without a ring.
+//!     waiter.wait(Duration::from_millis(20));
 //! }
 //! # }
 //! ```
+//!
+//! Programs of other people define payloads and topics of their own: `examples/` has one that
+//! publishes, one that acts and one that observes. Whoever creates a topic puts the layout of its
+//! samples beside it, so [`Bus::found`] reads a topic that this process was not built with.
 //!
 //! * Streams overwrite. A subscriber that falls behind loses the oldest samples and never blocks
 //!   the publisher; [`Subscriber::lost`] says exactly how many samples it missed.
@@ -44,6 +43,8 @@ mod clock;
 mod config;
 mod doorbell;
 mod error;
+mod fault;
+mod found;
 mod introspect;
 mod inventory;
 mod keeper;
@@ -58,6 +59,7 @@ mod pooled;
 mod presence;
 mod publisher;
 mod request;
+mod schema;
 mod service;
 mod shortage;
 mod shutdown;
@@ -76,6 +78,8 @@ pub use cause::Cause;
 pub use clock::Clock;
 pub use config::BusConfig;
 pub use error::{CallError, IntrospectError, OpenError, PortError, ReceiveError, SendError};
+pub use fault::{Difference, TransportFault};
+pub use found::{Found, FoundSample};
 pub use introspect::{Layout, NodeInfo, NodeState, Peer, TopicInfo, nodes, remove_stale_nodes};
 pub use inventory::Inventory;
 pub use keeper::{Keeper, KeeperError};

@@ -9,12 +9,13 @@ use iceoryx2::config::Config;
 
 use crate::bus::Bus;
 use crate::error::PortError;
+use crate::fault::TransportFault;
 use crate::shortage::Shortage;
 
 /// How an attempt to open or create something failed.
 pub(crate) enum Fault {
     /// Another process is in the middle of something, or has died there: sweep and try again.
-    Passing(String),
+    Passing(TransportFault),
     /// A limit is met: sweep in case dead processes hold the places, then give up.
     Full(PortError),
     /// Trying again cannot help.
@@ -45,11 +46,11 @@ pub(crate) fn patiently<T>(
                 }
                 swept_in_vain = removed == 0;
             }
-            Err(Fault::Passing(detail)) => {
+            Err(Fault::Passing(fault)) => {
                 bus.sweep();
                 if start.elapsed() > PATIENCE {
                     if mended || remove_unfinished(bus.transport()) == 0 {
-                        return Err(given_up(topic, detail));
+                        return Err(given_up(topic, fault));
                     }
                     mended = true;
                     start = Instant::now();
@@ -61,14 +62,14 @@ pub(crate) fn patiently<T>(
     }
 }
 
-fn given_up(topic: &str, detail: String) -> PortError {
+fn given_up(topic: &str, fault: TransportFault) -> PortError {
     let topic = topic.to_owned();
     if let Some(shortage) = Shortage::now() {
         PortError::Short { topic, shortage }
-    } else if detail == "ServiceInCorruptedState" {
+    } else if fault == TransportFault::Corrupted {
         PortError::Damaged { topic }
     } else {
-        PortError::Busy { topic, detail }
+        PortError::Busy { topic, fault }
     }
 }
 

@@ -43,6 +43,15 @@ impl<T: Topic> Publisher<T> {
         self.filled(T::Payload::default())
     }
 
+    /// Takes a sample whose payload is whatever lay there: zeros, or an earlier sample. For large
+    /// payloads that are filled anyway, which this saves from being blanked first.
+    ///
+    /// # Errors
+    /// As [`Publisher::loan`].
+    pub fn loan_uninit(&self) -> Result<Loan<'_, T>, SendError> {
+        Ok(self.lent(self.writer.lend()?))
+    }
+
     /// Sends a copy of `payload`, which follows from `cause`.
     ///
     /// # Errors
@@ -53,8 +62,9 @@ impl<T: Topic> Publisher<T> {
         loan.send()
     }
 
-    /// Gives readers that have come since the last sample their history. Writers of states call it
-    /// regularly; it costs next to nothing when there are no new readers.
+    /// Gives readers that have come since the last sample their history. A thread that waits in a
+    /// [`crate::Waiter`] need not call it; another writer of a state calls it regularly. It costs
+    /// next to nothing when there are no new readers.
     pub fn tick(&self) {
         self.writer.tick();
     }
@@ -77,20 +87,21 @@ impl<T: Topic> Publisher<T> {
     }
 
     /// A sample with `payload` in it.
-    #[allow(
-        unsafe_code,
-        reason = "a loan's payload has no value until one is written"
-    )]
+    #[allow(unsafe_code, reason = "the loan knows where its payload is, not what")]
     fn filled(&self, payload: T::Payload) -> Result<Loan<'_, T>, SendError> {
         let lent = self.writer.lend()?;
         // SAFETY: the writer was made with `Kind::of::<T>()`, so there is room for a payload, which
         // is the loan's alone.
         unsafe { lent.payload().cast::<T::Payload>().write(payload) };
-        Ok(Loan {
+        Ok(self.lent(lent))
+    }
+
+    fn lent(&self, lent: Lent) -> Loan<'_, T> {
+        Loan {
             lent,
             publisher: self,
             cause: Cause::OWN,
-        })
+        }
     }
 }
 
@@ -147,7 +158,8 @@ impl<T: Topic> Deref for Loan<'_, T> {
 
     #[allow(unsafe_code, reason = "the loan knows where its payload is, not what")]
     fn deref(&self) -> &T::Payload {
-        // SAFETY: `Publisher::filled` has written one there, and the loan is ours until it is sent.
+        // SAFETY: the memory was shared before and so is initialised, any bits are a payload
+        // (`Field`), and the loan is ours until it is sent.
         unsafe { self.lent.payload().cast().as_ref() }
     }
 }

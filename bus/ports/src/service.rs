@@ -4,23 +4,21 @@
 //! ([`Qos::max_subscribers`]). So keepers and restarted services get a place even when observers
 //! have taken all of theirs; the 65th observer is counted and refused.
 
-use iceoryx2::node::Node;
-use iceoryx2::prelude::{AttributeVerifier, SemanticString, ServiceName};
-use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
-use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
-use iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
-};
-use iceoryx2::service::builder::request_response::{
-    RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
-};
+use iceoryx2::prelude::{PortFactory, Service, ServiceName};
+use iceoryx2::service::builder::event::EventOpenOrCreateError;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+use iceoryx2::service::builder::request_response::RequestResponseOpenOrCreateError;
+use iceoryx2::service::messaging_pattern::MessagingPattern;
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
-use lager_topics::Qos;
+use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
+use lager_topics::Description;
 
 use crate::bus::Bus;
 use crate::error::PortError;
+use crate::fault::{Difference, Refusal, TransportFault};
 use crate::name::{self, RobotName};
 pub(crate) use crate::patience::{Fault, patiently};
+use crate::schema::{self, required};
 use crate::shortage::Shortage;
 use crate::transport::Ipc;
 use crate::untyped::{Bytes, Header, Kind, Question};
@@ -41,28 +39,33 @@ const MAX_REQUEST_NODES: usize = MAX_CLIENTS + MAX_SERVERS + 16;
 const MAX_STANDARD_LISTENERS: usize = 16;
 const MAX_EVENT_ID: usize = 3;
 
-const SCHEMA_KEY: &str = "lager.schema";
-
 pub(crate) type TopicService = publish_subscribe::PortFactory<Ipc, Bytes, Header>;
 
 pub(crate) type RequestService = request_response::PortFactory<Ipc, Bytes, Header, Bytes, Header>;
 
 pub(crate) type EventService = event::PortFactory<Ipc>;
 
-/// Opens or creates the service of a topic with the limits of the table.
+/// Opens the service of a topic, or creates it with the limits of the table.
 pub(crate) fn topic(bus: &Bus, kind: &Kind) -> Result<TopicService, PortError> {
     patiently(bus, kind.name, || {
         let qos = kind.qos;
-        builder(bus.node(), bus.robot(), kind)?
-            .max_publishers(qos.max_publishers())
-            .max_subscribers(qos.max_subscribers())
-            .max_nodes(qos.max_nodes())
-            .subscriber_max_buffer_size(qos.buffer)
-            .subscriber_max_borrowed_samples(MAX_HELD)
-            .history_size(qos.history)
-            .enable_safe_overflow(true)
-            .open_or_create_with_attributes(&layout(kind.layout))
-            .map_err(|error| topic_fault(kind.name, &qos, error))
+        let nodes = qos.max_nodes();
+        let limited = || {
+            Ok(builder(bus, bus.robot(), kind.name, &(kind.payload)())?
+                .max_publishers(qos.max_publishers())
+                .max_subscribers(qos.max_subscribers())
+                .max_nodes(nodes)
+                .subscriber_max_buffer_size(qos.buffer)
+                .subscriber_max_borrowed_samples(MAX_HELD)
+                .history_size(qos.history)
+                .enable_safe_overflow(true))
+        };
+        match limited()?.open_with_attributes(&required(kind.layout)) {
+            Err(PublishSubscribeOpenError::DoesNotExist) => limited()?
+                .create_with_attributes(&schema::stated(&kind.make, kind.layout))
+                .map_err(|error| meant(kind.name, nodes, error)),
+            opened => opened.map_err(|error| meant(kind.name, nodes, error)),
+        }
     })
 }
 
@@ -73,17 +76,56 @@ pub(crate) fn existing_topic(
     kind: &Kind,
 ) -> Result<Option<TopicService>, PortError> {
     patiently(bus, kind.name, || {
-        match builder(bus.node(), robot, kind)?.open_with_attributes(&layout(kind.layout)) {
+        match builder(bus, robot, kind.name, &(kind.payload)())?
+            .open_with_attributes(&required(kind.layout))
+        {
             Ok(service) => Ok(Some(service)),
             Err(
                 PublishSubscribeOpenError::DoesNotExist
                 | PublishSubscribeOpenError::IsMarkedForDestruction,
             ) => Ok(None),
-            Err(error) => Err(topic_fault(
-                kind.name,
-                &kind.qos,
-                PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(error),
-            )),
+            Err(error) => Err(meant(kind.name, kind.qos.max_nodes(), error)),
+        }
+    })
+}
+
+/// Opens the service of a topic that this process need not know, with the description that its
+/// creator gave, if it exists.
+pub(crate) fn found(
+    bus: &Bus,
+    robot: &RobotName,
+    name: &str,
+) -> Result<Option<(TopicService, Description)>, PortError> {
+    let differs = |difference| {
+        let topic = name.to_owned();
+        Fault::Lasting(PortError::OtherLayout { topic, difference })
+    };
+    patiently(bus, name, || {
+        let full = service_name(robot, name)?;
+        let pattern = MessagingPattern::PublishSubscribe;
+        let details = Ipc::details(&full, bus.transport(), pattern)
+            .map_err(|_| Fault::Passing(TransportFault::InMotion))?;
+        let Some(details) = details.map(|found| found.static_details) else {
+            return Ok(None);
+        };
+        let description = schema::described(details.attributes()).map_err(differs)?;
+        let types = details.publish_subscribe().message_type_details();
+        let is_as_described = types.payload.variant() == TypeVariant::FixedSize
+            && types.payload.size() == description.size()
+            && types.user_header == Kind::header();
+        if !is_as_described {
+            return Err(differs(Difference::Type));
+        }
+        match builder(bus, robot, name, &types.payload)?.open() {
+            Ok(service) if service.attributes() == details.attributes() => {
+                Ok(Some((service, description)))
+            }
+            Ok(_) => Err(Fault::Passing(TransportFault::InMotion)),
+            Err(
+                PublishSubscribeOpenError::DoesNotExist
+                | PublishSubscribeOpenError::IsMarkedForDestruction,
+            ) => Ok(None),
+            Err(error) => Err(meant(name, 0, error)),
         }
     })
 }
@@ -93,18 +135,21 @@ pub(crate) fn existing_topic(
     reason = "the transport believes what it is told of the types"
 )]
 fn builder(
-    node: &Node<Ipc>,
+    bus: &Bus,
     robot: &RobotName,
-    kind: &Kind,
+    name: &str,
+    payload: &TypeDetail,
 ) -> Result<iceoryx2::service::builder::publish_subscribe::Builder<Bytes, Header, Ipc>, Fault> {
-    let builder = node
-        .service_builder(&service_name(robot, kind.name)?)
+    let builder = bus
+        .node()
+        .service_builder(&service_name(robot, name)?)
         .publish_subscribe::<Bytes>()
         .user_header::<Header>();
-    // SAFETY: both are of the types that the typed ports read and write.
+    // SAFETY: both are of the types that the typed ports read and write, or that the service says
+    // itself.
     Ok(unsafe {
         builder
-            .__internal_set_payload_type_details(&(kind.payload)())
+            .__internal_set_payload_type_details(payload)
             .__internal_set_user_header_type_details(&Kind::header())
     })
 }
@@ -142,8 +187,16 @@ pub(crate) fn request(bus: &Bus, question: &Question) -> Result<RequestService, 
             .enable_safe_overflow_for_responses(true)
             // A request whose asker has given up must not be carried out later.
             .enable_fire_and_forget_requests(false)
-            .open_or_create_with_attributes(&layout(question.layout))
-            .map_err(|error| request_fault(question.name, error))
+            .open_or_create_with_attributes(&required(question.layout))
+            .map_err(|error| {
+                use RequestResponseOpenOrCreateError as Either;
+                let refusal = match error {
+                    Either::RequestResponseOpenError(error) => error.into(),
+                    Either::RequestResponseCreateError(error) => error.into(),
+                    Either::SystemInFlux => Refusal::Passing(TransportFault::InMotion),
+                };
+                meant(question.name, MAX_REQUEST_NODES, refusal)
+            })
     })
 }
 
@@ -158,150 +211,52 @@ pub(crate) fn event(bus: &Bus, kind: &Kind) -> Result<EventService, PortError> {
             .max_nodes(kind.qos.max_nodes())
             .event_id_max_value(MAX_EVENT_ID)
             .open_or_create()
-            .map_err(|error| event_fault(kind.name, &kind.qos, error))
+            .map_err(|error| {
+                use EventOpenOrCreateError as Either;
+                let refusal = match error {
+                    Either::EventOpenError(error) => error.into(),
+                    Either::EventCreateError(error) => error.into(),
+                    Either::SystemInFlux => Refusal::Passing(TransportFault::InMotion),
+                };
+                meant(kind.name, kind.qos.max_nodes(), refusal)
+            })
     })
 }
 
-/// The layout both sides must share: a difference refuses the service.
-fn layout([first, second]: [u64; 2]) -> AttributeVerifier {
-    let key = AttributeKey::new(SCHEMA_KEY.as_bytes()).expect("the key is short and not empty");
-    let value = AttributeValue::new(format!("{first:016x}.{second:016x}").as_bytes())
-        .expect("two hashes are short and not empty");
-    AttributeVerifier::new()
-        .require(&key, &value)
-        .expect("one attribute fits")
-}
-
 fn service_name(robot: &RobotName, topic: &str) -> Result<ServiceName, Fault> {
-    let full = name::service(robot, topic);
-    ServiceName::new(&full).map_err(|_| {
+    ServiceName::new(&name::service(robot, topic)).map_err(|_| {
         Fault::Lasting(PortError::Transport {
             topic: topic.to_owned(),
-            detail: format!("`{full}` is too long for a service's name"),
+            fault: TransportFault::NameTooLong,
         })
     })
 }
 
-fn topic_fault(topic: &str, qos: &Qos, error: PublishSubscribeOpenOrCreateError) -> Fault {
-    use PublishSubscribeCreateError as Create;
-    use PublishSubscribeOpenError as Open;
-    use PublishSubscribeOpenOrCreateError as Either;
-    let detail = match error {
-        Either::PublishSubscribeOpenError(open) => match open {
-            Open::IncompatibleTypes
-            | Open::IncompatibleMessagingPattern
-            | Open::IncompatibleAttributes
-            | Open::DoesNotSupportRequestedMinBufferSize
-            | Open::DoesNotSupportRequestedMinHistorySize
-            | Open::DoesNotSupportRequestedMinSubscriberBorrowedSamples
-            | Open::DoesNotSupportRequestedAmountOfPublishers
-            | Open::DoesNotSupportRequestedAmountOfSubscribers
-            | Open::DoesNotSupportRequestedAmountOfNodes
-            | Open::IncompatibleOverflowBehavior => {
-                return other_layout(topic, &format!("{open:?}"));
-            }
-            Open::InsufficientPermissions => return no_permission(topic),
-            Open::VersionMismatch => return other_version(topic),
-            Open::ExceedsMaxNumberOfNodes => return crowded(topic, qos.max_nodes()),
-            passing => format!("{passing:?}"),
-        },
-        Either::PublishSubscribeCreateError(create) => match create {
-            Create::InsufficientPermissions => return no_permission(topic),
-            passing => format!("{passing:?}"),
-        },
-        Either::SystemInFlux => "SystemInFlux".to_owned(),
-    };
-    Fault::Passing(detail)
-}
-
-fn request_fault(request: &str, error: RequestResponseOpenOrCreateError) -> Fault {
-    use RequestResponseCreateError as Create;
-    use RequestResponseOpenError as Open;
-    use RequestResponseOpenOrCreateError as Either;
-    let detail = match error {
-        Either::RequestResponseOpenError(open) => match open {
-            Open::InsufficientPermissions => return no_permission(request),
-            Open::VersionMismatch => return other_version(request),
-            Open::ExceedsMaxNumberOfNodes => return crowded(request, MAX_REQUEST_NODES),
-            Open::Interrupt
-            | Open::DoesNotExist
-            | Open::HangsInCreation
-            | Open::InternalFailure
-            | Open::IsMarkedForDestruction
-            | Open::ServiceInCorruptedState
-            | Open::UnableToCreateServiceTag => format!("{open:?}"),
-            incompatible => return other_layout(request, &format!("{incompatible:?}")),
-        },
-        Either::RequestResponseCreateError(create) => match create {
-            Create::InsufficientPermissions => return no_permission(request),
-            passing => format!("{passing:?}"),
-        },
-        Either::SystemInFlux => "SystemInFlux".to_owned(),
-    };
-    Fault::Passing(detail)
-}
-
-fn event_fault(name: &str, qos: &Qos, error: EventOpenOrCreateError) -> Fault {
-    use EventCreateError as Create;
-    use EventOpenError as Open;
-    use EventOpenOrCreateError as Either;
-    let detail = match error {
-        Either::EventOpenError(open) => match open {
-            Open::InsufficientPermissions => return no_permission(name),
-            Open::VersionMismatch => return other_version(name),
-            Open::ExceedsMaxNumberOfNodes => return crowded(name, qos.max_nodes()),
-            Open::Interrupt
-            | Open::DoesNotExist
-            | Open::HangsInCreation
-            | Open::InternalFailure
-            | Open::IsMarkedForDestruction
-            | Open::ServiceInCorruptedState
-            | Open::UnableToCreateServiceTag => format!("{open:?}"),
-            incompatible => return other_layout(name, &format!("{incompatible:?}")),
-        },
-        Either::EventCreateError(create) => match create {
-            Create::InsufficientPermissions => return no_permission(name),
-            passing => format!("{passing:?}"),
-        },
-        Either::SystemInFlux => "SystemInFlux".to_owned(),
-    };
-    Fault::Passing(detail)
-}
-
-fn other_layout(topic: &str, detail: &str) -> Fault {
-    Fault::Lasting(PortError::OtherLayout {
-        topic: topic.to_owned(),
-        detail: detail.to_owned(),
-    })
-}
-
-fn other_version(topic: &str) -> Fault {
-    Fault::Lasting(PortError::OtherVersion {
-        topic: topic.to_owned(),
-    })
-}
-
-fn no_permission(topic: &str) -> Fault {
-    Fault::Lasting(PortError::Permission {
-        topic: topic.to_owned(),
-    })
-}
-
-fn crowded(topic: &str, limit: usize) -> Fault {
-    Fault::Full(PortError::TooManyProcesses {
-        topic: topic.to_owned(),
-        limit,
-    })
+/// What a refusal means for the topic or request called `name`.
+fn meant(name: &str, nodes: usize, refusal: impl Into<Refusal>) -> Fault {
+    let topic = name.to_owned();
+    match refusal.into() {
+        Refusal::Passing(fault) => Fault::Passing(fault),
+        Refusal::Differs(difference) => {
+            Fault::Lasting(PortError::OtherLayout { topic, difference })
+        }
+        Refusal::Permission => Fault::Lasting(PortError::Permission { topic }),
+        Refusal::Version => Fault::Lasting(PortError::OtherVersion { topic }),
+        Refusal::Crowded => Fault::Full(PortError::TooManyProcesses {
+            topic,
+            limit: nodes,
+        }),
+    }
 }
 
 /// A port that could not be made for want of resources.
-pub(crate) fn no_resources(topic: &str, detail: impl core::fmt::Debug) -> Fault {
+pub(crate) fn no_resources(topic: &str, fault: impl Into<TransportFault>) -> Fault {
     let topic = topic.to_owned();
     Fault::Lasting(match Shortage::now() {
         Some(shortage) => PortError::Short { topic, shortage },
         None => PortError::Transport {
             topic,
-            detail: format!("{detail:?}"),
+            fault: fault.into(),
         },
     })
 }

@@ -12,6 +12,7 @@
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
+use core::marker::PhantomData;
 use core::num::NonZeroU64;
 use core::str::FromStr;
 use core::time::Duration;
@@ -23,6 +24,7 @@ use crate::bus::Bus;
 use crate::clock::Clock;
 use crate::doorbell::{self, Bell, InsideRope, Pace, Plan};
 use crate::error::PortError;
+use crate::untyped::republish_states;
 
 /// How to wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -99,8 +101,16 @@ const GIVE_WAY_NS: u64 = 4_000;
 /// of none.
 const WAKES: u32 = 16;
 
-/// Waits for all topics that a service acts on. It stays in the thread that made it.
+/// Waits for all topics that a service acts on. It stays in the thread that made it, as its ports
+/// do:
+///
+/// ```compile_fail,E0277
+/// fn sent_elsewhere(waiter: lager_ports::Waiter) -> impl Send {
+///     waiter
+/// }
+/// ```
 pub struct Waiter {
+    stays: PhantomData<*const ()>,
     bell: Bell,
     policy: Policy,
     role: Role,
@@ -139,6 +149,7 @@ impl Waiter {
             Policy::Block | Policy::Spin => Duration::ZERO,
         };
         Ok(Self {
+            stays: PhantomData,
             bell: Bell::hang(bus)?,
             policy,
             role,
@@ -154,12 +165,18 @@ impl Waiter {
         })
     }
 
-    /// Waits until rung, at most `timeout` of real time (see [`crate::Clock::real`]).
+    /// Waits until rung, at most `timeout` of real time (see [`crate::Clock::real`]). At a time-out,
+    /// and now and then after a ring, readers that have come late get the states that this thread
+    /// publishes.
     pub fn wait(&self, timeout: Duration) -> Wake {
         let rung = self.wait_while_not(timeout, || self.bell.rung());
         let wakes = self.wakes.get().wrapping_add(1);
         self.wakes.set(wakes);
-        self.everything.set(!rung || wakes.is_multiple_of(WAKES));
+        let everything = !rung || wakes.is_multiple_of(WAKES);
+        self.everything.set(everything);
+        if everything {
+            republish_states();
+        }
         if rung { Wake::Rung } else { Wake::TimedOut }
     }
 
@@ -383,7 +400,10 @@ impl fmt::Debug for Ringer {
 }
 
 fn is_actor(role: Role) -> bool {
-    BridgeRequest::ACTOR == role || TOPICS.iter().any(|topic| topic.qos.actors.contains(&role))
+    // A guest's topics are in no table of ours.
+    role == Role::Guest
+        || BridgeRequest::ACTOR == role
+        || TOPICS.iter().any(|topic| topic.qos.actors.contains(&role))
 }
 
 /// The machine's cores that run, whichever of them this thread may use.
@@ -409,7 +429,7 @@ mod tests {
 
     #[test]
     fn who_acts_is_an_actor_and_who_looks_is_not() {
-        assert!(is_actor(Role::Logic) && is_actor(Role::Bridge));
+        assert!(is_actor(Role::Logic) && is_actor(Role::Bridge) && is_actor(Role::Guest));
         assert!(!is_actor(Role::Observer) && !is_actor(Role::Recorder));
     }
 }

@@ -3,11 +3,11 @@
 //! Not for untrusted input: it only has to tell two layouts of this project apart.
 
 /// The start value of the 64-bit FNV-1a hash.
-pub(crate) const START: u64 = 0xcbf2_9ce4_8422_2325;
+pub const START: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
 /// Continues `hash` over `bytes` and one separator, so that `ab`+`c` differs from `a`+`bc`.
-pub(crate) const fn bytes(mut hash: u64, bytes: &[u8]) -> u64 {
+pub const fn bytes(mut hash: u64, bytes: &[u8]) -> u64 {
     let mut index = 0;
     while index < bytes.len() {
         hash = (hash ^ bytes[index] as u64).wrapping_mul(PRIME);
@@ -17,7 +17,7 @@ pub(crate) const fn bytes(mut hash: u64, bytes: &[u8]) -> u64 {
 }
 
 /// Continues `hash` over a number, little end first.
-pub(crate) const fn number(hash: u64, number: u64) -> u64 {
+pub const fn number(hash: u64, number: u64) -> u64 {
     bytes(hash, &number.to_le_bytes())
 }
 

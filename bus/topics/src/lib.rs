@@ -7,12 +7,15 @@
 //! * [`table`] lists the topics: name, payload, quality of service, actors.
 //! * [`payloads`] holds the sample layouts, one file per family of topics.
 //! * [`schema`] turns a layout into a hash, so that a changed one is refused.
+//! * [`Description`] is that layout as text, for tools that were built without it.
 //! * [`Stamp`] is the header in front of every sample.
 //!
 //! **Invariant:** every bit pattern of every payload is a valid value. Enums travel as
 //! [`Tag`], so a foreign or broken writer cannot cause undefined behaviour in a reader.
 
-mod hash;
+mod description;
+#[doc(hidden)]
+pub mod hash;
 pub mod list;
 pub mod payloads;
 mod role;
@@ -21,9 +24,20 @@ mod stamp;
 pub mod table;
 mod tag;
 
+/// What the macros of this crate name in the crates that use them.
+#[doc(hidden)]
+pub mod private {
+    pub use iceoryx2::prelude::ZeroCopySend;
+    pub use serde;
+}
+
+// The derives in `payload!` name this crate as its users do.
+extern crate self as lager_topics;
+
+pub use description::{Described, Description, DescriptionError, describe};
 pub use payloads::*;
 pub use role::{Role, UnknownRole};
-pub use schema::{Field, FieldInfo, Payload, Schema};
+pub use schema::{Field, FieldInfo, Make, Payload, Schema};
 pub use stamp::Stamp;
 pub use table::{
     BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,

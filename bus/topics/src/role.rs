@@ -30,12 +30,14 @@ coded! {
         Operator = 9,
         /// Any tool that only looks.
         Observer = 10,
+        /// A program of somebody else that acts on topics.
+        Guest = 11,
     }
 }
 
 impl Role {
     /// Every role.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Bridge,
         Self::Logic,
         Self::Comm,
@@ -47,6 +49,7 @@ impl Role {
         Self::Supervisor,
         Self::Operator,
         Self::Observer,
+        Self::Guest,
     ];
 
     /// The role's name in node and service names: lower case, no blanks.
@@ -63,6 +66,7 @@ impl Role {
             Self::Supervisor => "supervisor",
             Self::Operator => "operator",
             Self::Observer => "observer",
+            Self::Guest => "guest",
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! iceoryx2 compares two types by name, size and alignment only, so a `u64` that became an
 //! `f64` would pass. The hash made here is a required attribute of every service and catches
-//! that. [`payload!`] is the one way to make a payload: it checks at compile time that the
-//! struct has no implicit padding and exactly the stated size.
+//! that. [`payload!`](crate::payload) is the one way to make a payload: it checks at compile time
+//! that the struct has no implicit padding and exactly the stated size.
 
 use core::fmt::Debug;
 
@@ -13,18 +13,31 @@ use serde::de::DeserializeOwned;
 
 use crate::hash;
 
-/// A type that may be a field of a payload: any bit pattern is a valid value.
-pub trait Field: Copy + ZeroCopySend + 'static {
+/// A type that may be a field of a payload.
+///
+/// # Safety
+/// Any bit pattern is a valid value of the type, and it has no padding.
+#[allow(
+    unsafe_code,
+    reason = "what shared memory holds is read as such a type"
+)]
+pub unsafe trait Field: Copy + ZeroCopySend + 'static {
     /// Hash of the type's meaning: name, and for compound types everything inside.
     const SHAPE: u64;
+    /// What the type is made of.
+    const MAKE: Make;
     /// The value of a field nobody has written.
     const BLANK: Self;
 }
 
 macro_rules! primitive {
     ($($type:ty = $blank:expr),* $(,)?) => {
-        $(impl Field for $type {
+        $(
+        // SAFETY: a number without padding, of which any bits are one.
+        #[allow(unsafe_code)]
+        unsafe impl Field for $type {
             const SHAPE: u64 = hash::bytes(hash::START, stringify!($type).as_bytes());
+            const MAKE: Make = Make::Number(stringify!($type));
             const BLANK: Self = $blank;
         })*
     };
@@ -43,7 +56,10 @@ primitive!(
     f64 = 0.0,
 );
 
-impl<T: Field, const N: usize> Field for [T; N] {
+// SAFETY: elements lie without gaps, and each is a `Field`.
+#[allow(unsafe_code)]
+unsafe impl<T: Field, const N: usize> Field for [T; N] {
+    const MAKE: Make = Make::List(&T::MAKE, N);
     const SHAPE: u64 = hash::number(
         hash::number(hash::bytes(hash::START, b"array"), N as u64),
         T::SHAPE,
@@ -62,6 +78,31 @@ pub struct FieldInfo {
     pub offset: usize,
     /// Bytes the field occupies.
     pub size: usize,
+    /// What it is made of.
+    pub make: Make,
+}
+
+/// What a type is made of, for [`Description`](crate::Description).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Make {
+    /// A number, by the name of its Rust type.
+    Number(&'static str),
+    /// So many of one type.
+    List(&'static Make, usize),
+    /// A [`Tag`](crate::Tag).
+    Tag {
+        /// The enum's name.
+        name: &'static str,
+        /// Every variant's code and name.
+        variants: &'static [(u8, &'static str)],
+    },
+    /// A struct made by [`payload!`](crate::payload).
+    Record {
+        /// Its name.
+        name: &'static str,
+        /// Its fields in memory order.
+        fields: &'static [FieldInfo],
+    },
 }
 
 /// The layout of a payload as constants.
@@ -74,7 +115,7 @@ pub trait Schema {
     const FIELDS: &'static [FieldInfo];
 }
 
-/// Everything a topic needs of its sample type; [`payload!`] provides it.
+/// Everything a topic needs of its sample type; [`payload!`](crate::payload) provides it.
 pub trait Payload:
     Field + Schema + Debug + Default + PartialEq + Serialize + DeserializeOwned + Send + Sync
 {
@@ -82,7 +123,24 @@ pub trait Payload:
 
 /// Defines a payload: `repr(C)`, `Copy`, no implicit padding, exactly the given size.
 ///
-/// A field may state its blank value after `=`; otherwise it is the type's own.
+/// A field may state its blank value after `=`; otherwise it is the type's own. Fields whose names
+/// begin with `reserved` fill gaps; tools do not show them.
+///
+/// ```
+/// lager_topics::payload! {
+///     /// What a weather station sees.
+///     pub struct Weather: 8 bytes {
+///         /// Wind in mm/s.
+///         pub wind: u32,
+///         /// From where it blows, in degrees; 65535 = not known.
+///         pub from: u16 = u16::MAX,
+///         /// Fills the gap.
+///         pub reserved: [u8; 2],
+///     }
+/// }
+/// assert_eq!(Weather::default().from, 65535);
+/// ```
+#[macro_export]
 macro_rules! payload {
     (
         $(#[$meta:meta])*
@@ -92,8 +150,11 @@ macro_rules! payload {
     ) => {
         $(#[$meta])*
         #[repr(C)]
-        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(default)]
+        #[derive(
+            Clone, Copy, Debug, PartialEq,
+            $crate::private::serde::Serialize, $crate::private::serde::Deserialize,
+        )]
+        #[serde(default, crate = "lager_topics::private::serde")]
         pub struct $name {
             $( $(#[$field_meta])* pub $field: $type, )*
         }
@@ -113,16 +174,22 @@ macro_rules! payload {
         // self-contained and valid for any bit pattern; the supertrait bound is checked by
         // `Field::SHAPE` being taken of each field type below.
         #[allow(unsafe_code)]
-        unsafe impl iceoryx2::prelude::ZeroCopySend for $name {
+        unsafe impl $crate::private::ZeroCopySend for $name {
             unsafe fn type_name() -> &'static str {
                 <Self as $crate::schema::Schema>::TYPE_NAME
             }
         }
 
-        impl $crate::schema::Field for $name {
+        // SAFETY: as above.
+        #[allow(unsafe_code)]
+        unsafe impl $crate::schema::Field for $name {
             const SHAPE: u64 = <Self as $crate::schema::Schema>::HASH;
+            const MAKE: $crate::schema::Make = $crate::schema::Make::Record {
+                name: stringify!($name),
+                fields: <Self as $crate::schema::Schema>::FIELDS,
+            };
             const BLANK: Self = Self {
-                $( $field: $crate::schema::blank!($type $(, $blank)?), )*
+                $( $field: $crate::__blank!($type $(, $blank)?), )*
             };
         }
 
@@ -155,6 +222,7 @@ macro_rules! payload {
                     type_name: stringify!($type),
                     offset: core::mem::offset_of!($name, $field),
                     size: core::mem::size_of::<$type>(),
+                    make: <$type as $crate::schema::Field>::MAKE,
                 }, )*
             ];
         }
@@ -164,7 +232,9 @@ macro_rules! payload {
 }
 
 /// The blank value of a field: the stated one, else the type's own.
-macro_rules! blank {
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __blank {
     ($type:ty) => {
         <$type as $crate::schema::Field>::BLANK
     };
@@ -173,8 +243,7 @@ macro_rules! blank {
     };
 }
 
-pub(crate) use blank;
-pub(crate) use payload;
+pub(crate) use crate::payload;
 
 #[cfg(test)]
 // The macro makes public types; here they stay inside the test.
@@ -249,13 +318,15 @@ mod tests {
                     name: "count",
                     type_name: "u64",
                     offset: 0,
-                    size: 8
+                    size: 8,
+                    make: Make::Number("u64"),
                 },
                 FieldInfo {
                     name: "parts",
                     type_name: "[u16; 4]",
                     offset: 8,
-                    size: 8
+                    size: 8,
+                    make: Make::List(&Make::Number("u16"), 4),
                 },
             ]
         );

@@ -36,11 +36,36 @@ pub struct Qos {
     pub publishers: usize,
     /// Roles that act on the topic and are woken by each sample.
     pub actors: &'static [Role],
-    /// Whether the writer must call `tick` regularly, so that late joiners get the history.
+    /// Whether late joiners get the history also while nothing new is published.
     pub republish: bool,
 }
 
 impl Qos {
+    /// A stream of one writer: readers queue up to `buffer` samples, late joiners get none.
+    pub const fn stream(buffer: usize) -> Self {
+        Self {
+            buffer,
+            history: 0,
+            publishers: 1,
+            actors: &[],
+            republish: false,
+        }
+    }
+
+    /// A state of one writer: readers see the last sample, also those that join late.
+    pub const fn state() -> Self {
+        Self {
+            history: 1,
+            republish: true,
+            ..Self::stream(1)
+        }
+    }
+
+    /// The same, waking the processes of these roles with each sample.
+    pub const fn waking(self, actors: &'static [Role]) -> Self {
+        Self { actors, ..self }
+    }
+
     /// Subscriber places: 64 observers, each actor twice (a killed one and its successor), and
     /// [`SERVICE_SLOTS`].
     pub const fn max_subscribers(&self) -> usize {

@@ -11,7 +11,7 @@ use serde::de::{Error, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::hash;
-use crate::schema::Field;
+use crate::schema::{Field, Make};
 
 /// An enum whose variants have fixed one-byte codes and names.
 pub trait Coded: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
@@ -19,6 +19,8 @@ pub trait Coded: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
     const NAME: &'static str;
     /// Every variant with its name, in the order of declaration.
     const VARIANTS: &'static [(Self, &'static str)];
+    /// Every variant's code and name, in the same order.
+    const CODES: &'static [(u8, &'static str)];
     /// Hash over the enum's name and each variant's name and code.
     const SHAPE: u64;
 
@@ -51,12 +53,15 @@ pub trait Coded: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
 }
 
 /// Describes an enum defined elsewhere, whose variants cast to their codes.
+#[macro_export]
 macro_rules! coded_as_is {
     ($name:ident { $( $variant:ident ),* $(,)? }) => {
-        impl $crate::tag::Coded for $name {
+        impl $crate::Coded for $name {
             const NAME: &'static str = stringify!($name);
             const VARIANTS: &'static [(Self, &'static str)] =
                 &[ $( ($name::$variant, stringify!($variant)) ),* ];
+            const CODES: &'static [(u8, &'static str)] =
+                &[ $( ($name::$variant as u8, stringify!($variant)) ),* ];
             const SHAPE: u64 = {
                 let hash = $crate::hash::bytes($crate::hash::START, stringify!($name).as_bytes());
                 $(
@@ -76,7 +81,9 @@ macro_rules! coded_as_is {
     };
 }
 
-/// Defines an enum with one-byte codes, and describes it.
+/// Defines an enum with one-byte codes, and describes it, so that a payload may carry it as a
+/// [`Tag`].
+#[macro_export]
 macro_rules! coded {
     (
         $(#[$meta:meta])*
@@ -91,12 +98,11 @@ macro_rules! coded {
             $( $(#[$variant_meta])* $variant = $code, )*
         }
 
-        $crate::tag::coded_as_is!($name { $( $variant ),* });
+        $crate::coded_as_is!($name { $( $variant ),* });
     };
 }
 
-pub(crate) use coded;
-pub(crate) use coded_as_is;
+pub(crate) use crate::{coded, coded_as_is};
 
 /// One byte that means a variant of `E`, or is unknown. Blank is code 0.
 #[repr(transparent)]
@@ -127,7 +133,13 @@ impl<E: Coded> Tag<E> {
     }
 }
 
-impl<E: Coded> Field for Tag<E> {
+// SAFETY: as above.
+#[allow(unsafe_code)]
+unsafe impl<E: Coded> Field for Tag<E> {
+    const MAKE: Make = Make::Tag {
+        name: E::NAME,
+        variants: E::CODES,
+    };
     const SHAPE: u64 = hash::number(hash::bytes(hash::START, b"tag"), E::SHAPE);
     const BLANK: Self = Self::from_raw(0);
 }

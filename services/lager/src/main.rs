@@ -49,7 +49,7 @@ use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
 use lager_ports::{Bus, Shutdown};
 use lager_simulator::SimulatorConfig;
-use lager_topics::{Mode, Role};
+use lager_topics::{Mode, Role, TOPICS};
 use lager_wire::OperatorCommand;
 
 use crate::cli::{
@@ -344,8 +344,10 @@ fn service(
 
 /// The topic tools, on standard output.
 fn topic(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patience) -> Result<()> {
-    if let TopicCommand::Echo { wait: false, .. } | TopicCommand::Hz { wait: false, .. } =
-        args.command
+    if let TopicCommand::Echo { wait: false, topic, .. }
+    | TopicCommand::Hz { wait: false, topic, .. } = &args.command
+        // Other people's topics need no robot.
+        && TOPICS.iter().any(|entry| entry.name == topic)
     {
         diagnose::must_be_up(config)?;
     }

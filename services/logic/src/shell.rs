@@ -349,10 +349,6 @@ impl Shell {
         let now = self.clock.now();
         if now >= self.status_due {
             self.publish_status(now);
-            self.status.tick();
-            self.route.tick();
-            self.blocks.tick();
-            self.queue.tick();
         }
         if now >= self.renewal_due {
             self.give_order(now, Cause::OWN);

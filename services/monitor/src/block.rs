@@ -19,7 +19,8 @@
 
 use std::fmt::Write;
 
-use lager_topics::{FieldInfo, Schema, Stamp, Topic};
+use lager_ports::Found;
+use lager_topics::{Schema, Stamp, Topic};
 use serde_json::Value;
 
 use crate::{ToolError, sentence};
@@ -36,9 +37,9 @@ const YES_OR_NO: [&str; 4] = ["up", "stopped", "under_way", "arm_granted"];
 /// How samples of one topic are written.
 #[derive(Debug)]
 pub(crate) struct Blocks {
-    topic: &'static str,
-    fields: &'static [FieldInfo],
-    /// The payload's blank value.
+    topic: String,
+    fields: Vec<String>,
+    /// The payload's blank value; null where it is not known.
     blank: Value,
     /// The columns' widths so far, where samples are rows; none before the first.
     row: Option<Vec<usize>>,
@@ -49,15 +50,27 @@ pub(crate) struct Blocks {
 impl Blocks {
     pub(crate) fn new<T: Topic>() -> Result<Self, ToolError> {
         let blank = serde_json::to_value(T::Payload::default())?;
-        let fields = <T::Payload as Schema>::FIELDS;
-        let is_flat = members(&blank).all(|(_, value)| !value.is_object() && !value.is_array());
-        let is_row = is_flat && members(&blank).count() <= WIDEST_ROW;
+        let fields = <T::Payload as Schema>::FIELDS.iter();
+        let fields = fields.map(|field| field.name.to_owned()).collect();
         Ok(Self {
-            topic: T::NAME,
+            row: is_row(&blank).then(Vec::new),
+            topic: T::NAME.to_owned(),
             fields,
             blank,
-            row: is_row.then(Vec::new),
             sentence: sentence::of::<T>(),
+        })
+    }
+
+    /// For a topic of which only its description is known.
+    pub(crate) fn of_found(found: &Found) -> Result<Self, ToolError> {
+        let description = found.description();
+        let zeros = vec![0; description.size()];
+        Ok(Self {
+            row: is_row(&serde_json::to_value(description.read(&zeros))?).then(Vec::new),
+            topic: found.name().to_owned(),
+            fields: description.fields().map(str::to_owned).collect(),
+            blank: Value::Null,
+            sentence: |_| None,
         })
     }
 
@@ -166,12 +179,18 @@ impl Blocks {
     fn entries<'a>(
         &'a self,
         payload: &'a Value,
-    ) -> impl Iterator<Item = (&'static str, &'a Value, &'a Value)> {
-        self.fields.iter().filter_map(|field| {
-            let value = payload.get(field.name)?;
-            Some((field.name, value, self.blank.get(field.name)?))
+    ) -> impl Iterator<Item = (&'a str, &'a Value, &'a Value)> {
+        self.fields.iter().filter_map(|name| {
+            let value = payload.get(name)?;
+            Some((name.as_str(), value, &self.blank[name]))
         })
     }
+}
+
+/// Whether a payload like this one is shown as a row.
+fn is_row(blank: &Value) -> bool {
+    let is_flat = members(blank).all(|(_, value)| !value.is_object() && !value.is_array());
+    is_flat && members(blank).count() <= WIDEST_ROW
 }
 
 /// Fields that are made of fields: those of the same make beside each other.

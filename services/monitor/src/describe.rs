@@ -41,7 +41,7 @@ impl<W: Write> Tools<'_, W> {
             }
             let name = format!("lager/{}/{}", topic.robot, topic.name);
             match topic.layout {
-                Layout::Ours => {
+                Layout::Ours | Layout::Described => {
                     let publishers = Count(topic.publishers, "publisher").to_string();
                     let subscribers = Count(topic.subscribers, "subscriber").to_string();
                     let observers = Count(topic.observers, "observer");
@@ -64,10 +64,9 @@ impl<W: Write> Tools<'_, W> {
     /// # Errors
     /// No topic has that name, or the output cannot be written.
     pub fn info(&mut self, name: &str) -> Result<(), ToolError> {
-        let entry = TOPICS
-            .iter()
-            .find(|entry| entry.name == name)
-            .ok_or_else(|| UnknownTopic(name.to_owned()))?;
+        let Some(entry) = TOPICS.iter().find(|entry| entry.name == name) else {
+            return self.info_of_found(name);
+        };
         let live = self
             .watchdog
             .over("looking at the topic", || {
@@ -150,6 +149,35 @@ impl<W: Write> Tools<'_, W> {
             let by = if done == "woken" { "is" } else { "by" };
             writeln!(out, "    {done:7} {by} {role}, process {}", peer.pid)?;
         }
+        Ok(())
+    }
+
+    /// What a topic that is in no table says of itself.
+    fn info_of_found(&mut self, name: &str) -> Result<(), ToolError> {
+        let topics = self
+            .watchdog
+            .over("looking at the topic", || self.bus.topics())?;
+        let mut topics = topics.into_iter();
+        let topic = topics.find(|topic| topic.robot == *self.bus.robot() && topic.name == name);
+        let described = topic.and_then(|mut topic| Some((topic.description.take()?, topic)));
+        let (description, topic) = described.ok_or_else(|| UnknownTopic(name.to_owned()))?;
+        let (publishers, subscribers) = (topic.publishers, topic.subscribers);
+        let fields: Vec<&str> = description.fields().collect();
+        if self.as_json {
+            let value = json!({
+                "name": name, "type": description.name(), "size": description.size(),
+                "fields": fields, "publishers": publishers, "subscribers": subscribers,
+            });
+            writeln!(self.out, "{value}")?;
+            return Ok(());
+        }
+        let size = Count(description.size(), "byte");
+        writeln!(self.out, "{name}: in no table of this build")?;
+        writeln!(self.out, "  carries     {}, {size}", description.name())?;
+        writeln!(self.out, "    {}", fields.join(", "))?;
+        let publishers = Count(publishers, "publisher");
+        let subscribers = Count(subscribers, "subscriber");
+        writeln!(self.out, "  has now     {publishers}, {subscribers}")?;
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ use lager_topics::{Stamp, Topic, TopicVisitor, by_id, visit};
 use serde_json::{Value, json};
 
 use crate::block::Blocks;
+use crate::source::Source;
 use crate::{Count, ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
@@ -17,7 +18,14 @@ impl<W: Write> Tools<'_, W> {
     /// # Errors
     /// No topic has that name, it cannot be read, or the output cannot be written.
     pub fn echo(&mut self, name: &str, count: Option<u64>) -> Result<(), ToolError> {
-        visit(name, Echo { tools: self, count })?
+        match visit(name, Echo { tools: self, count }) {
+            Ok(echoed) => echoed,
+            Err(unknown) => {
+                let found = self.found(name, unknown)?;
+                let blocks = Blocks::of_found(&found)?;
+                self.echo_from(name, found, blocks, count)
+            }
+        }
     }
 
     /// Who writes, in words: its role where the bus knows it, and its process.
@@ -45,46 +53,56 @@ impl<W: Write> TopicVisitor for Echo<'_, '_, W> {
     type Output = Result<(), ToolError>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        let Self { tools, count } = self;
-        let mut subscriber = tools.subscriber::<T>()?;
-        let mut blocks = Blocks::new::<T>()?;
+        let subscriber = self.tools.subscriber::<T>()?;
+        let blocks = Blocks::new::<T>()?;
+        self.tools
+            .echo_from(T::NAME, subscriber, blocks, self.count)
+    }
+}
+
+impl<W: Write> Tools<'_, W> {
+    fn echo_from(
+        &mut self,
+        name: &str,
+        mut from: impl Source,
+        mut blocks: Blocks,
+        count: Option<u64>,
+    ) -> Result<(), ToolError> {
         let mut writers = HashMap::new();
         let (mut shown, mut lost) = (0, 0);
         let mut heard = Instant::now();
-        while !tools.shutdown.is_requested() && count.is_none_or(|count| shown < count) {
-            let Some(sample) = tools.receive(&mut subscriber)? else {
-                tools.out.flush()?;
-                tools.pause(heard)?;
+        while !self.shutdown.is_requested() && count.is_none_or(|count| shown < count) {
+            let Some((stamp, payload)) = self.receive(&mut from, Source::next_as_json)? else {
+                self.out.flush()?;
+                self.pause(heard)?;
                 continue;
             };
+            let payload = payload?;
             heard = Instant::now();
             let received_ns = Clock::monotonic_ns();
-            let stamp = *sample.stamp();
-            let payload = serde_json::to_value(*sample)?;
-            drop(sample);
-            if tools.as_json {
+            if self.as_json {
                 let value = json!({
-                    "topic": T::NAME, "sequence": stamp.sequence, "epoch": stamp.epoch,
+                    "topic": name, "sequence": stamp.sequence, "epoch": stamp.epoch,
                     "writer": stamp.writer, "source_time_ns": stamp.source_time_ns,
                     "publish_time_ns": stamp.publish_time_ns, "cause": cause(&stamp),
-                    "lost": subscriber.lost(), "payload": payload,
+                    "lost": from.lost(), "payload": payload,
                 });
-                writeln!(tools.out, "{value}")?;
+                writeln!(self.out, "{value}")?;
             } else {
-                if subscriber.lost() > lost {
-                    let newly = usize::try_from(subscriber.lost() - lost).unwrap_or(usize::MAX);
-                    writeln!(tools.out, "-- {} lost", Count(newly, "sample"))?;
+                if from.lost() > lost {
+                    let newly = usize::try_from(from.lost() - lost).unwrap_or(usize::MAX);
+                    writeln!(self.out, "-- {} lost", Count(newly, "sample"))?;
                 }
                 let writer = writers
                     .entry(stamp.writer)
-                    .or_insert_with(|| tools.writer(stamp.writer));
+                    .or_insert_with(|| self.writer(stamp.writer));
                 let text = blocks.sample(&stamp, received_ns, writer, &payload);
-                tools.out.write_all(text.as_bytes())?;
+                self.out.write_all(text.as_bytes())?;
             }
-            lost = subscriber.lost();
+            lost = from.lost();
             shown += 1;
         }
-        tools.out.flush()?;
+        self.out.flush()?;
         Ok(())
     }
 }

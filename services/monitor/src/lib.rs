@@ -1,8 +1,8 @@
 //! The topic tools: list, info, echo and hz, for any topic of any robot, by name.
 //!
 //! They are observers: they poll, hold no listener and never slow the path. They know no topic,
-//! except for the sentences of some samples (`sentence.rs`); the table leads from a name to its
-//! static type. Each tool writes text or one JSON value a line to the writer that it is given, and
+//! except for the sentences of some samples (`sentence.rs`). The table leads from a name to its
+//! static type; a topic that is in no table brings its description along. Each tool writes text or one JSON value a line to the writer that it is given, and
 //! says how many samples it lost. Every call into the bus is made under a watchdog, so that a tool
 //! reports a bus that does not answer and does not wait for it.
 
@@ -11,15 +11,17 @@ mod describe;
 mod echo;
 mod rate;
 mod sentence;
+mod source;
 
 use std::fmt;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use lager_ports::{
-    Bus, IntrospectError, PortError, ReceiveError, Sample, Shortage, Shutdown, Subscriber, Watchdog,
+    Bus, Found, IntrospectError, PortError, ReceiveError, Shortage, Shutdown, Subscriber, Watchdog,
 };
 use lager_topics::{Topic, UnknownTopic};
+use source::Source;
 
 /// The pace at which an observer polls.
 const POLL: Duration = Duration::from_millis(5);
@@ -45,9 +47,20 @@ impl<W: Write> Tools<'_, W> {
         Ok(self.watchdog.over("opening the topic", open)?)
     }
 
-    fn receive<T: Topic>(&self, from: &mut Subscriber<T>) -> Result<Option<Sample<T>>, ToolError> {
-        let receive = || from.receive();
-        Ok(self.watchdog.over("reading the topic", receive)?)
+    /// A topic that is in no table but on the bus.
+    fn found(&self, name: &str, unknown: UnknownTopic) -> Result<Found, ToolError> {
+        let found = self
+            .watchdog
+            .over("opening the topic", || self.bus.found(name))?;
+        found.ok_or(ToolError::Unknown(unknown))
+    }
+
+    fn receive<S: Source, R>(
+        &self,
+        from: &mut S,
+        next: impl Fn(&mut S) -> Result<Option<R>, ReceiveError>,
+    ) -> Result<Option<R>, ToolError> {
+        Ok(self.watchdog.over("reading the topic", || next(from))?)
     }
 
     /// Waits a moment for the next sample. A subscriber that cannot reach a writer for want of

@@ -7,6 +7,7 @@ use lager_ports::Clock;
 use lager_topics::{Stamp, Topic, TopicVisitor, visit};
 use serde_json::json;
 
+use crate::source::Source;
 use crate::{ToolError, Tools};
 
 /// One line is printed for each window.
@@ -18,8 +19,19 @@ impl<W: Write> Tools<'_, W> {
     /// # Errors
     /// No topic has that name, it cannot be read, or the output cannot be written.
     pub fn hz(&mut self, name: &str, windows: Option<u64>) -> Result<(), ToolError> {
-        let tools = self;
-        visit(name, Hz { tools, windows })?
+        match visit(
+            name,
+            Hz {
+                tools: self,
+                windows,
+            },
+        ) {
+            Ok(measured) => measured,
+            Err(unknown) => {
+                let found = self.found(name, unknown)?;
+                self.hz_from(name, found, windows)
+            }
+        }
     }
 }
 
@@ -67,45 +79,55 @@ impl<W: Write> TopicVisitor for Hz<'_, '_, W> {
     type Output = Result<(), ToolError>;
 
     fn visit<T: Topic>(self) -> Self::Output {
-        let Self { tools, windows } = self;
-        let mut subscriber = tools.subscriber::<T>()?;
+        let subscriber = self.tools.subscriber::<T>()?;
+        self.tools.hz_from(T::NAME, subscriber, self.windows)
+    }
+}
+
+impl<W: Write> Tools<'_, W> {
+    fn hz_from(
+        &mut self,
+        name: &str,
+        mut from: impl Source,
+        windows: Option<u64>,
+    ) -> Result<(), ToolError> {
         let (mut printed, mut lost) = (0, 0);
         let mut heard = Instant::now();
         while windows.is_none_or(|count| printed < count) {
             let mut window = Window::default();
             let end = Instant::now() + WINDOW;
             while Instant::now() < end {
-                if tools.shutdown.is_requested() {
+                if self.shutdown.is_requested() {
                     return Ok(());
                 }
-                while let Some(sample) = tools.receive(&mut subscriber)? {
-                    window.add(sample.stamp(), Clock::monotonic_ns());
+                while let Some(stamp) = self.receive(&mut from, Source::next_stamp)? {
+                    window.add(&stamp, Clock::monotonic_ns());
                     heard = Instant::now();
                 }
-                tools.pause(heard)?;
+                self.pause(heard)?;
             }
-            let newly_lost = subscriber.lost() - lost;
-            lost = subscriber.lost();
+            let newly_lost = from.lost() - lost;
+            lost = from.lost();
             printed += 1;
-            if tools.as_json {
+            if self.as_json {
                 let value = json!({
-                    "topic": T::NAME, "hz": window.rate(), "samples": window.samples,
+                    "topic": name, "hz": window.rate(), "samples": window.samples,
                     "longest_gap_ns": window.longest_gap_ns,
                     "oldest_ns": window.oldest_source_ns, "lost": newly_lost,
                 });
-                writeln!(tools.out, "{value}")?;
+                writeln!(self.out, "{value}")?;
             } else if window.samples == 0 {
-                writeln!(tools.out, "no sample in the last second")?;
+                writeln!(self.out, "no sample in the last second")?;
             } else {
                 writeln!(
-                    tools.out,
+                    self.out,
                     "{:9.2} Hz   longest gap {:8.3} ms   oldest {:8.3} ms   lost {newly_lost}",
                     window.rate(),
                     window.longest_gap_ns as f64 / 1e6,
                     window.oldest_source_ns as f64 / 1e6,
                 )?;
             }
-            tools.out.flush()?;
+            self.out.flush()?;
         }
         Ok(())
     }

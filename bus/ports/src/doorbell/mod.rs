@@ -9,7 +9,7 @@
 //!
 //! | file | what it is |
 //! |---|---|
-//! | `word` | the ring and sleep protocol; `model` runs it under every interleaving |
+//! | `word` | the ring and sleep protocol; `model` runs it under all interleavings with at most three preemptions |
 //! | `futex` | the word as a futex |
 //! | `board` | the shared memory: who is rung for what, who may spin |
 //! | `segment`, `locks` | its file: joining, leaving, seats, what killed processes leave |
@@ -41,6 +41,7 @@ use word::Sleeper;
 
 use crate::bus::Bus;
 use crate::error::PortError;
+use crate::fault::{Difference, TransportFault};
 use crate::name::RobotName;
 use crate::place::Place;
 
@@ -217,11 +218,11 @@ fn error(role: Role, fault: Fault) -> PortError {
     match fault {
         Fault::OtherLayout => PortError::OtherLayout {
             topic,
-            detail: "its board in shared memory differs".to_owned(),
+            difference: Difference::Board,
         },
         Fault::Busy => PortError::Busy {
             topic,
-            detail: "its board in shared memory stays locked".to_owned(),
+            fault: TransportFault::InMotion,
         },
         Fault::NoSeat => PortError::TooManyWaiters {
             role,
@@ -232,7 +233,7 @@ fn error(role: Role, fault: Fault) -> PortError {
         }
         Fault::File(error) => PortError::Transport {
             topic,
-            detail: error.to_string(),
+            fault: error.into(),
         },
     }
 }

@@ -1,6 +1,5 @@
 //! Both sides of a request.
 
-use core::fmt;
 use core::ptr::NonNull;
 use core::time::Duration;
 use std::time::Instant;
@@ -19,6 +18,7 @@ use super::{Bytes, Header, Here, Question, behind, ends_here};
 use crate::bus::Bus;
 use crate::doorbell::Rope;
 use crate::error::{CallError, PortError, ReceiveError};
+use crate::fault::TransportFault;
 use crate::service::{self, Fault, MAX_CLIENTS, MAX_SERVERS, RequestService, patiently};
 use crate::transport::Ipc;
 
@@ -142,10 +142,10 @@ impl Asker {
         servers
     }
 
-    fn failed(&self, error: impl fmt::Debug) -> CallError {
+    fn failed(&self, error: impl Into<TransportFault>) -> CallError {
         CallError::Transport {
             request: self.question.name,
-            detail: format!("{error:?}"),
+            fault: error.into(),
         }
     }
 }
@@ -201,7 +201,7 @@ impl Answerer {
                 answerer: self,
             })),
             Err(IpcReceiveError::ExceedsMaxBorrows) => Err(ReceiveError::TooManyHeld { limit: 1 }),
-            Err(other) => Err(ReceiveError::Transport(format!("{other:?}"))),
+            Err(other) => Err(ReceiveError::Transport(other.into())),
         }
     }
 }

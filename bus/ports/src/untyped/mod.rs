@@ -33,13 +33,13 @@ use iceoryx2::node::Node;
 use iceoryx2::service::marker::{CustomHeaderMarker, CustomPayloadMarker};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use iceoryx2_bb_elementary_traits::type_name::TypeName;
-use lager_topics::{Qos, Request, Role, Schema, Stamp, Topic};
+use lager_topics::{Field, Make, Qos, Request, Role, Schema, Stamp, Topic};
 
 use crate::transport::Ipc;
 
 pub(crate) use asking::{Answerer, Asker};
 pub(crate) use reader::{Reader, Taken};
-pub(crate) use writer::{Lent, Ring, Writer};
+pub(crate) use writer::{Lent, Ring, Writer, republish_states};
 
 /// What a payload is to the transport.
 pub(crate) type Bytes = [CustomPayloadMarker];
@@ -54,6 +54,8 @@ pub(crate) struct Kind {
     pub(crate) id: u32,
     pub(crate) qos: Qos,
     pub(crate) payload: fn() -> TypeDetail,
+    /// What the payload is made of.
+    pub(crate) make: Make,
     /// The hashes of payload and header.
     pub(crate) layout: [u64; 2],
 }
@@ -65,6 +67,7 @@ impl Kind {
             id: T::ID,
             qos: T::QOS,
             payload: detail::<T::Payload>,
+            make: T::Payload::MAKE,
             layout: [T::Payload::HASH, Stamp::HASH],
         }
     }

@@ -44,9 +44,16 @@ pub(crate) struct Taken {
 impl Reader {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
-        let service = service::topic(bus, kind)?;
+        Self::of(bus, kind.name, &service::topic(bus, kind)?)
+    }
+
+    /// A reader of the topic called `name`, whose service this is.
+    #[inline(never)]
+    pub(crate) fn of(bus: &Bus, name: &str, service: &TopicService) -> Result<Self, PortError> {
+        let limits = service.static_config();
+        let no_place = || Fault::Full(no_place(bus, name, limits.max_subscribers()));
         let unreached = Arc::new(AtomicU32::new(0));
-        let port = patiently(bus, kind.name, || {
+        let port = patiently(bus, name, || {
             unreached.store(0, Ordering::Relaxed);
             let missed = Arc::clone(&unreached);
             let subscriber = service
@@ -57,25 +64,22 @@ impl Reader {
                     missed.fetch_add(1, Ordering::Relaxed);
                     DegradationAction::Ignore
                 })
-                .buffer_size(kind.qos.buffer)
+                .buffer_size(limits.subscriber_max_buffer_size())
                 .create()
                 .map_err(|error| match error {
-                    SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
-                        Fault::Full(no_place(bus, kind))
-                    }
-                    other => service::no_resources(kind.name, other),
+                    SubscriberCreateError::ExceedsMaxSupportedSubscribers => no_place(),
+                    other => service::no_resources(name, other),
                 })?;
             // This counts with the new reader in place, so that two readers that come at once
             // cannot both get the last place.
-            if bus.role().is_observer() && observers(&service) > OBSERVERS {
-                return Err(Fault::Full(no_place(bus, kind)));
+            if bus.role().is_observer() && observers(service) > OBSERVERS {
+                return Err(no_place());
             }
             Ok(subscriber)
         })?;
-        let details = service.static_config().message_type_details();
         Ok(Self {
             port: Here::new(port),
-            payload_align: details.payload.alignment(),
+            payload_align: limits.message_type_details().payload.alignment(),
             // Taken after the port exists: a publisher that is younger has seen the port from its
             // start.
             streams: Streams::new(Clock::monotonic_ns()),
@@ -102,7 +106,7 @@ impl Reader {
             Err(IpcReceiveError::ExceedsMaxBorrows) => {
                 Err(ReceiveError::TooManyHeld { limit: MAX_HELD })
             }
-            Err(other) => Err(ReceiveError::Transport(format!("{other:?}"))),
+            Err(other) => Err(ReceiveError::Transport(other.into())),
         }
     }
 
@@ -160,17 +164,14 @@ fn observers(service: &TopicService) -> usize {
     observers
 }
 
-fn no_place(bus: &Bus, kind: &Kind) -> PortError {
-    let topic = kind.name.to_owned();
+fn no_place(bus: &Bus, name: &str, limit: usize) -> PortError {
+    let topic = name.to_owned();
     if bus.role().is_observer() {
         PortError::TooManyObservers {
             topic,
             limit: OBSERVERS,
         }
     } else {
-        PortError::TooManyReaders {
-            topic,
-            limit: kind.qos.max_subscribers(),
-        }
+        PortError::TooManyReaders { topic, limit }
     }
 }

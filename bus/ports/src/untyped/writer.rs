@@ -1,7 +1,8 @@
 //! The writing end of a topic.
 
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
 use core::ptr::NonNull;
+use std::rc::{Rc, Weak};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use iceoryx2::port::LoanError;
@@ -22,7 +23,7 @@ use crate::transport::Ipc;
 
 /// [`crate::Publisher`] without the payload's type.
 pub(crate) struct Writer {
-    port: Here<Port>,
+    port: Rc<Here<Port>>,
     payload_align: usize,
     standard: Here<StandardListeners>,
     ropes: Box<[Rope]>,
@@ -35,6 +36,22 @@ type Port = Publisher<Ipc, Bytes, Header>;
 type Loaned = SampleMut<Ipc, Bytes, Header>;
 
 ends_here!(Port, Loaned, StandardListeners);
+
+thread_local! {
+    /// The ports of this thread that write states.
+    static STATES: RefCell<Vec<Weak<Here<Port>>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Gives readers that have come since to the states of this thread their history.
+pub(crate) fn republish_states() {
+    // A thread that is ending has no states any more.
+    let _ = STATES.try_with(|states| {
+        for port in states.borrow().iter().filter_map(Weak::upgrade) {
+            // As in `tick`.
+            let _ = port.update_connections();
+        }
+    });
+}
 
 /// A sample on loan; dropped unsent it leaves no trace.
 pub(crate) struct Lent {
@@ -79,8 +96,15 @@ impl Writer {
                 })
         })?;
         let details = service.static_config().message_type_details();
+        let port = Rc::new(Here::new(port));
+        if kind.qos.republish {
+            STATES.with_borrow_mut(|states| {
+                states.retain(|state| state.strong_count() > 0);
+                states.push(Rc::downgrade(&port));
+            });
+        }
         Ok(Self {
-            port: Here::new(port),
+            port,
             payload_align: details.payload.alignment(),
             standard: Here::new(standard),
             ropes,
@@ -137,7 +161,7 @@ impl Writer {
         self.standard.notify();
         match sent {
             Ok(_) => Ok(()),
-            Err(error) => Err(SendError::Transport(format!("{error:?}"))),
+            Err(error) => Err(SendError::Transport(error.into())),
         }
     }
 
@@ -169,7 +193,7 @@ impl Lent {
 fn refused(error: LoanError) -> SendError {
     match error {
         LoanError::ExceedsMaxLoans => SendError::TooManyLoans { limit: MAX_LOANS },
-        other => SendError::Transport(format!("{other:?}")),
+        other => SendError::Transport(other.into()),
     }
 }
 

@@ -12,7 +12,7 @@ use iceoryx2::prelude::{
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
 use iceoryx2::service::port_factory::event;
-use lager_ports::{Cause, Clock, Policy, Wake};
+use lager_ports::{Cause, Clock, Difference, Policy, PortError, Wake};
 use lager_topics::{
     Answer, Ask, BridgeRequest, LineFrame, NavStatus, NavigatorStatus, Qos, Request, Role, Schema,
     SensorLine, Stamp, Topic,
@@ -192,6 +192,11 @@ fn a_topic_that_stock_made_is_ours_too() {
     let sample = subscriber.receive().unwrap().unwrap();
     assert_eq!(sample.payload().link_epoch, 5);
     assert_eq!(made.attributes().number_of_key_values(&key), 1);
+    // It does not say how its samples are laid out.
+    let found = bus.found(SensorLine::NAME).unwrap_err();
+    let topic = SensorLine::NAME.to_owned();
+    let difference = Difference::Undescribed;
+    assert_eq!(found, PortError::OtherLayout { topic, difference });
 }
 
 #[test]

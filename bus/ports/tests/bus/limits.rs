@@ -8,8 +8,8 @@ use std::time::Duration;
 use iceoryx2::prelude::ZeroCopySend;
 use lager_ports::{Bus, Cause, OpenError, Policy, PortError, Wake};
 use lager_topics::{
-    DistanceFrame, Field, FieldInfo, LineFrame, OBSERVERS, Payload, Qos, Role, Schema, SensorLine,
-    SteeringCommand, Topic,
+    DistanceFrame, Field, FieldInfo, LineFrame, Make, OBSERVERS, Payload, Qos, Role, Schema,
+    SensorLine, SteeringCommand, Topic,
 };
 use serde::{Deserialize, Serialize};
 
@@ -172,7 +172,10 @@ unsafe impl ZeroCopySend for ExchangedFields {
     }
 }
 
-impl Field for ExchangedFields {
+// SAFETY: `repr(C)`, integers only, without padding.
+#[allow(unsafe_code)]
+unsafe impl Field for ExchangedFields {
+    const MAKE: Make = LineFrame::MAKE;
     const SHAPE: u64 = 1;
     const BLANK: Self = Self {
         bits: 0,

@@ -5,6 +5,7 @@
 mod bells;
 mod damage;
 mod domain;
+mod examples;
 mod interop;
 mod introspection;
 mod killed;

@@ -1,8 +1,9 @@
 //! What is sent and what arrives.
 
 use std::sync::Barrier;
+use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Cause, Clock, ReceiveError, SendError};
+use lager_ports::{Bus, BusConfig, Cause, Clock, Policy, ReceiveError, SendError, Wake};
 use lager_topics::{NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine};
 
 use crate::domain::{Domain, drain, send};
@@ -212,6 +213,26 @@ fn a_late_joiner_gets_the_last_state_at_the_writers_tick() {
 
     // Once is enough.
     publisher.tick();
+    assert!(late.latest().unwrap().is_none());
+}
+
+#[test]
+fn a_state_reaches_late_joiners_while_its_writer_waits() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Logic);
+    let waiter = bus.waiter(Policy::Block).unwrap();
+    let publisher = bus.publisher::<NavStatus>().unwrap();
+    publisher
+        .send(Cause::OWN, NavigatorStatus::default())
+        .unwrap();
+    let late = domain.open(Role::Observer);
+    let mut late = late.subscriber::<NavStatus>().unwrap();
+    assert!(late.latest().unwrap().is_none());
+    assert_eq!(waiter.wait(Duration::from_millis(1)), Wake::TimedOut);
+    assert_eq!(late.latest().unwrap().unwrap().stamp().sequence, 0);
+    // The state of a writer that is gone is nobody's any more.
+    drop(publisher);
+    assert_eq!(waiter.wait(Duration::from_millis(1)), Wake::TimedOut);
     assert!(late.latest().unwrap().is_none());
 }
 

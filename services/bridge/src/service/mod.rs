@@ -104,7 +104,7 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
                 })
                 .map_err(|error| PortError::Transport {
                     topic: "link/health".to_owned(),
-                    detail: format!("no thread for a serial port: {error}"),
+                    fault: error.into(),
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;
         }
@@ -122,7 +122,7 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
                 .spawn_scoped(scope, watch)
                 .map_err(|error| PortError::Transport {
                     topic: "operator/input".to_owned(),
-                    detail: format!("no thread for the buttons: {error}"),
+                    fault: error.into(),
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;
         }

@@ -1,0 +1,28 @@
+//! Looks at the weather now and then, and never slows its publisher.
+
+mod weather;
+
+use std::{error::Error, thread::sleep, time::Duration};
+
+use lager_ports::{Bus, BusConfig};
+use lager_topics::Role;
+use weather::WeatherNow;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args_os().nth(1).map(Into::into);
+    let bus = Bus::open(
+        &BusConfig {
+            folder,
+            ..BusConfig::default()
+        },
+        Role::Observer,
+    )?;
+    let mut weather = bus.subscriber::<WeatherNow>()?;
+    loop {
+        while let Some(sample) = weather.receive()? {
+            println!("number {}: {:?}", sample.stamp().sequence, *sample);
+        }
+        println!("{} lost", weather.lost());
+        sleep(Duration::from_secs(1));
+    }
+}

@@ -1,0 +1,102 @@
+//! Topics that this process was not built with: read by the description that travels with them.
+
+use core::fmt;
+
+use lager_topics::{Described, Description, Stamp};
+
+use crate::bus::Bus;
+use crate::error::{PortError, ReceiveError};
+use crate::service;
+use crate::untyped::{Reader, Taken};
+
+/// The reading end of a topic that is only known by its name; stays in the thread that made it.
+pub struct Found {
+    name: String,
+    description: Description,
+    reader: Reader,
+}
+
+impl Found {
+    /// `None` if no process has the topic open.
+    pub(crate) fn new(bus: &Bus, name: &str) -> Result<Option<Self>, PortError> {
+        let Some((service, description)) = service::found(bus, bus.robot(), name)? else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            name: name.to_owned(),
+            description,
+            reader: Reader::of(bus, name, &service)?,
+        }))
+    }
+
+    /// The topic's name behind `lager/<robot>/`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How its samples are laid out, as its creator says.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// The next sample, oldest first; `None` when there is nothing more.
+    ///
+    /// # Errors
+    /// The transport failed.
+    pub fn receive(&mut self) -> Result<Option<FoundSample<'_>>, ReceiveError> {
+        let description = &self.description;
+        let taken = self.reader.receive()?;
+        Ok(taken.map(|taken| FoundSample { taken, description }))
+    }
+
+    /// Samples missed, as [`crate::Subscriber::lost`] counts them.
+    pub fn lost(&self) -> u64 {
+        self.reader.streams().lost()
+    }
+}
+
+impl fmt::Debug for Found {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Found")
+            .field("name", &self.name)
+            .field("lost", &self.lost())
+            .finish_non_exhaustive()
+    }
+}
+
+/// A received sample, read where the writer wrote it.
+pub struct FoundSample<'found> {
+    taken: Taken,
+    description: &'found Description,
+}
+
+impl FoundSample<'_> {
+    /// The stamp: when, why and by whom it was published, and its number.
+    pub fn stamp(&self) -> &Stamp {
+        self.taken.stamp()
+    }
+
+    /// The payload, to be written by serde.
+    #[allow(
+        unsafe_code,
+        reason = "the sample knows where its payload is, not what"
+    )]
+    pub fn payload(&self) -> Described<'_> {
+        let size = self.description.size();
+        // SAFETY: `service::found` has made sure that a payload has as many bytes. The sample is
+        // held, and its writer does not touch it meanwhile.
+        let bytes = unsafe { core::slice::from_raw_parts(self.taken.payload().as_ptr(), size) };
+        let read = self.description.read(bytes);
+        read.expect("as many bytes as the description says")
+    }
+}
+
+impl fmt::Debug for FoundSample<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("FoundSample")
+            .field("stamp", self.stamp())
+            .finish_non_exhaustive()
+    }
+}

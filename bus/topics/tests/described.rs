@@ -1,0 +1,196 @@
+//! Every topic as a tool sees it that was built without it.
+
+use lager_topics::{
+    Coded, Description, Field, Payload, Role, TOPICS, Tag, Topic, TopicVisitor, coded, describe,
+    payload, visit,
+};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+coded! {
+    /// What is above.
+    pub enum Sky {
+        /// Nothing.
+        Clear = 0,
+        /// Much.
+        Fog = 7,
+        /// The most there is.
+        Storm = 8,
+    }
+}
+
+payload! {
+    /// A part of a payload.
+    pub struct Gust: 4 bytes {
+        /// In mm/s.
+        pub mm_s: i16,
+        /// What was above.
+        pub sky: Tag<Sky>,
+        /// Fills the gap.
+        pub reserved: u8,
+    }
+}
+
+payload! {
+    /// A payload that is in no table.
+    pub struct Weather: 24 bytes {
+        /// In m/s.
+        pub wind: f64,
+        /// Three gusts.
+        pub gusts: [Gust; 3],
+        /// What is above.
+        pub sky: Tag<Sky>,
+        /// Fills the gap.
+        pub reserved: [u8; 3],
+    }
+}
+
+#[allow(unsafe_code)]
+fn bytes<P: Payload>(payload: &P) -> &[u8] {
+    // SAFETY: a payload has no padding, so that all of its bytes are initialised.
+    unsafe { std::slice::from_raw_parts(std::ptr::from_ref(payload).cast(), size_of::<P>()) }
+}
+
+#[test]
+fn a_type_is_named_in_full_once() {
+    assert_eq!(
+        describe(&Weather::MAKE),
+        "Weather{wind:f64,\
+         gusts:[Gust{mm_s:i16,sky:Sky<Clear,7=Fog,Storm>,reserved:u8};3],\
+         sky:Sky,reserved:[u8;3]}"
+    );
+}
+
+#[test]
+fn a_sample_reads_as_its_type_would_write_it() {
+    let description = Description::parse(&describe(&Weather::MAKE)).unwrap();
+    let mut weather = Weather {
+        wind: -2.5,
+        ..Weather::default()
+    };
+    weather.gusts[1] = Gust {
+        mm_s: -300,
+        sky: Sky::Storm.into(),
+        reserved: 9,
+    };
+    weather.sky = Tag::from_raw(99);
+    let seen = serde_json::to_value(description.read(bytes(&weather)).unwrap()).unwrap();
+    assert_eq!(
+        seen,
+        json!({
+            "wind": -2.5,
+            "gusts": [
+                {"mm_s": 0, "sky": "Clear"},
+                {"mm_s": -300, "sky": "Storm"},
+                {"mm_s": 0, "sky": "Clear"},
+            ],
+            "sky": 99,
+        })
+    );
+    assert_eq!(description.size(), 24);
+    assert!(description.read(&bytes(&weather)[1..]).is_none());
+}
+
+/// What a topic's own type says of a blank sample, beside what its description says.
+struct Both;
+
+impl TopicVisitor for Both {
+    type Output = (Value, Value);
+
+    fn visit<T: Topic>(self) -> (Value, Value) {
+        let blank = T::Payload::default();
+        let description = Description::parse(&describe(&T::Payload::MAKE)).unwrap();
+        assert_eq!(description.size(), size_of::<T::Payload>(), "{}", T::NAME);
+        let described = description.read(bytes(&blank)).unwrap();
+        (
+            serde_json::to_value(blank).unwrap(),
+            serde_json::to_value(described).unwrap(),
+        )
+    }
+}
+
+/// Whether `full` says all that `short` says; lists may be longer.
+fn says(full: &Value, short: &Value) -> bool {
+    match (full, short) {
+        (Value::Object(full), Value::Object(short)) => {
+            full.len() == short.len()
+                && short
+                    .iter()
+                    .all(|(name, value)| full.get(name).is_some_and(|seen| says(seen, value)))
+        }
+        (Value::Array(full), Value::Array(short)) => {
+            full.len() >= short.len() && full.iter().zip(short).all(|(a, b)| says(a, b))
+        }
+        (a, b) => a == b,
+    }
+}
+
+#[test]
+fn every_topic_of_the_table_is_described_as_it_is() {
+    for entry in TOPICS {
+        let (own, described) = visit(entry.name, Both).unwrap();
+        assert!(says(&described, &own), "{}: {described} {own}", entry.name);
+    }
+}
+
+/// The bytes of a description that one service carries: seven of its eight attributes.
+const ROOM: usize = 7 * 256;
+
+#[test]
+fn every_topic_of_the_table_can_carry_its_description() {
+    struct Length;
+    impl TopicVisitor for Length {
+        type Output = usize;
+
+        fn visit<T: Topic>(self) -> usize {
+            describe(&T::Payload::MAKE).len()
+        }
+    }
+    for entry in TOPICS {
+        let length = visit(entry.name, Length).unwrap();
+        assert!(length <= ROOM, "{}: {length} bytes", entry.name);
+    }
+}
+
+#[test]
+fn what_describes_nothing_is_refused() {
+    let deep = format!("A{{x:{}u8{}}}", "[".repeat(40), ";1]".repeat(40));
+    for text in [
+        "",
+        "u8",
+        "A",
+        "A{}",
+        "A{x}",
+        "A{x:u8",
+        "A{x:u8}}",
+        "A{x:B}",
+        "A{x:A}",
+        "A{x:[u8;0]}",
+        "A{x:[u64;9999999999999999999]}",
+        "A{x:[[u64;99999999999];99999999999]}",
+        "A{x:E<300=Far>}",
+        "A{x:E<255=Last,After>}",
+        deep.as_str(),
+    ] {
+        assert!(Description::parse(text).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn the_codes_of_an_enum_are_its_variants_codes() {
+    for (variant, (code, name)) in Role::VARIANTS.iter().zip(Role::CODES) {
+        assert_eq!((variant.0.to_code(), variant.1), (*code, *name));
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_text_is_too_strange_to_be_read(text in r"[A-C]\{[a-c:,;\[\]{}<>=0-9u8]{0,60}\}?") {
+        if let Ok(description) = Description::parse(&text) {
+            prop_assume!(description.size() < 1 << 16);
+            let bytes = vec![1; description.size()];
+            let seen = serde_json::to_value(description.read(&bytes).unwrap());
+            prop_assert!(seen.is_ok());
+        }
+    }
+}
