@@ -119,6 +119,8 @@ coded! {
         QueueCleared = 50,
         /// The turn to the station has passed its mark.
         StationPassed = 51,
+        /// The delivery corner's mark has not come on the way back.
+        CornerMissed = 52,
     }
 }
 
@@ -327,6 +329,10 @@ impl fmt::Display for Thought {
                  crossing ({x}, {y})."
             ),
             ThoughtKind::Halts => write!(to, "Something stands {seen} cm ahead of me; I stop."),
+            ThoughtKind::CornerMissed => write!(
+                to,
+                "I have not seen the mark of the delivery corner; I drive on to the next one."
+            ),
             ThoughtKind::TriesAgain => {
                 write!(to, "I try the ways again that I have found blocked.")
             }
