@@ -300,6 +300,9 @@ impl Mission {
                 out.think(ThoughtKind::CornerMissed);
                 self.phase = Phase::Driving;
             }
+            (Phase::Returning, Outcome::Missed) => {
+                self.get_stuck(FailureKind::CornerUnseen, 0, 0, out);
+            }
             (Phase::Returning, _) => {
                 out.announce(EventKind::NextNode, self.place, self.order);
                 self.go_on_from_node(out);
