@@ -32,14 +32,6 @@ use crate::telling;
 /// further process to wake.
 const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
-<<<<<<< HEAD
-/// How often the map is offered to late joiners, in real time.
-const MAP_PERIOD_NS: u64 = 20_000_000;
-=======
-/// How often what only the extension tells is looked at, in real time: as often as it is told.
-const SENSES_PERIOD_NS: u64 = 50_000_000;
->>>>>>> 80353884c26aa1b722fc044e1bf97cc4a60ff1d4
-
 /// How long a predecessor's map is waited for, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
 
@@ -98,11 +90,6 @@ struct Shell {
     commands: Publisher<SteeringCommand>,
     bridge: Asking<BridgeRequest>,
     world: Asking<WorldRequest>,
-<<<<<<< HEAD
-    map_ticked_ns: u64,
-=======
-    sensed_ns: u64,
->>>>>>> 80353884c26aa1b722fc044e1bf97cc4a60ff1d4
     complaints: u32,
 }
 
@@ -140,11 +127,6 @@ impl Shell {
             orders: bus.publisher()?,
             inputs: bus.publisher()?,
             commands: bus.publisher()?,
-<<<<<<< HEAD
-            map_ticked_ns: 0,
-=======
-            sensed_ns: 0,
->>>>>>> 80353884c26aa1b722fc044e1bf97cc4a60ff1d4
             complaints: 0,
         };
         if let Some(map) = kept {

@@ -12,6 +12,7 @@
 //!          +--> corner -|-----------+                       v  at the delivery corner (L8)
 //!                    Dropping <--------------------------- Exiting
 //!
+//!   Returning -> Driving: the corner's mark did not come; the next node's tells where the robot is
 //!   at a node, before Driving or Approaching: Looking, whether the way is open (L6)
 //!   Driving, Approaching -> Halted -> TurningBack -> Driving: something stands between the nodes
 //!   any -> Stuck: lost line, missing node, moved by hand (AMB-49); only a reset leads out
@@ -298,6 +299,13 @@ impl Mission {
                 self.phase = Phase::TurningRound;
             }
             (Phase::TurningRound, _) => self.phase = Phase::Returning,
+            (Phase::Returning, Outcome::Missed) if self.may_go_past_corner() => {
+                out.think(ThoughtKind::CornerMissed);
+                self.phase = Phase::Driving;
+            }
+            (Phase::Returning, Outcome::Missed) => {
+                self.get_stuck(FailureKind::CornerUnseen, 0, 0, out);
+            }
             (Phase::Returning, _) => {
                 out.announce(EventKind::NextNode, self.place, self.order);
                 self.go_on_from_node(out);

@@ -76,6 +76,8 @@ coded! {
         /// Neither the pick station's mark nor its edge is in sight after `seen` turns of
         /// `expected`.
         MarkUnseen = 29,
+        /// The delivery corner's mark has not come on the way back, and the way on is blocked.
+        CornerUnseen = 30,
     }
 }
 
@@ -139,6 +141,7 @@ impl FailureKind {
             | Self::BarMissing
             | Self::StationMissing
             | Self::MarkUnseen
+            | Self::CornerUnseen
             | Self::BoardRefuses
             | Self::DrivenByHand
             | Self::OffTheMap
@@ -218,6 +221,10 @@ impl fmt::Display for Failure {
             FailureKind::MarkUnseen => write!(
                 formatter,
                 "I stand at the pick station behind ({x}, {y}) and do not see its mark in {seen} turns"
+            ),
+            FailureKind::CornerUnseen => write!(
+                formatter,
+                "I came back to ({x}, {y}) and did not see its mark, and the way on is blocked"
             ),
             FailureKind::NoWay => write!(
                 formatter,

@@ -125,6 +125,8 @@ coded! {
         LinkBack = 53,
         /// It stands at the node (`x`, `y`) until the external computer is there again.
         ParkedWithoutLink = 54,
+        /// The delivery corner's mark has not come on the way back.
+        CornerMissed = 55,
     }
 }
 
@@ -342,6 +344,10 @@ impl fmt::Display for Thought {
                  crossing ({x}, {y})."
             ),
             ThoughtKind::Halts => write!(to, "Something stands {seen} cm ahead of me; I stop."),
+            ThoughtKind::CornerMissed => write!(
+                to,
+                "I have not seen the mark of the delivery corner; I drive on to the next one."
+            ),
             ThoughtKind::TriesAgain => {
                 write!(to, "I try the ways again that I have found blocked.")
             }

@@ -18,7 +18,7 @@ use core::time::Duration;
 use lager_topics::{FailureKind, Step, Thought, ThoughtKind};
 use lager_wire::{Command, LineState, WheelCommand};
 
-use super::helm::{Helm, Senses};
+use super::helm::{Helm, Senses, turning_place};
 use super::outcome::Outcome;
 use crate::config::LogicConfig;
 use crate::judge::{Edge, Verdict, judge};
@@ -299,8 +299,11 @@ impl Follow {
         match self.step {
             Step::ToNode | Step::NearNode if travelled >= length_mm - config.coast_mm => {
                 senses.odometer.travelled_mm -= length_mm;
-                return Some(match self.until {
-                    Until::Station => Outcome::Missed,
+                return Some(match (self.until, self.step) {
+                    (Until::Station, _) => Outcome::Missed,
+                    (Until::Corner, Step::NearNode) if !is_near(length_mm, config) => {
+                        Outcome::Missed
+                    }
                     _ => Outcome::Done,
                 });
             }
@@ -314,6 +317,11 @@ impl Follow {
                 self.step = Step::NearNode;
             }
             Step::Seeking if senses.mark_at(config) > length_mm * config.overdue => {
+                let past_mm = travelled - length_mm;
+                if self.until == Until::Corner && past_mm <= config.sensor_ahead_mm {
+                    senses.odometer.travelled_mm = past_mm;
+                    return Some(Outcome::Missed);
+                }
                 let seen = senses.mark_at(config);
                 return Some(Outcome::Failed(FailureKind::NodeMissing, length_mm, seen));
             }
@@ -344,6 +352,12 @@ impl Follow {
             }
         }
     }
+}
+
+/// Whether the corner is too near for its mark to be relied on when the way back begins where the
+/// robot turns round, on a way out of this length.
+fn is_near(exit_mm: f32, config: &LogicConfig) -> bool {
+    turning_place(exit_mm, config) - config.sensor_ahead_mm < config.run_up_mm
 }
 
 fn is_no_line(state: LineState) -> bool {

@@ -97,3 +97,11 @@ pub(crate) struct Helm<'a> {
     pub(crate) order: &'a mut Standing,
     pub(crate) out: &'a mut Output,
 }
+
+/// Where the axle stands to turn round on the way out, in mm from the corner: far enough from the
+/// cross bar and, on a short way out, from the corner, because a turn ends on the first tape that
+/// comes under the sensors.
+pub(crate) fn turning_place(exit_mm: f32, config: &LogicConfig) -> f32 {
+    let reach = config.sensor_ahead_mm + config.tape_mm;
+    (exit_mm - config.sensor_ahead_mm - config.back_off_mm).max(reach)
+}

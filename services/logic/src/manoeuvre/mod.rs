@@ -34,7 +34,7 @@ pub(crate) use turn::{Spot, Turn};
 use crate::config::LogicConfig;
 use crate::heading::{Compass, Spin};
 use crate::marks::Mark;
-use helm::Pause;
+use helm::{Pause, turning_place};
 
 /// How old a distance may be that tells whether there is room to turn.
 const IN_SIGHT: Duration = Duration::from_millis(500);
@@ -231,7 +231,7 @@ impl Manoeuvre {
             Self::Follow(follow) => follow.go_on(helm),
             Self::Turn(turn) => turn.go_on(helm),
             Self::BackUp => {
-                let at = turning_place(helm.senses, helm.config);
+                let at = turning_place(helm.senses.exit_mm, helm.config);
                 (helm.senses.odometer.travelled_mm <= at).then_some(Outcome::Done)
             }
             Self::Retreat(to_mm) => {
@@ -343,12 +343,4 @@ fn is_close(helm: &Helm<'_>) -> bool {
             && cm <= config.turn_room_cm
     };
     config.ranger_cm > 0 && senses.distance.is_some_and(has_seen)
-}
-
-/// Where the axle stands to turn round on the way out, in mm from the corner: far enough from the
-/// cross bar and, on a short way out, from the corner, because a turn ends on the first tape that
-/// comes under the sensors.
-fn turning_place(senses: &Senses, config: &LogicConfig) -> f32 {
-    let reach = config.sensor_ahead_mm + config.tape_mm;
-    (senses.exit_mm - config.sensor_ahead_mm - config.back_off_mm).max(reach)
 }

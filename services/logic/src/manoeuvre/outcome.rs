@@ -9,8 +9,8 @@ pub(crate) enum Outcome {
     Done,
     /// As it should, as far as can be known: it was cut short, or the board was not heard.
     Interrupted,
-    /// The station's mark did not come: the robot is at the node behind it, or has turned to the
-    /// station and sees no tape.
+    /// The mark did not come. A station's: the robot is at the node behind it, or has turned to the
+    /// station and sees no tape. The delivery corner's: the robot is about there, on its way back.
     Missed,
     /// Something stands on the way ahead.
     Blocked,

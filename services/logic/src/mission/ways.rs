@@ -296,6 +296,14 @@ impl Mission {
         })
     }
 
+    /// Whether the way straight on behind the delivery corner is open.
+    pub(super) fn may_go_past_corner(&self) -> bool {
+        let Place { node, heading, .. } = self.place;
+        let blocks = &self.tables.blocks;
+        let is_open = |map: &Map| map.has_tape(node, heading) && blocks.is_open(map, node, heading);
+        self.map.as_ref().is_some_and(is_open)
+    }
+
     /// The nodes of which the robot must reach one, if it has a goal that can be reached at all.
     fn goals(&self) -> Option<[Node; 2]> {
         let map = self.map.as_ref()?;
