@@ -2,8 +2,10 @@
 //! them.
 
 use std::process::Output;
+use std::time::Duration;
 
 use lager_tests::{Domain, Running, pid, wait_for};
+use lager_topics::TruthPose;
 use rustix::process::{Signal, kill_process};
 
 fn said(output: &Output) -> String {
@@ -44,6 +46,37 @@ fn robot(domain: &Domain) -> Running {
     });
     domain.done(&["stop"]);
     up
+}
+
+#[test]
+fn a_mission_among_things_that_come_and_go_is_delivered_in_its_order_without_a_collision() {
+    let domain = Domain::new();
+    let mut up = domain.start(&[
+        "up",
+        "--headless",
+        "--mission",
+        "3,1,2",
+        "--obstacles",
+        "4",
+        "--speed",
+        "3",
+        "--exit-when-done",
+        "--json",
+    ]);
+    let bus = domain.observe("r1", 3.0);
+    let mut truth = bus.subscriber::<TruthPose>().expect("a topic");
+    let mut collisions = None;
+    while up.is_running() {
+        let seen = truth.latest().expect("readable");
+        collisions = seen.map(|truth| truth.collisions).or(collisions);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], serde_json::json!([3, 1, 2]), "{told}");
+    assert_eq!(collisions, Some(0), "{}", up.log());
+    drop((truth, bus));
+    domain.assert_clean();
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The robot and the external computer as processes. The test plays either side and shares no code
 //! with them: it follows the grammar alone.
 
+mod bad;
 mod extended;
 mod gag;
 mod lost;

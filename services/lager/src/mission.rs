@@ -235,7 +235,10 @@ impl Watch {
         }
         let since = *self.idle_since.get_or_insert(now);
         let open = &self.mission.open;
-        (now - since >= IDLE).then(|| format!("nobody orders {open:?} any more"))
+        (now - since >= IDLE).then(|| match phase {
+            Phase::WaitingForMap => "nobody tells the robot its warehouse".into(),
+            _ => format!("nobody orders {open:?} any more"),
+        })
     }
 
     /// Whether the refused order is one of the mission's. A station's orders have numbers that are
