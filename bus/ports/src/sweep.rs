@@ -8,15 +8,24 @@
 //! then is the node's name free again.
 
 use std::fs::{self, DirEntry};
+use std::io::ErrorKind;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{DeadNodeView, NodeListFailure, NodeState, NodeView};
-use iceoryx2::prelude::{CallbackProgression, Node};
+use iceoryx2::prelude::{CallbackProgression, FileName, Node, SemanticString};
+use iceoryx2::service::Service;
+use iceoryx2_cal::monitoring::{Monitoring, MonitoringBuilder, MonitoringCleaner};
+use iceoryx2_cal::named_concept::{
+    NamedConceptBuilder, NamedConceptConfiguration, NamedConceptMgmt,
+};
 
 use crate::transport::Ipc;
+
+/// Where the transport's nodes say that they live.
+type Monitors = <Ipc as Service>::Monitoring;
 
 /// How long a sweep waits for another one that has the same dead process in hand.
 const OTHERS_SWEEP: Duration = Duration::from_millis(100);
@@ -41,18 +50,18 @@ pub(crate) fn dead_nodes(config: &Config) -> Result<usize, NodeListFailure> {
 /// folder again, but the details are only written with the node.
 pub(crate) fn is_listed(config: &Config, node: &Node<Ipc>) -> bool {
     let beside = PathBuf::from(config.global.node_dir().to_string());
-    let details = format!("{}node.details", config.global.prefix);
     beside
         .join(node.id().value().to_string())
-        .join(details)
+        .join(details_name(config))
         .is_file()
 }
 
 fn remove(config: &Config, dead: DeadNodeView<Ipc>) -> bool {
     let files = Files::of(config, &dead);
     if dead.details().is_none() {
-        // A node removes its ports before its details.
-        return files.remove();
+        // A node removes its ports before its details. Details that are there but cannot be read,
+        // for want of rights or of files, are of a node that may have ports.
+        return files.are_without_details() && files.remove_as_cleaner(config);
     }
     files.remove_half_written_tags();
     dead.blocking_remove_stale_resources(OTHERS_SWEEP).is_ok()
@@ -60,20 +69,28 @@ fn remove(config: &Config, dead: DeadNodeView<Ipc>) -> bool {
 
 /// A node's files: a folder of tags and details, and beside it some with the node's name.
 struct Files {
-    beside: PathBuf,
-    /// How those beside the folder begin.
-    stem: String,
+    /// The node's name among its monitors.
+    id: String,
+    details: PathBuf,
     folder: PathBuf,
 }
 
 impl Files {
     fn of(config: &Config, node: &DeadNodeView<Ipc>) -> Self {
-        let id = node.id().value();
-        let beside = PathBuf::from(config.global.node_dir().to_string());
+        let id = node.id().value().to_string();
+        let folder = PathBuf::from(config.global.node_dir().to_string()).join(&id);
         Self {
-            folder: beside.join(id.to_string()),
-            stem: format!("{}{id}.", config.global.prefix),
-            beside,
+            details: folder.join(details_name(config)),
+            folder,
+            id,
+        }
+    }
+
+    /// Whether the node has no details, or was killed while it wrote them.
+    fn are_without_details(&self) -> bool {
+        match fs::symlink_metadata(&self.details) {
+            Ok(details) => details.permissions().mode() & 0o777 == BEING_WRITTEN,
+            Err(error) => error.kind() == ErrorKind::NotFound,
         }
     }
 
@@ -86,16 +103,41 @@ impl Files {
         }
     }
 
-    /// Removes them all; says whether nothing is left.
-    fn remove(&self) -> bool {
-        entries(&self.folder).iter().for_each(remove_file);
-        let _ = fs::remove_dir(&self.folder);
-        let ours = |file: &DirEntry| file.file_name().to_string_lossy().starts_with(&self.stem);
-        let mut left = entries(&self.beside);
-        left.retain(ours);
-        left.iter().for_each(remove_file);
-        !self.folder.exists() && left.iter().all(|file| !file.path().exists())
+    /// Removes them all, those beside the folder by giving the cleaner's lock back; says whether
+    /// nothing is left. Without that lock another process may be sweeping the same node.
+    fn remove_as_cleaner(&self, config: &Config) -> bool {
+        let Some(cleaner) = cleaner(config, &self.id) else {
+            return false;
+        };
+        if self.are_without_details() {
+            entries(&self.folder).iter().for_each(remove_file);
+            let _ = fs::remove_dir(&self.folder);
+        }
+        let is_gone = !self.folder.exists();
+        if !is_gone {
+            cleaner.relinquish();
+        }
+        is_gone
     }
+}
+
+/// The transport's lock on what a dead node has left. Nobody gets it for a living one.
+fn cleaner(config: &Config, id: &str) -> Option<<Monitors as Monitoring>::Cleaner> {
+    let global = &config.global;
+    let monitors = <Monitors as NamedConceptMgmt>::Configuration::default()
+        .prefix(&global.prefix)
+        .suffix(&global.node.monitor_suffix)
+        .path_hint(&global.node_dir());
+    let name = FileName::new(id.as_bytes()).ok()?;
+    <Monitors as Monitoring>::Builder::new(&name)
+        .config(&monitors)
+        .cleaner()
+        .ok()
+}
+
+fn details_name(config: &Config) -> String {
+    let global = &config.global;
+    format!("{}node{}", global.prefix, global.node.static_config_suffix)
 }
 
 /// What a folder contains; nothing if it cannot be read, as the next sweep sees it again.

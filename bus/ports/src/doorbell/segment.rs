@@ -176,12 +176,18 @@ impl Segment {
         let _door = Door::lock(&self.file)?;
         let mut own = self.own();
         self.sweep_but(*own)?;
+        self.sit(&mut own, role)
+    }
+
+    fn sit(&self, own: &mut u32, role: Role) -> Result<usize, Fault> {
         if self.seats_of(role).count_ones() as usize >= SEATS_PER_ROLE {
             return Err(Fault::NoSeat);
         }
         for seat in 0..SEATS {
             if *own & (1 << seat) == 0 && try_lock(&self.file, byte(seat), Kind::Exclusive)? {
                 *own |= 1 << seat;
+                // Its owner may have been killed since the sweep.
+                self.clear(seat);
                 self.take(seat, role, std::process::id());
                 // A ringer that has just found no seat to ring has sent its sample before. After
                 // this call, a waiter that looks sees that sample. On older kernels the sample
@@ -326,5 +332,28 @@ impl<'file> Door<'file> {
 impl Drop for Door<'_> {
     fn drop(&mut self) {
         unlock(self.file, DOOR);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_takes_the_seat_of_a_waiter_killed_since_the_sweep_is_not_rung_for_it() {
+        let path = PathBuf::from(format!("/dev/shm/lpseat{}", std::process::id()));
+        let segment = Segment::join(&path).unwrap();
+        // What a waiter leaves that held its seat's lock during the sweep and has died after it.
+        segment.take(0, Role::Bridge, 4711);
+        assert!(segment.may_spin(0, 1));
+        let mut own = 0;
+        let door = Door::lock(&segment.file).unwrap();
+        assert_eq!(segment.sit(&mut own, Role::Logic).unwrap(), 0);
+        drop(door);
+        assert_eq!(segment.seats_of(Role::Bridge), 0);
+        assert_eq!(segment.seats_of(Role::Logic), 1);
+        assert!(segment.may_spin(1, 1), "the right to spin has come free");
+        drop(segment);
+        assert!(!path.exists());
     }
 }

@@ -23,7 +23,9 @@ use crate::process::Player;
 
 /// As a stock program reads it from what `lager config --iceoryx2` prints.
 fn config(domain: &Domain) -> Config {
-    let file = domain.place().folder().join("iceoryx2.toml");
+    // Each process has its own, as two may read theirs at once.
+    let file = format!("iceoryx2.{}.toml", std::process::id());
+    let file = domain.place().folder().join(file);
     std::fs::write(&file, domain.config.iceoryx2_toml().unwrap()).unwrap();
     let path = FilePath::new(file.as_os_str().as_encoded_bytes()).unwrap();
     let config = Config::from_file(&path).unwrap();
@@ -31,7 +33,7 @@ fn config(domain: &Domain) -> Config {
     config
 }
 
-fn stock(domain: &Domain) -> Node<ipc::Service> {
+pub(crate) fn stock(domain: &Domain) -> Node<ipc::Service> {
     NodeBuilder::new()
         .config(&config(domain))
         .signal_handling_mode(SignalHandlingMode::Disabled)

@@ -15,4 +15,5 @@ mod reasons;
 mod requests;
 mod samples;
 mod stress;
+mod swept;
 mod waiting;

@@ -1,8 +1,10 @@
 //! Other processes: this test binary started again, playing one part until it is killed.
 
 use std::io::{BufRead, BufReader, Write};
+use std::mem::ManuallyDrop;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig, Cause, Policy};
@@ -11,6 +13,7 @@ use lager_topics::{
 };
 
 use crate::domain::{Domain, frame};
+use crate::swept::stranger;
 
 const PART: &str = "LAGER_PORTS_TEST_PART";
 const FOLDER: &str = "LAGER_PORTS_TEST_FOLDER";
@@ -19,7 +22,7 @@ const FOLDER: &str = "LAGER_PORTS_TEST_FOLDER";
 pub(crate) struct Player {
     child: Child,
     // The player ends when this closes, so that none outlives a failed test.
-    _stdin: ChildStdin,
+    stdin: ChildStdin,
 }
 
 impl Player {
@@ -38,14 +41,21 @@ impl Player {
             .lines()
             .any(|line| line.unwrap().ends_with("READY"));
         assert!(ready, "the player `{part}` ended before it was ready");
-        Self {
-            child,
-            _stdin: stdin,
-        }
+        Self { child, stdin }
     }
 
     pub(crate) fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    pub(crate) fn is_running(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_none()
+    }
+
+    /// Lets it end by itself, for parts that do that in order.
+    pub(crate) fn end(mut self) {
+        self.stdin.write_all(b"\n").unwrap();
+        assert!(self.child.wait().unwrap().success());
     }
 
     /// `kill -9`, and waits until it is gone.
@@ -103,6 +113,20 @@ fn player() {
             let _subscriber = bus.subscriber::<SensorLine>().unwrap();
             ready();
             until_parent_ends();
+        }
+        "stranger" => {
+            // The parent tidies up.
+            let domain = ManuallyDrop::new(Domain::at(std::env::var(FOLDER).unwrap().into()));
+            let ends = AtomicBool::new(false);
+            std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    let _ = std::io::stdin().read_line(&mut String::new());
+                    ends.store(true, Ordering::Relaxed);
+                });
+                stranger(&domain, ready, &ends);
+            });
+            // Nobody reads what a test says at its end.
+            std::process::exit(0);
         }
         "onlooker" => {
             let _bus = open(Role::Observer);
