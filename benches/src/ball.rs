@@ -2,7 +2,9 @@
 //! the topics they travel on when the typed ports carry them.
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_topics::{Field, FieldInfo, Payload, Qos, Role, Schema, SensorLine, Topic};
+use lager_topics::{
+    Field, FieldInfo, Payload, Qos, Role, Schema, SensorLine, StructInfo, Topic, TypeInfo,
+};
 use serde::{Deserialize, Serialize};
 
 /// A payload of 64 bytes.
@@ -78,6 +80,7 @@ impl Field for Ball {
         number: 0,
         rest: [0; 7],
     };
+    const TYPE: &'static TypeInfo = &TypeInfo::Struct(StructInfo::of::<Self>());
 }
 
 impl Schema for Ball {
@@ -90,12 +93,14 @@ impl Schema for Ball {
             type_name: "u64",
             offset: 0,
             size: 8,
+            kind: u64::TYPE,
         },
         FieldInfo {
             name: "rest",
             type_name: "[u64; 7]",
             offset: 8,
             size: 56,
+            kind: <[u64; 7]>::TYPE,
         },
     ];
 }

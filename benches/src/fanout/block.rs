@@ -1,7 +1,9 @@
 //! What is published: blocks of several sizes, and a topic for each.
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_topics::{Field, FieldInfo, Payload, Qos, Schema, SensorLine, Topic};
+use lager_topics::{
+    Field, FieldInfo, Payload, Qos, Schema, SensorLine, StructInfo, Topic, TypeInfo,
+};
 use serde::{Deserialize, Serialize};
 
 /// A payload of `WORDS` words of eight bytes.
@@ -24,6 +26,7 @@ unsafe impl<const WORDS: usize> ZeroCopySend for Block<WORDS> {
 impl<const WORDS: usize> Field for Block<WORDS> {
     const SHAPE: u64 = <Self as Schema>::HASH;
     const BLANK: Self = Self { words: [0; WORDS] };
+    const TYPE: &'static TypeInfo = &TypeInfo::Struct(StructInfo::of::<Self>());
 }
 
 impl<const WORDS: usize> Default for Block<WORDS> {
@@ -41,6 +44,7 @@ impl<const WORDS: usize> Schema for Block<WORDS> {
         type_name: "[u64]",
         offset: 0,
         size: 8 * WORDS,
+        kind: <[u64; WORDS]>::TYPE,
     }];
 }
 

@@ -23,7 +23,7 @@ mod tag;
 
 pub use payloads::*;
 pub use role::{Role, UnknownRole};
-pub use schema::{Field, FieldInfo, Payload, Schema};
+pub use schema::{Field, FieldInfo, Payload, Schema, StructInfo, TypeInfo};
 pub use stamp::Stamp;
 pub use table::{
     BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,

@@ -19,6 +19,59 @@ pub trait Field: Copy + ZeroCopySend + 'static {
     const SHAPE: u64;
     /// The value of a field nobody has written.
     const BLANK: Self;
+    /// The type, for tools that make the same one in another language.
+    const TYPE: &'static TypeInfo;
+}
+
+/// What a field's type is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TypeInfo {
+    /// A number, by its name in Rust.
+    Number(&'static str),
+    /// A [`Tag`](crate::Tag): one byte.
+    Enum {
+        /// The enum's name.
+        name: &'static str,
+        /// Each variant's name and code.
+        variants: &'static [(&'static str, u8)],
+    },
+    /// Elements behind each other.
+    Array {
+        /// What they are.
+        of: &'static TypeInfo,
+        /// How many.
+        length: usize,
+    },
+    /// A payload, or a struct inside one.
+    Struct(StructInfo),
+}
+
+/// A payload, or a struct inside one, as it lies in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StructInfo {
+    /// [`Schema::TYPE_NAME`].
+    pub type_name: &'static str,
+    /// [`Schema::HASH`].
+    pub hash: u64,
+    /// Its size in bytes.
+    pub size: usize,
+    /// Its alignment in bytes.
+    pub align: usize,
+    /// [`Schema::FIELDS`].
+    pub fields: &'static [FieldInfo],
+}
+
+impl StructInfo {
+    /// How `T` lies in memory.
+    pub const fn of<T: Schema>() -> Self {
+        Self {
+            type_name: T::TYPE_NAME,
+            hash: T::HASH,
+            size: size_of::<T>(),
+            align: align_of::<T>(),
+            fields: T::FIELDS,
+        }
+    }
 }
 
 macro_rules! primitive {
@@ -26,6 +79,7 @@ macro_rules! primitive {
         $(impl Field for $type {
             const SHAPE: u64 = hash::bytes(hash::START, stringify!($type).as_bytes());
             const BLANK: Self = $blank;
+            const TYPE: &'static TypeInfo = &TypeInfo::Number(stringify!($type));
         })*
     };
 }
@@ -49,6 +103,10 @@ impl<T: Field, const N: usize> Field for [T; N] {
         T::SHAPE,
     );
     const BLANK: Self = [T::BLANK; N];
+    const TYPE: &'static TypeInfo = &TypeInfo::Array {
+        of: T::TYPE,
+        length: N,
+    };
 }
 
 /// One field of a payload, for tools that describe a topic.
@@ -62,10 +120,12 @@ pub struct FieldInfo {
     pub offset: usize,
     /// Bytes the field occupies.
     pub size: usize,
+    /// What the type is made of.
+    pub kind: &'static TypeInfo,
 }
 
 /// The layout of a payload as constants.
-pub trait Schema {
+pub trait Schema: Sized {
     /// The name under which the type crosses processes and languages.
     const TYPE_NAME: &'static str;
     /// Hash over the type's name and every field's name, type and offset.
@@ -124,6 +184,8 @@ macro_rules! payload {
             const BLANK: Self = Self {
                 $( $field: $crate::schema::blank!($type $(, $blank)?), )*
             };
+            const TYPE: &'static $crate::schema::TypeInfo =
+                &$crate::schema::TypeInfo::Struct($crate::schema::StructInfo::of::<Self>());
         }
 
         impl Default for $name {
@@ -155,6 +217,7 @@ macro_rules! payload {
                     type_name: stringify!($type),
                     offset: core::mem::offset_of!($name, $field),
                     size: core::mem::size_of::<$type>(),
+                    kind: <$type as $crate::schema::Field>::TYPE,
                 }, )*
             ];
         }
@@ -249,13 +312,18 @@ mod tests {
                     name: "count",
                     type_name: "u64",
                     offset: 0,
-                    size: 8
+                    size: 8,
+                    kind: &TypeInfo::Number("u64")
                 },
                 FieldInfo {
                     name: "parts",
                     type_name: "[u16; 4]",
                     offset: 8,
-                    size: 8
+                    size: 8,
+                    kind: &TypeInfo::Array {
+                        of: &TypeInfo::Number("u16"),
+                        length: 4
+                    }
                 },
             ]
         );

@@ -11,7 +11,7 @@ use serde::de::{Error, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::hash;
-use crate::schema::Field;
+use crate::schema::{Field, TypeInfo};
 
 /// An enum whose variants have fixed one-byte codes and names.
 pub trait Coded: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
@@ -19,6 +19,8 @@ pub trait Coded: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
     const NAME: &'static str;
     /// Every variant with its name, in the order of declaration.
     const VARIANTS: &'static [(Self, &'static str)];
+    /// Every variant's name and code, in the same order.
+    const CODES: &'static [(&'static str, u8)];
     /// Hash over the enum's name and each variant's name and code.
     const SHAPE: u64;
 
@@ -57,6 +59,8 @@ macro_rules! coded_as_is {
             const NAME: &'static str = stringify!($name);
             const VARIANTS: &'static [(Self, &'static str)] =
                 &[ $( ($name::$variant, stringify!($variant)) ),* ];
+            const CODES: &'static [(&'static str, u8)] =
+                &[ $( (stringify!($variant), $name::$variant as u8) ),* ];
             const SHAPE: u64 = {
                 let hash = $crate::hash::bytes($crate::hash::START, stringify!($name).as_bytes());
                 $(
@@ -130,6 +134,10 @@ impl<E: Coded> Tag<E> {
 impl<E: Coded> Field for Tag<E> {
     const SHAPE: u64 = hash::number(hash::bytes(hash::START, b"tag"), E::SHAPE);
     const BLANK: Self = Self::from_raw(0);
+    const TYPE: &'static TypeInfo = &TypeInfo::Enum {
+        name: E::NAME,
+        variants: E::CODES,
+    };
 }
 
 impl<E: Coded> From<E> for Tag<E> {

@@ -9,7 +9,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use lager_ports::{Bus, Cause, OpenError, Policy, PortError, Wake};
 use lager_topics::{
     DistanceFrame, Field, FieldInfo, LineFrame, OBSERVERS, Payload, Qos, Role, Schema, SensorLine,
-    SteeringCommand, Topic,
+    SteeringCommand, StructInfo, Topic, TypeInfo,
 };
 use serde::{Deserialize, Serialize};
 
@@ -180,6 +180,7 @@ impl Field for ExchangedFields {
         packet_id: 0,
         link_epoch: 0,
     };
+    const TYPE: &'static TypeInfo = &TypeInfo::Struct(StructInfo::of::<Self>());
 }
 
 impl Schema for ExchangedFields {
