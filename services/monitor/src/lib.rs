@@ -9,6 +9,7 @@
 mod block;
 mod describe;
 mod echo;
+mod python;
 mod rate;
 mod sentence;
 
@@ -20,6 +21,8 @@ use lager_ports::{
     Bus, IntrospectError, PortError, ReceiveError, Sample, Shortage, Shutdown, Subscriber, Watchdog,
 };
 use lager_topics::{Topic, UnknownTopic};
+
+pub use python::write_python;
 
 /// The pace at which an observer polls.
 const POLL: Duration = Duration::from_millis(5);
