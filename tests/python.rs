@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 const PACKAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../bus/python");
 
-/// Frames of the paced stream, a thousand a second.
+/// Frames of the paced stream, a thousand a second; `LAGER_SOAK_FRAMES=60_000` is a minute.
 fn frames() -> u64 {
     std::env::var("LAGER_SOAK_FRAMES").map_or(2_000, |text| {
         text.replace('_', "").parse().expect("a number of frames")
@@ -218,6 +218,15 @@ fn python_reads_what_rust_reads_and_counts_what_it_missed() {
     assert!(reader.child.wait().expect("a child").success());
     drop((publisher, distances, maps, beside, bus));
     domain.assert_clean();
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn python_counts_losses_by_rusts_laws() {
+    let output = python().arg(program("streams.py")).output();
+    let output = output.expect("Python starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! The topic tools: list, info, echo and hz, for any topic of any robot, by name.
+//! The topic tools: list, info, echo and hz, for any topic of any robot, by name; and the table of
+//! topics for Python programs (`python.rs`), which needs no robot.
 //!
 //! They are observers: they poll, hold no listener and never slow the path. They know no topic,
 //! except for the sentences of some samples (`sentence.rs`); the table leads from a name to its
