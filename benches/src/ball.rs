@@ -2,7 +2,9 @@
 //! the topics they travel on when the typed ports carry them.
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_topics::{Field, FieldInfo, Make, Payload, Qos, Role, Schema, SensorLine, Topic};
+use lager_topics::{
+    Field, FieldInfo, Make, Payload, Qos, Role, Schema, SensorLine, StructInfo, Topic,
+};
 use serde::{Deserialize, Serialize};
 
 /// A payload of 64 bytes.
@@ -75,10 +77,7 @@ unsafe impl ZeroCopySend for Ball {
 // SAFETY: eight words, of which any bits are one, without padding.
 #[allow(unsafe_code)]
 unsafe impl Field for Ball {
-    const MAKE: Make = Make::Record {
-        name: "Ball",
-        fields: <Self as Schema>::FIELDS,
-    };
+    const MAKE: Make = Make::Record(StructInfo::of::<Self>());
     const SHAPE: u64 = <Self as Schema>::HASH;
     const BLANK: Self = Self {
         number: 0,

@@ -1,7 +1,7 @@
 //! What is published: blocks of several sizes, and a topic for each.
 
 use iceoryx2::prelude::ZeroCopySend;
-use lager_topics::{Field, FieldInfo, Make, Payload, Qos, Schema, SensorLine, Topic};
+use lager_topics::{Field, FieldInfo, Make, Payload, Qos, Schema, SensorLine, StructInfo, Topic};
 use serde::{Deserialize, Serialize};
 
 /// A payload of `WORDS` words of eight bytes.
@@ -24,10 +24,7 @@ unsafe impl<const WORDS: usize> ZeroCopySend for Block<WORDS> {
 // SAFETY: words, of which any bits are one, without padding.
 #[allow(unsafe_code)]
 unsafe impl<const WORDS: usize> Field for Block<WORDS> {
-    const MAKE: Make = Make::Record {
-        name: "Block",
-        fields: <Self as Schema>::FIELDS,
-    };
+    const MAKE: Make = Make::Record(StructInfo::of::<Self>());
     const SHAPE: u64 = <Self as Schema>::HASH;
     const BLANK: Self = Self { words: [0; WORDS] };
 }

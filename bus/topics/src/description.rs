@@ -41,14 +41,15 @@ fn write(text: &mut String, known: &mut HashMap<&'static str, Make>, make: &Make
             let _ = write!(text, ";{length}]");
             return;
         }
-        Make::Tag { name, .. } | Make::Record { name, .. } => name,
+        Make::Tag { name, .. } => name,
+        Make::Record(info) => info.name(),
     };
     text.push_str(name);
     if known.get(name) == Some(make) {
         return;
     }
     match make {
-        Make::Record { fields, .. } => write_fields(text, known, fields),
+        Make::Record(info) => write_fields(text, known, info.fields),
         Make::Tag { variants, .. } => write_variants(text, variants),
         Make::Number(_) | Make::List(..) => (),
     }

@@ -37,7 +37,7 @@ extern crate self as lager_topics;
 pub use description::{Described, Description, DescriptionError, describe};
 pub use payloads::*;
 pub use role::{Role, UnknownRole};
-pub use schema::{Field, FieldInfo, Make, Payload, Schema};
+pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo};
 pub use stamp::Stamp;
 pub use table::{
     BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,

@@ -97,12 +97,42 @@ pub enum Make {
         variants: &'static [(u8, &'static str)],
     },
     /// A struct made by [`payload!`](crate::payload).
-    Record {
-        /// Its name.
-        name: &'static str,
-        /// Its fields in memory order.
-        fields: &'static [FieldInfo],
-    },
+    Record(StructInfo),
+}
+
+/// A struct made by [`payload!`](crate::payload), as it lies in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StructInfo {
+    /// [`Schema::TYPE_NAME`].
+    pub type_name: &'static str,
+    /// [`Schema::HASH`].
+    pub hash: u64,
+    /// Its size in bytes.
+    pub size: usize,
+    /// Its alignment in bytes.
+    pub align: usize,
+    /// [`Schema::FIELDS`].
+    pub fields: &'static [FieldInfo],
+}
+
+impl StructInfo {
+    /// How `T` lies in memory.
+    pub const fn of<T: Schema>() -> Self {
+        Self {
+            type_name: T::TYPE_NAME,
+            hash: T::HASH,
+            size: size_of::<T>(),
+            align: align_of::<T>(),
+            fields: T::FIELDS,
+        }
+    }
+
+    /// Its name: its type's name without the family.
+    pub fn name(&self) -> &'static str {
+        self.type_name
+            .rsplit_once("::")
+            .map_or(self.type_name, |(_, name)| name)
+    }
 }
 
 /// The layout of a payload as constants.
@@ -184,10 +214,7 @@ macro_rules! payload {
         #[allow(unsafe_code)]
         unsafe impl $crate::schema::Field for $name {
             const SHAPE: u64 = <Self as $crate::schema::Schema>::HASH;
-            const MAKE: $crate::schema::Make = $crate::schema::Make::Record {
-                name: stringify!($name),
-                fields: <Self as $crate::schema::Schema>::FIELDS,
-            };
+            const MAKE: $crate::schema::Make = $crate::schema::Make::Record($crate::schema::StructInfo::of::<Self>());
             const BLANK: Self = Self {
                 $( $field: $crate::__blank!($type $(, $blank)?), )*
             };

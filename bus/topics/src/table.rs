@@ -16,7 +16,7 @@ use crate::payloads::{
     WarehouseMap, WorldAnswer, WorldAsk,
 };
 use crate::role::Role;
-use crate::schema::{FieldInfo, Payload, Schema};
+use crate::schema::{FieldInfo, Payload, Schema, StructInfo};
 
 /// Observers that can be attached to one topic at the same time.
 pub const OBSERVERS: usize = 64;
@@ -148,6 +148,8 @@ pub struct TopicEntry {
     pub size: usize,
     /// The payload's fields.
     pub fields: &'static [FieldInfo],
+    /// How the payload lies in memory, with everything inside.
+    pub layout: StructInfo,
     /// How it is published.
     pub qos: Qos,
     /// One line for people.
@@ -206,6 +208,7 @@ macro_rules! topics {
                 hash: <$payload as Schema>::HASH,
                 size: size_of::<$payload>(),
                 fields: <$payload as Schema>::FIELDS,
+                layout: StructInfo::of::<$payload>(),
                 qos: <$topic as Topic>::QOS,
                 summary: $summary,
             }, )*

@@ -484,6 +484,12 @@ pub enum TopicCommand {
         #[arg(value_parser = values::topic)]
         topic: String,
     },
+    /// Write the table of topics for programs in another language
+    Schema {
+        /// Write layouts.py and its stub into this folder, as bus/python has them
+        #[arg(long, value_name = "FOLDER", required = true)]
+        python: PathBuf,
+    },
     /// Print each sample with its stamp
     Echo {
         /// The topic's name, such as sensor/line

@@ -203,6 +203,14 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             gag::run(&config, socket, &shutdown)?;
             return Ok(ExitCode::SUCCESS);
         }
+        Command::Topic(TopicArgs {
+            command: TopicCommand::Schema { python },
+            ..
+        }) => {
+            lager_monitor::write_python(&python)
+                .with_context(|| format!("cannot write the layouts into {}", python.display()))?;
+            return Ok(ExitCode::SUCCESS);
+        }
         Command::Topic(args) => {
             topic(&config, args, cli.global.name.is_none(), &patience()?)?;
             return Ok(ExitCode::SUCCESS);
@@ -362,6 +370,7 @@ fn topic(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patienc
     };
     let shown = match args.command {
         TopicCommand::List => tools.list(every_robot),
+        TopicCommand::Schema { .. } => unreachable!("it needs no bus"),
         TopicCommand::Info { topic } => tools.info(&topic),
         TopicCommand::Echo { topic, count, .. } => tools.echo(&topic, count),
         TopicCommand::Hz { topic, count, .. } => tools.hz(&topic, count),

@@ -1,4 +1,5 @@
-//! The topic tools: list, info, echo and hz, for any topic of any robot, by name.
+//! The topic tools: list, info, echo and hz, for any topic of any robot, by name; and the table of
+//! topics for Python programs (`python.rs`), which needs no robot.
 //!
 //! They are observers: they poll, hold no listener and never slow the path. They know no topic,
 //! except for the sentences of some samples (`sentence.rs`). The table leads from a name to its
@@ -9,6 +10,7 @@
 mod block;
 mod describe;
 mod echo;
+mod python;
 mod rate;
 mod sentence;
 mod source;
@@ -22,6 +24,8 @@ use lager_ports::{
 };
 use lager_topics::{Topic, UnknownTopic};
 use source::Source;
+
+pub use python::write_python;
 
 /// The pace at which an observer polls.
 const POLL: Duration = Duration::from_millis(5);

@@ -1,0 +1,153 @@
+"""A robot's bus, joined as an observer: this package has no way to write to it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import re
+from types import TracebackType
+from typing import Any, List, Optional, Type
+
+import iceoryx2 as iox2
+
+from . import _place
+from ._errors import NoBus, OtherLayout, OtherVersion, Unread
+from ._layout import TopicEntry
+from ._reader import Reader
+from .layouts import TOPICS, ByName, Stamp
+
+# All processes on one bus need this one.
+ICEORYX2 = "0.10.0"
+
+# The limits that `bus/ports` gives every topic.
+_MAX_HELD = 4
+_OBSERVERS = 64
+_GONE = 16
+
+_SCHEMA_KEY = "lager.schema"
+_NAME = re.compile(r"[a-z0-9-]{1,24}")
+# What the transport says of a service that another build has made.
+_OTHER = ("Incompatible", "DoesNotSupportRequested")
+
+
+class Robot(ByName):
+    """The robot called `name`, on this user's bus or on the one that lives in the folder `bus`.
+
+    `robot.topic("sensor/line")` reads a topic. Use it as a context manager, or `close` it; it stays
+    in the thread that made it.
+    """
+
+    def __init__(self, name: str = "r1", *, bus: Optional[str] = None) -> None:
+        _check_version()
+        if not _NAME.fullmatch(name) or name.startswith("iceoryx2"):
+            raise NoBus(f"`{name}` is no robot's name: 1 to 24 of a-z, 0-9 and -")
+        self.name = name
+        self._place = _place.find(bus)
+        self._port_name = f"observer/{os.getpid()}"
+        self._readers: List[Reader[Any]] = []
+        builder = iox2.NodeBuilder.new().config(self._config())
+        builder = builder.name(iox2.NodeName.new(f"lager/{name}/{self._port_name}"))
+        builder = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled)
+        try:
+            self._node: Optional[Any] = builder.create(iox2.ServiceType.Ipc)
+        except Exception as error:
+            raise NoBus(f"the bus at {self._place.folder} cannot be joined: {error}") from error
+
+    def close(self) -> None:
+        """Leaves the bus; every sample is given back."""
+        for reader in self._readers:
+            reader.close()
+        self._readers.clear()
+        self._node = None
+
+    def __enter__(self) -> Robot:
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        self.close()
+
+    def _open(self, name: str) -> Reader[Any]:
+        entry = TOPICS.get(name)
+        if entry is None:
+            raise Unread(f"there is no topic `{name}`; the topics are {' '.join(TOPICS)}")
+        if self._node is None:
+            raise Unread("this robot is closed")
+        service = self._service(self._node, entry)
+        port = self._subscriber(service, entry)
+        # Services have places of their own beyond these, which looking must never take.
+        if service.dynamic_config.number_of_subscribers > _OBSERVERS:
+            port.delete()
+            raise Unread(f"`{name}` has {_OBSERVERS} readers already; end one of them")
+        reader: Reader[Any] = Reader(port, entry, self._check_there)
+        self._readers.append(reader)
+        return reader
+
+    def _service(self, node: Any, entry: TopicEntry) -> Any:
+        qos = entry.qos
+        builder = node.service_builder(iox2.ServiceName.new(f"lager/{self.name}/{entry.name}"))
+        builder = builder.publish_subscribe(entry.payload).user_header(Stamp)
+        builder = builder.max_publishers(qos.max_publishers).max_subscribers(qos.max_subscribers)
+        builder = builder.max_nodes(qos.max_nodes).subscriber_max_buffer_size(qos.buffer)
+        builder = builder.subscriber_max_borrowed_samples(_MAX_HELD).history_size(qos.history)
+        layout = iox2.AttributeVerifier.new().require(
+            iox2.AttributeKey.new(_SCHEMA_KEY), iox2.AttributeValue.new(_layout(entry))
+        )
+        try:
+            return builder.enable_safe_overflow(True).open_or_create_with_attributes(layout)
+        except Exception as error:
+            if any(word in str(error) for word in _OTHER):
+                raise self._other_layout(node, entry, str(error)) from error
+            raise Unread(f"`{entry.name}` cannot be opened: {error}") from error
+
+    def _subscriber(self, service: Any, entry: TopicEntry) -> Any:
+        builder = service.subscriber_builder().name(iox2.PortName.new(self._port_name))
+        try:
+            return builder.buffer_size(entry.qos.buffer).create()
+        except Exception as error:
+            raise Unread(f"`{entry.name}` cannot be read: {error}") from error
+
+    def _other_layout(self, node: Any, entry: TopicEntry, detail: str) -> OtherLayout:
+        key = iox2.AttributeKey.new(_SCHEMA_KEY)
+        full = f"lager/{self.name}/{entry.name}"
+        there = "none"
+        for service in iox2.Service.list(node.config, iox2.ServiceType.Ipc):
+            if service.name().to_string() == full:
+                values = service.attributes().key_values(key)
+                there = values[0].to_string() if values else there
+        ours = _layout(entry)
+        return OtherLayout(
+            f"`{entry.name}` has the layout {there} on the bus of `{self.name}` and {ours} in this "
+            f"package, lagerrobot {importlib.metadata.version('lagerrobot')} ({detail}); install "
+            "the package of the version that runs: pip install ./bus/python"
+        )
+
+    def _config(self) -> Any:
+        config = iox2.config.default()
+        config.global_cfg.prefix = iox2.FileName.new(self._place.prefix)
+        config.global_cfg.root_path = iox2.Path.new(self._place.root)
+        config.global_cfg.creation_timeout = iox2.Duration.from_millis(500)
+        config.global_cfg.service.cleanup_dead_nodes_on_open = False
+        config.defaults.publish_subscribe.subscriber_expired_connection_buffer = _GONE
+        return config
+
+    def _check_there(self) -> None:
+        if _place.generation_in(self._place.folder) != self._place.generation:
+            raise NoBus("the bus was damaged and has been cleared; open the robot again")
+
+
+def _layout(entry: TopicEntry) -> str:
+    return f"{entry.payload._hash_:016x}.{Stamp._hash_:016x}"
+
+
+def _check_version() -> None:
+    found = importlib.metadata.version("iceoryx2")
+    if found != ICEORYX2:
+        raise OtherVersion(
+            f"the bus is iceoryx2 {ICEORYX2} and the wheel installed here is {found}; "
+            f"pip install iceoryx2=={ICEORYX2}"
+        )

@@ -1,0 +1,1014 @@
+"""The topics' layouts. Made by `lager topic schema --python bus/python/lagerrobot`."""
+
+import ctypes
+import enum
+
+from ._layout import Layout, Qos, TopicEntry
+
+
+class LineState(enum.IntEnum):
+    OnLine = 0
+    NotOnLine = 1
+    LeftOfLine = 2
+    RightOfLine = 3
+    StationToLeft = 4
+    StationToRight = 5
+    FourWay = 6
+    DropStation = 7
+
+
+class Origin(enum.IntEnum):
+    Logic = 0
+    Operator = 1
+
+
+class Finish(enum.IntEnum):
+    None_ = 0
+    Done = 1
+    Aborted = 2
+    Refused = 3
+    NoWord = 4
+    NoTape = 5
+
+
+class ResetCause(enum.IntEnum):
+    Unknown = 0
+    PowerOn = 1
+    External = 2
+    BrownOut = 3
+    Watchdog = 4
+    Panic = 5
+    Jtag = 6
+
+
+class Mode(enum.IntEnum):
+    Manual = 0
+    Autonomous = 1
+
+
+class Refusal(enum.IntEnum):
+    None_ = 0
+    Undefined = 1
+    LogicOnly = 2
+    ArmLocked = 3
+    CodeChanged = 4
+    NotInCharge = 5
+    StopLatched = 6
+    ShuttingDown = 7
+    NoBoard = 8
+    BoardSilent = 9
+    OriginalBoard = 10
+    Stale = 11
+    ArmUnlimited = 12
+
+
+class ArmProfileState(enum.IntEnum):
+    NoBoard = 0
+    Telling = 1
+    Accepted = 2
+    Refused = 3
+    Unanswered = 4
+
+
+class Calibration(enum.IntEnum):
+    Never = 0
+    Running = 1
+    Done = 2
+    Partly = 3
+    BrokenOff = 4
+
+
+class StopCause(enum.IntEnum):
+    None_ = 0
+    Ordered = 1
+    FreshStart = 2
+    StateLost = 3
+    BoardResets = 4
+    WordRemoved = 5
+    WordDamaged = 6
+
+
+class Role(enum.IntEnum):
+    Bridge = 0
+    Logic = 1
+    Comm = 2
+    Station = 3
+    Recorder = 4
+    Monitor = 5
+    Gateway = 6
+    Simulator = 7
+    Supervisor = 8
+    Operator = 9
+    Observer = 10
+
+
+class FailureKind(enum.IntEnum):
+    None_ = 0
+    LineLost = 1
+    NodeMissing = 2
+    BarMissing = 3
+    StationMissing = 4
+    NoWay = 5
+    BoardRefuses = 6
+    DrivenByHand = 7
+    OffTheMap = 8
+    StateLost = 9
+    NoMap = 10
+    UnknownProduct = 11
+    NeedsReset = 12
+    QueueFull = 13
+    PutDown = 14
+    ClawUnheard = 15
+    ClawEmpty = 16
+    ClawSlack = 17
+    ArmJammed = 18
+    GoodsMissing = 19
+    MapEmpty = 20
+    MapTooLarge = 21
+    DeliveryOffCorner = 22
+    SideUnknown = 23
+    SideTooShort = 24
+    TooManyProducts = 25
+    ProductOutside = 26
+    ProductTwice = 27
+    Unreachable = 28
+    MarkUnseen = 29
+
+
+class Remedy(enum.IntEnum):
+    None_ = 0
+    Reset = 1
+    Way = 2
+    Map = 3
+    Later = 4
+    Hand = 5
+    Light = 6
+    Report = 7
+    Arm = 8
+    Charge = 9
+    Resume = 10
+    Mode = 11
+
+
+class Phase(enum.IntEnum):
+    WaitingForMap = 0
+    WaitingForOrder = 1
+    Driving = 2
+    Turning = 3
+    Approaching = 4
+    Positioning = 5
+    Picking = 6
+    Leaving = 7
+    Exiting = 8
+    Dropping = 9
+    BackingOff = 10
+    TurningRound = 11
+    Returning = 12
+    Stuck = 13
+    Lost = 14
+    Looking = 15
+    Halted = 16
+    TurningBack = 17
+
+
+class Step(enum.IntEnum):
+    Seeking = 0
+    ToStation = 1
+    ToNode = 2
+    AtBar = 3
+    NearNode = 4
+
+
+class Heading(enum.IntEnum):
+    Left = 0
+    Up = 1
+    Right = 2
+    Down = 3
+
+
+class Goal(enum.IntEnum):
+    None_ = 0
+    Product = 1
+    Delivery = 2
+    Home = 3
+
+
+class Hold(enum.IntEnum):
+    None_ = 0
+    Blind = 1
+    Unheard = 2
+    Arm = 3
+    Battery = 4
+
+
+class Side(enum.IntEnum):
+    Left = 0
+    Up = 1
+    Right = 2
+    Down = 3
+
+
+class BlockSource(enum.IntEnum):
+    Sensor = 0
+    Person = 1
+
+
+class EventKind(enum.IntEnum):
+    InPosition = 0
+    GettingItem = 1
+    ItemDelivered = 2
+    NextNode = 3
+    Refused = 4
+    PickupRefused = 5
+    Failed = 6
+    WayBlocked = 7
+
+
+class InputKind(enum.IntEnum):
+    PickupDone = 0
+    SwitchPressed = 1
+    ResetPressed = 2
+    Placed = 3
+    PickupForced = 4
+    OrderCancelled = 5
+    OrderMovedUp = 6
+    QueueCleared = 7
+
+
+class ThoughtKind(enum.IntEnum):
+    None_ = 0
+    MapTaken = 1
+    MapRefused = 2
+    MapKept = 3
+    MapChanged = 4
+    NoSuchNode = 5
+    PutAtStart = 6
+    PutDown = 7
+    MovesAlone = 8
+    WayBlocked = 9
+    WayOpen = 10
+    OrderWaits = 11
+    OrderWaitsForCharge = 12
+    OrderRefused = 13
+    Fetching = 14
+    Picking = 15
+    AwaitsPickup = 16
+    PickupRefused = 17
+    HasGoods = 18
+    Delivered = 19
+    BoardUnheard = 20
+    BoardHeard = 21
+    Blind = 22
+    SeesAgain = 23
+    BatteryLow = 24
+    BatteryCharged = 25
+    Parked = 26
+    JointUnheard = 27
+    JointOff = 28
+    ArmCarried = 29
+    NodePassed = 30
+    TurnsLeft = 31
+    TurnsRight = 32
+    SeeksStation = 33
+    LeavesToDeliver = 34
+    IsBack = 35
+    AtBar = 36
+    StationSeen = 37
+    StationMissed = 38
+    MarkUnexpected = 39
+    MarkOnWayOut = 40
+    CrossingOnWayOut = 41
+    TurnDisturbed = 42
+    PlaceCorrected = 43
+    Failed = 44
+    Halts = 45
+    TriesAgain = 46
+    OrderPutOff = 47
+    OrderCancelled = 48
+    OrderMovedUp = 49
+    QueueCleared = 50
+    StationPassed = 51
+
+
+class Joint(enum.IntEnum):
+    Base = 0
+    Shoulder = 1
+    Elbow = 2
+    Wrist = 3
+
+
+class GoodState(enum.IntEnum):
+    Shelf = 0
+    Held = 1
+    Lying = 2
+    Delivered = 3
+
+
+class Stamp(Layout):
+    _type_name_ = "lager::Stamp"
+    _hash_ = 0x25797021E1D5DCAC
+    _fields_ = [
+        ("sequence", ctypes.c_uint64),
+        ("source_time_ns", ctypes.c_uint64),
+        ("cause_publish_time_ns", ctypes.c_uint64),
+        ("cause_receive_time_ns", ctypes.c_uint64),
+        ("publish_time_ns", ctypes.c_uint64),
+        ("epoch", ctypes.c_uint64),
+        ("writer", ctypes.c_uint32),
+        ("cause_topic", ctypes.c_uint32),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["sequence", "source_time_ns", "cause_publish_time_ns", "cause_receive_time_ns", "publish_time_ns", "epoch", "writer", "cause_topic"],
+        "formats": ["<u8", "<u8", "<u8", "<u8", "<u8", "<u8", "<u4", "<u4"],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 52],
+        "itemsize": 56,
+    }
+
+
+class LineFrame(Layout):
+    _type_name_ = "lager::LineFrame"
+    _hash_ = 0x1B6A7D9A172598EA
+    _fields_ = [
+        ("link_epoch", ctypes.c_uint32),
+        ("bits", ctypes.c_uint16),
+        ("state", ctypes.c_uint8),
+        ("packet_id", ctypes.c_uint8),
+    ]
+    _enums_ = {"state": LineState}
+    _dtype_ = {
+        "names": ["link_epoch", "bits", "state", "packet_id"],
+        "formats": ["<u4", "<u2", "<u1", "<u1"],
+        "offsets": [0, 4, 6, 7],
+        "itemsize": 8,
+    }
+
+
+class DistanceFrame(Layout):
+    _type_name_ = "lager::DistanceFrame"
+    _hash_ = 0x03D04F7BFCA491AB
+    _fields_ = [
+        ("link_epoch", ctypes.c_uint32),
+        ("distance_cm", ctypes.c_uint8),
+        ("packet_id", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 2),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["link_epoch", "distance_cm", "packet_id", "reserved"],
+        "formats": ["<u4", "<u1", "<u1", ("<u1", (2,))],
+        "offsets": [0, 4, 5, 6],
+        "itemsize": 8,
+    }
+
+
+class SteeringOrder(Layout):
+    _type_name_ = "lager::SteeringOrder"
+    _hash_ = 0x122D28744FFF6E82
+    _fields_ = [
+        ("given_ns", ctypes.c_uint64),
+        ("id", ctypes.c_uint32),
+        ("origin", ctypes.c_uint8),
+        ("code", ctypes.c_uint8),
+        ("arm_granted", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
+    ]
+    _enums_ = {"origin": Origin}
+    _dtype_ = {
+        "names": ["given_ns", "id", "origin", "code", "arm_granted", "reserved"],
+        "formats": ["<u8", "<u4", "<u1", "<u1", "<u1", "<u1"],
+        "offsets": [0, 8, 12, 13, 14, 15],
+        "itemsize": 16,
+    }
+
+
+class SteeringReport(Layout):
+    _type_name_ = "lager::SteeringReport"
+    _hash_ = 0xADA4603A40EBD67D
+    _fields_ = [
+        ("link_epoch", ctypes.c_uint32),
+        ("finished_id", ctypes.c_uint32),
+        ("current_id", ctypes.c_uint32),
+        ("finished_origin", ctypes.c_uint8),
+        ("current_origin", ctypes.c_uint8),
+        ("finish", ctypes.c_uint8),
+        ("code", ctypes.c_uint8),
+        ("left_duty", ctypes.c_uint8),
+        ("right_duty", ctypes.c_uint8),
+        ("flags", ctypes.c_uint8),
+        ("line_error", ctypes.c_int8),
+        ("servo_errors", ctypes.c_uint8),
+        ("battery_decivolts", ctypes.c_uint8),
+        ("age_ms", ctypes.c_uint16),
+        ("servo_position", ctypes.c_uint16 * 8),
+        ("servo_load", ctypes.c_int16 * 8),
+    ]
+    _enums_ = {"finished_origin": Origin, "current_origin": Origin, "finish": Finish}
+    _dtype_ = {
+        "names": ["link_epoch", "finished_id", "current_id", "finished_origin", "current_origin", "finish", "code", "left_duty", "right_duty", "flags", "line_error", "servo_errors", "battery_decivolts", "age_ms", "servo_position", "servo_load"],
+        "formats": ["<u4", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<i1", "<u1", "<u1", "<u2", ("<u2", (8,)), ("<i2", (8,))],
+        "offsets": [0, 4, 8, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 24, 40],
+        "itemsize": 56,
+    }
+
+
+class BoardHealth(Layout):
+    _type_name_ = "lager::BoardHealth"
+    _hash_ = 0xE4D173C587C7B315
+    _fields_ = [
+        ("epoch", ctypes.c_uint32),
+        ("packets", ctypes.c_uint32),
+        ("lost", ctypes.c_uint32),
+        ("lost_total", ctypes.c_uint32),
+        ("bad_crc", ctypes.c_uint32),
+        ("skipped_bytes", ctypes.c_uint32),
+        ("reboots", ctypes.c_uint32),
+        ("baud", ctypes.c_uint32),
+        ("up", ctypes.c_uint8),
+        ("version", ctypes.c_uint8),
+        ("reset_cause", ctypes.c_uint8),
+        ("port", ctypes.c_uint8),
+        ("board_bad_packets", ctypes.c_uint8),
+        ("board_lost", ctypes.c_uint8),
+        ("board_refused", ctypes.c_uint8),
+        ("board_exde_errors", ctypes.c_uint8),
+        ("board_servo_timeouts", ctypes.c_uint8),
+        ("board_load_percent", ctypes.c_uint8),
+        ("board_longest_loop_100us", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 5),
+    ]
+    _enums_ = {"reset_cause": ResetCause}
+    _dtype_ = {
+        "names": ["epoch", "packets", "lost", "lost_total", "bad_crc", "skipped_bytes", "reboots", "baud", "up", "version", "reset_cause", "port", "board_bad_packets", "board_lost", "board_refused", "board_exde_errors", "board_servo_timeouts", "board_load_percent", "board_longest_loop_100us", "reserved"],
+        "formats": ["<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (5,))],
+        "offsets": [0, 4, 8, 12, 16, 20, 24, 28, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43],
+        "itemsize": 48,
+    }
+
+
+class Health(Layout):
+    _type_name_ = "lager::Health"
+    _hash_ = 0x904A9D24C614BD54
+    _fields_ = [
+        ("sensor", BoardHealth),
+        ("steering", BoardHealth),
+        ("bus_lost", ctypes.c_uint64),
+        ("driven_by_hand", ctypes.c_uint64),
+        ("stopped_at_ns", ctypes.c_uint64),
+        ("current_id", ctypes.c_uint32),
+        ("finished_id", ctypes.c_uint32),
+        ("orders_refused", ctypes.c_uint32),
+        ("leases_expired", ctypes.c_uint32),
+        ("refused_id", ctypes.c_uint32),
+        ("switch_ids", ctypes.c_uint32 * 4),
+        ("next_lease_ms", ctypes.c_uint16),
+        ("gain_p", ctypes.c_int16),
+        ("gain_d", ctypes.c_int16),
+        ("mode", ctypes.c_uint8),
+        ("stopped", ctypes.c_uint8),
+        ("current_origin", ctypes.c_uint8),
+        ("finished_origin", ctypes.c_uint8),
+        ("current_code", ctypes.c_uint8),
+        ("wire_seq", ctypes.c_uint8),
+        ("finish", ctypes.c_uint8),
+        ("refused_origin", ctypes.c_uint8),
+        ("refusal", ctypes.c_uint8),
+        ("blocked", ctypes.c_uint8),
+        ("arm_profile", ctypes.c_uint8),
+        ("calibration", ctypes.c_uint8),
+        ("calibrated_sensors", ctypes.c_uint8),
+        ("calibrations_ended", ctypes.c_uint8),
+        ("stop_cause", ctypes.c_uint8),
+        ("stop_origin", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 6),
+    ]
+    _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ArmProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role}
+    _dtype_ = {
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "stop_cause", "stop_origin", "reserved"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (6,))],
+        "offsets": [0, 48, 96, 104, 112, 120, 124, 128, 132, 136, 140, 156, 158, 160, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178],
+        "itemsize": 184,
+    }
+
+
+class Failure(Layout):
+    _type_name_ = "lager::Failure"
+    _hash_ = 0x84FAF5FA1B2D1010
+    _fields_ = [
+        ("kind", ctypes.c_uint8),
+        ("remedy", ctypes.c_uint8),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("expected", ctypes.c_int32),
+        ("seen", ctypes.c_int32),
+    ]
+    _enums_ = {"kind": FailureKind, "remedy": Remedy}
+    _dtype_ = {
+        "names": ["kind", "remedy", "x", "y", "expected", "seen"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", "<i4", "<i4"],
+        "offsets": [0, 1, 2, 3, 4, 8],
+        "itemsize": 12,
+    }
+
+
+class NavigatorStatus(Layout):
+    _type_name_ = "lager::NavigatorStatus"
+    _hash_ = 0x359C279576A6DD94
+    _fields_ = [
+        ("frames_lost", ctypes.c_uint64),
+        ("frames", ctypes.c_uint64),
+        ("driven_by_hand", ctypes.c_uint64),
+        ("order_id", ctypes.c_uint32),
+        ("product", ctypes.c_int32),
+        ("command_id", ctypes.c_uint32),
+        ("delivered", ctypes.c_uint32),
+        ("travelled_mm", ctypes.c_int32),
+        ("exit_mm", ctypes.c_int32),
+        ("failure", Failure),
+        ("x", ctypes.c_int16),
+        ("y", ctypes.c_int16),
+        ("turned_deg", ctypes.c_int16),
+        ("distance_age_ms", ctypes.c_uint16),
+        ("phase", ctypes.c_uint8),
+        ("step", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("target", ctypes.c_uint8),
+        ("goal", ctypes.c_uint8),
+        ("mark", ctypes.c_uint8),
+        ("code", ctypes.c_uint8),
+        ("tries", ctypes.c_uint8),
+        ("misses", ctypes.c_uint8),
+        ("waiting", ctypes.c_uint8),
+        ("distance_cm", ctypes.c_uint8),
+        ("mode", ctypes.c_uint8),
+        ("stopped", ctypes.c_uint8),
+        ("hold", ctypes.c_uint8),
+        ("forced", ctypes.c_uint8),
+        ("doubt", ctypes.c_uint8),
+        ("doubt_x", ctypes.c_uint8 * 3),
+        ("doubt_y", ctypes.c_uint8 * 3),
+        ("arm_attempt", ctypes.c_uint8),
+        ("arm_moves", ctypes.c_uint8),
+        ("remedy", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 3),
+    ]
+    _enums_ = {"phase": Phase, "step": Step, "heading": Heading, "target": Heading, "goal": Goal, "mode": Mode, "hold": Hold, "remedy": Remedy}
+    _dtype_ = {
+        "names": ["frames_lost", "frames", "driven_by_hand", "order_id", "product", "command_id", "delivered", "travelled_mm", "exit_mm", "failure", "x", "y", "turned_deg", "distance_age_ms", "phase", "step", "heading", "target", "goal", "mark", "code", "tries", "misses", "waiting", "distance_cm", "mode", "stopped", "hold", "forced", "doubt", "doubt_x", "doubt_y", "arm_attempt", "arm_moves", "remedy", "reserved"],
+        "formats": ["<u8", "<u8", "<u8", "<u4", "<i4", "<u4", "<u4", "<i4", "<i4", Failure._dtype_, "<i2", "<i2", "<i2", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,)), ("<u1", (3,)), "<u1", "<u1", "<u1", ("<u1", (3,))],
+        "offsets": [0, 8, 16, 24, 28, 32, 36, 40, 44, 48, 60, 62, 64, 66, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 87, 90, 91, 92, 93],
+        "itemsize": 96,
+    }
+
+
+class MapProduct(Layout):
+    _type_name_ = "lager::MapProduct"
+    _hash_ = 0x809EDEFAB8000AE3
+    _fields_ = [
+        ("id", ctypes.c_int32),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("side", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
+    ]
+    _enums_ = {"side": Side}
+    _dtype_ = {
+        "names": ["id", "x", "y", "side", "reserved"],
+        "formats": ["<i4", "<u1", "<u1", "<u1", "<u1"],
+        "offsets": [0, 4, 5, 6, 7],
+        "itemsize": 8,
+    }
+
+
+class WarehouseMap(Layout):
+    _type_name_ = "lager::WarehouseMap"
+    _hash_ = 0x6424C06972BB8591
+    _fields_ = [
+        ("width", ctypes.c_uint8),
+        ("height", ctypes.c_uint8),
+        ("delivery_x", ctypes.c_uint8),
+        ("delivery_y", ctypes.c_uint8),
+        ("side_length_cm", ctypes.c_uint16),
+        ("product_count", ctypes.c_uint16),
+        ("products", MapProduct * 256),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["width", "height", "delivery_x", "delivery_y", "side_length_cm", "product_count", "products"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", "<u2", "<u2", (MapProduct._dtype_, (256,))],
+        "offsets": [0, 1, 2, 3, 4, 6, 8],
+        "itemsize": 2056,
+    }
+
+
+class RouteNode(Layout):
+    _type_name_ = "lager::RouteNode"
+    _hash_ = 0xF408032183BCD3DC
+    _fields_ = [
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["x", "y"],
+        "formats": ["<u1", "<u1"],
+        "offsets": [0, 1],
+        "itemsize": 2,
+    }
+
+
+class Route(Layout):
+    _type_name_ = "lager::Route"
+    _hash_ = 0xF152DAD0CB7B31CC
+    _fields_ = [
+        ("length", ctypes.c_uint16),
+        ("reserved", ctypes.c_uint16),
+        ("nodes", RouteNode * 512),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["length", "reserved", "nodes"],
+        "formats": ["<u2", "<u2", (RouteNode._dtype_, (512,))],
+        "offsets": [0, 2, 4],
+        "itemsize": 1028,
+    }
+
+
+class BlockedWay(Layout):
+    _type_name_ = "lager::BlockedWay"
+    _hash_ = 0x77ED8DC17DE94CA5
+    _fields_ = [
+        ("since_ns", ctypes.c_uint64),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("source", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 4),
+    ]
+    _enums_ = {"heading": Heading, "source": BlockSource}
+    _dtype_ = {
+        "names": ["since_ns", "x", "y", "heading", "source", "reserved"],
+        "formats": ["<u8", "<u1", "<u1", "<u1", "<u1", ("<u1", (4,))],
+        "offsets": [0, 8, 9, 10, 11, 12],
+        "itemsize": 16,
+    }
+
+
+class BlockedWays(Layout):
+    _type_name_ = "lager::BlockedWays"
+    _hash_ = 0xE63D86F24D73565D
+    _fields_ = [
+        ("width", ctypes.c_uint8),
+        ("height", ctypes.c_uint8),
+        ("tries", ctypes.c_uint8),
+        ("count", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 4),
+        ("ways", BlockedWay * 64),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["width", "height", "tries", "count", "reserved", "ways"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", ("<u1", (4,)), (BlockedWay._dtype_, (64,))],
+        "offsets": [0, 1, 2, 3, 4, 8],
+        "itemsize": 1032,
+    }
+
+
+class Order(Layout):
+    _type_name_ = "lager::Order"
+    _hash_ = 0xC03E5A56CC1C0602
+    _fields_ = [
+        ("id", ctypes.c_uint32),
+        ("product", ctypes.c_int32),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["id", "product"],
+        "formats": ["<u4", "<i4"],
+        "offsets": [0, 4],
+        "itemsize": 8,
+    }
+
+
+class WaitingOrder(Layout):
+    _type_name_ = "lager::WaitingOrder"
+    _hash_ = 0x1D646255671AD69F
+    _fields_ = [
+        ("id", ctypes.c_uint32),
+        ("product", ctypes.c_int32),
+        ("put_off", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 3),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["id", "product", "put_off", "reserved"],
+        "formats": ["<u4", "<i4", "<u1", ("<u1", (3,))],
+        "offsets": [0, 4, 8, 9],
+        "itemsize": 12,
+    }
+
+
+class OrderQueue(Layout):
+    _type_name_ = "lager::OrderQueue"
+    _hash_ = 0x5CD0293F38C40EC5
+    _fields_ = [
+        ("order_id", ctypes.c_uint32),
+        ("product", ctypes.c_int32),
+        ("under_way", ctypes.c_uint8),
+        ("count", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 2),
+        ("orders", WaitingOrder * 32),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["order_id", "product", "under_way", "count", "reserved", "orders"],
+        "formats": ["<u4", "<i4", "<u1", "<u1", ("<u1", (2,)), (WaitingOrder._dtype_, (32,))],
+        "offsets": [0, 4, 8, 9, 10, 12],
+        "itemsize": 396,
+    }
+
+
+class Event(Layout):
+    _type_name_ = "lager::Event"
+    _hash_ = 0x3C6CD92B9C2EF11D
+    _fields_ = [
+        ("kind", ctypes.c_uint8),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("order_id", ctypes.c_uint32),
+        ("product", ctypes.c_int32),
+        ("failure", Failure),
+    ]
+    _enums_ = {"kind": EventKind, "heading": Heading}
+    _dtype_ = {
+        "names": ["kind", "x", "y", "heading", "order_id", "product", "failure"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", "<u4", "<i4", Failure._dtype_],
+        "offsets": [0, 1, 2, 3, 4, 8, 12],
+        "itemsize": 24,
+    }
+
+
+class Input(Layout):
+    _type_name_ = "lager::Input"
+    _hash_ = 0xA5CFAC28A7A2790E
+    _fields_ = [
+        ("kind", ctypes.c_uint8),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("order_id", ctypes.c_uint32),
+        ("id", ctypes.c_uint32),
+    ]
+    _enums_ = {"kind": InputKind, "heading": Heading}
+    _dtype_ = {
+        "names": ["kind", "x", "y", "heading", "order_id", "id"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", "<u4", "<u4"],
+        "offsets": [0, 1, 2, 3, 4, 8],
+        "itemsize": 12,
+    }
+
+
+class Thought(Layout):
+    _type_name_ = "lager::Thought"
+    _hash_ = 0xDE6841CF6F894102
+    _fields_ = [
+        ("kind", ctypes.c_uint8),
+        ("from_", ctypes.c_uint8),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("joint", ctypes.c_uint8),
+        ("sides", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
+        ("product", ctypes.c_int32),
+        ("expected", ctypes.c_int32),
+        ("seen", ctypes.c_int32),
+        ("failure", Failure),
+    ]
+    _enums_ = {"kind": ThoughtKind, "from_": Role, "heading": Heading, "joint": Joint}
+    _dtype_ = {
+        "names": ["kind", "from_", "x", "y", "heading", "joint", "sides", "reserved", "product", "expected", "seen", "failure"],
+        "formats": ["<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<i4", "<i4", "<i4", Failure._dtype_],
+        "offsets": [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20],
+        "itemsize": 32,
+    }
+
+
+class StageLatency(Layout):
+    _type_name_ = "lager::StageLatency"
+    _hash_ = 0x841A71E0807D9D26
+    _fields_ = [
+        ("count", ctypes.c_uint64),
+        ("min_ns", ctypes.c_uint64),
+        ("p50_ns", ctypes.c_uint64),
+        ("p90_ns", ctypes.c_uint64),
+        ("p99_ns", ctypes.c_uint64),
+        ("p999_ns", ctypes.c_uint64),
+        ("max_ns", ctypes.c_uint64),
+        ("mean_ns", ctypes.c_uint64),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["count", "min_ns", "p50_ns", "p90_ns", "p99_ns", "p999_ns", "max_ns", "mean_ns"],
+        "formats": ["<u8", "<u8", "<u8", "<u8", "<u8", "<u8", "<u8", "<u8"],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56],
+        "itemsize": 64,
+    }
+
+
+class PathLatency(Layout):
+    _type_name_ = "lager::PathLatency"
+    _hash_ = 0x2BB3668404DE4A81
+    _fields_ = [
+        ("since_start", ctypes.c_uint64),
+        ("window_start_ns", ctypes.c_uint64),
+        ("window_ns", ctypes.c_uint64),
+        ("read_publish", StageLatency),
+        ("publish_receive", StageLatency),
+        ("decide", StageLatency),
+        ("order_receive", StageLatency),
+        ("receive_write", StageLatency),
+        ("total", StageLatency),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["since_start", "window_start_ns", "window_ns", "read_publish", "publish_receive", "decide", "order_receive", "receive_write", "total"],
+        "formats": ["<u8", "<u8", "<u8", StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_],
+        "offsets": [0, 8, 16, 24, 88, 152, 216, 280, 344],
+        "itemsize": 408,
+    }
+
+
+class TruthGood(Layout):
+    _type_name_ = "lager::TruthGood"
+    _hash_ = 0x979A92DD7D6495A1
+    _fields_ = [
+        ("id", ctypes.c_int32),
+        ("x_mm", ctypes.c_float),
+        ("y_mm", ctypes.c_float),
+        ("z_mm", ctypes.c_float),
+        ("state", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 3),
+    ]
+    _enums_ = {"state": GoodState}
+    _dtype_ = {
+        "names": ["id", "x_mm", "y_mm", "z_mm", "state", "reserved"],
+        "formats": ["<i4", "<f4", "<f4", "<f4", "<u1", ("<u1", (3,))],
+        "offsets": [0, 4, 8, 12, 16, 17],
+        "itemsize": 20,
+    }
+
+
+class TruthObstacle(Layout):
+    _type_name_ = "lager::TruthObstacle"
+    _hash_ = 0x1F45D15119242573
+    _fields_ = [
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("by_chance", ctypes.c_uint8),
+    ]
+    _enums_ = {"heading": Heading}
+    _dtype_ = {
+        "names": ["x", "y", "heading", "by_chance"],
+        "formats": ["<u1", "<u1", "<u1", "<u1"],
+        "offsets": [0, 1, 2, 3],
+        "itemsize": 4,
+    }
+
+
+class Truth(Layout):
+    _type_name_ = "lager::Truth"
+    _hash_ = 0xBBAE686BFF52823E
+    _fields_ = [
+        ("time_ns", ctypes.c_uint64),
+        ("x_mm", ctypes.c_double),
+        ("y_mm", ctypes.c_double),
+        ("heading_rad", ctypes.c_double),
+        ("left_mm_per_s", ctypes.c_float),
+        ("right_mm_per_s", ctypes.c_float),
+        ("carrying", ctypes.c_int32),
+        ("good_count", ctypes.c_uint16),
+        ("left_duty", ctypes.c_uint8),
+        ("right_duty", ctypes.c_uint8),
+        ("servo_position", ctypes.c_uint16 * 8),
+        ("battery_charge", ctypes.c_float),
+        ("collisions", ctypes.c_uint32),
+        ("goods", TruthGood * 64),
+        ("obstacles", TruthObstacle * 64),
+        ("obstacle_count", ctypes.c_uint16),
+        ("reserved", ctypes.c_uint8 * 6),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["time_ns", "x_mm", "y_mm", "heading_rad", "left_mm_per_s", "right_mm_per_s", "carrying", "good_count", "left_duty", "right_duty", "servo_position", "battery_charge", "collisions", "goods", "obstacles", "obstacle_count", "reserved"],
+        "formats": ["<u8", "<f8", "<f8", "<f8", "<f4", "<f4", "<i4", "<u2", "<u1", "<u1", ("<u2", (8,)), "<f4", "<u4", (TruthGood._dtype_, (64,)), (TruthObstacle._dtype_, (64,)), "<u2", ("<u1", (6,))],
+        "offsets": [0, 8, 16, 24, 32, 36, 40, 44, 46, 47, 48, 64, 68, 72, 1352, 1608, 1610],
+        "itemsize": 1616,
+    }
+
+
+TOPICS = {
+    "sensor/line": TopicEntry(
+        "sensor/line",
+        LineFrame,
+        Qos(256, 0, 4, 74, 94),
+        "The line under the robot, as the sensor board classifies it.",
+    ),
+    "sensor/distance": TopicEntry(
+        "sensor/distance",
+        DistanceFrame,
+        Qos(256, 0, 4, 74, 94),
+        "The distance to what is in front of the robot.",
+    ),
+    "steering/command": TopicEntry(
+        "steering/command",
+        SteeringOrder,
+        Qos(16, 0, 18, 74, 108),
+        "Orders to the arbiter in the bridge.",
+    ),
+    "steering/state": TopicEntry(
+        "steering/state",
+        SteeringReport,
+        Qos(64, 0, 4, 74, 94),
+        "What the steering board does, with the arm's servos.",
+    ),
+    "link/health": TopicEntry(
+        "link/health",
+        Health,
+        Qos(1, 1, 4, 74, 94),
+        "Both serial links and who may steer.",
+    ),
+    "nav/status": TopicEntry(
+        "nav/status",
+        NavigatorStatus,
+        Qos(1, 1, 4, 72, 92),
+        "Where the robot is and what it is doing.",
+    ),
+    "nav/map": TopicEntry(
+        "nav/map",
+        WarehouseMap,
+        Qos(1, 1, 10, 74, 100),
+        "The warehouse and where its products stand.",
+    ),
+    "nav/route": TopicEntry(
+        "nav/route",
+        Route,
+        Qos(1, 1, 4, 72, 92),
+        "The nodes the robot means to pass.",
+    ),
+    "nav/blocks": TopicEntry(
+        "nav/blocks",
+        BlockedWays,
+        Qos(1, 1, 4, 72, 92),
+        "The ways on which something stands.",
+    ),
+    "mission/order": TopicEntry(
+        "mission/order",
+        Order,
+        Qos(16, 0, 10, 74, 100),
+        "Products to fetch.",
+    ),
+    "mission/queue": TopicEntry(
+        "mission/queue",
+        OrderQueue,
+        Qos(1, 1, 4, 72, 92),
+        "The order under way and those that wait for their turn.",
+    ),
+    "mission/event": TopicEntry(
+        "mission/event",
+        Event,
+        Qos(64, 0, 4, 74, 94),
+        "What happened on a mission.",
+    ),
+    "operator/input": TopicEntry(
+        "operator/input",
+        Input,
+        Qos(16, 0, 18, 76, 110),
+        "Buttons and acknowledgements of a person.",
+    ),
+    "log/thought": TopicEntry(
+        "log/thought",
+        Thought,
+        Qos(64, 0, 18, 72, 106),
+        "What the services think, for people to read.",
+    ),
+    "latency/path": TopicEntry(
+        "latency/path",
+        PathLatency,
+        Qos(1, 1, 4, 72, 92),
+        "How long sensor frames take to become commands, stage by stage, once a second.",
+    ),
+    "truth/pose": TopicEntry(
+        "truth/pose",
+        Truth,
+        Qos(1, 1, 4, 72, 92),
+        "The simulated world as it really is.",
+    ),
+}
+
+
+class ByName:
+    def topic(self, name):
+        return self._open(name)

@@ -1,0 +1,14 @@
+"""What a program may write, and mypy must accept."""
+
+from lagerrobot import Robot
+from lagerrobot.layouts import LineFrame, LineState
+
+
+def on_the_line(robot: Robot) -> int:
+    count = 0
+    for sample in robot.topic("sensor/line"):
+        frame: LineFrame = sample.copy()
+        bits: int = sample.data.bits
+        if frame.state == LineState.OnLine and bits and sample.stamp.sequence > 9:
+            count += 1
+    return count

@@ -1,0 +1,255 @@
+//! The Python package `bus/python`, in the environment into which `tests/run` has installed it.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use lager_ports::{BUS_VERSION, Bus, Cause, Publisher, Subscriber};
+use lager_tests::Domain;
+use lager_topics::{
+    LineFrame, Make, NavMap, OBSERVERS, Role, SensorDistance, SensorLine, Stamp, StructInfo,
+    TOPICS, WarehouseMap,
+};
+use lager_wire::LineState;
+use serde_json::{Value, json};
+
+const PACKAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../bus/python");
+
+/// Frames of the paced stream, a thousand a second; `LAGER_SOAK_FRAMES=60_000` is a minute.
+fn frames() -> u64 {
+    std::env::var("LAGER_SOAK_FRAMES").map_or(2_000, |text| {
+        text.replace('_', "").parse().expect("a number of frames")
+    })
+}
+
+fn python() -> Command {
+    let python = std::env::var_os("LAGER_PYTHON").expect("LAGER_PYTHON names a Python");
+    let mut command = Command::new(python);
+    command.env("PYTHONDONTWRITEBYTECODE", "1");
+    command
+}
+
+fn program(name: &str) -> PathBuf {
+    Path::new(PACKAGE).join("tests").join(name)
+}
+
+/// A Python program that is led line by line; killed when dropped.
+struct Led {
+    child: Child,
+    to: ChildStdin,
+    from: BufReader<ChildStdout>,
+}
+
+impl Led {
+    fn start(domain: &Domain, name: &str, frames: u64) -> Self {
+        let mut child = python()
+            .arg(program(name))
+            .arg(domain.bus_folder())
+            .arg(frames.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("Python starts");
+        Self {
+            to: child.stdin.take().expect("it is piped"),
+            from: BufReader::new(child.stdout.take().expect("it is piped")),
+            child,
+        }
+    }
+
+    fn tell(&mut self, line: &str) {
+        writeln!(self.to, "{line}").expect("it reads");
+    }
+
+    /// What it says next; the harness of a failing program says why on standard error.
+    fn says(&mut self) -> Value {
+        let mut line = String::new();
+        self.from.read_line(&mut line).expect("it speaks UTF-8");
+        serde_json::from_str(&line).unwrap_or_else(|_| panic!("it said `{line}`"))
+    }
+}
+
+impl Drop for Led {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Every struct of the table, with those inside.
+fn structs(info: StructInfo, found: &mut Vec<StructInfo>) {
+    for field in info.fields {
+        let mut make = field.make;
+        while let Make::List(of, _) = make {
+            make = *of;
+        }
+        if let Make::Record(inner) = make {
+            structs(inner, found);
+        }
+    }
+    if !found.contains(&info) {
+        found.push(info);
+    }
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn python_has_rusts_sizes_and_offsets_and_finds_the_same_bus() {
+    let domain = Domain::new();
+    let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
+    // The second time on a bus that was cleared, which has names of its own.
+    for cleared in [false, true] {
+        if cleared {
+            let robot = "r1".parse().expect("a name");
+            std::fs::create_dir_all(place.transport_folder()).expect("a folder");
+            assert!(place.clear(&robot));
+        }
+        let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
+        let output = python()
+            .arg(program("layouts.py"))
+            .arg(domain.bus_folder())
+            .output()
+            .expect("Python starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        let theirs: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(theirs["prefix"], place.prefix());
+        assert_eq!(
+            Path::new(theirs["root"].as_str().unwrap()),
+            place.transport_folder()
+        );
+        assert_eq!(
+            format!("iceoryx2 {}", theirs["iceoryx2"].as_str().unwrap()),
+            BUS_VERSION
+        );
+        assert_eq!(theirs["observers"], OBSERVERS);
+
+        let mut ours = Vec::new();
+        structs(StructInfo::of::<Stamp>(), &mut ours);
+        for entry in TOPICS {
+            structs(entry.layout, &mut ours);
+        }
+        assert_eq!(theirs["ctypes"].as_object().unwrap().len(), ours.len());
+        for info in ours {
+            let fields: Value = info
+                .fields
+                .iter()
+                .map(|field| (field.name.to_owned(), json!([field.offset, field.size])))
+                .collect::<serde_json::Map<_, _>>()
+                .into();
+            let name = info.type_name;
+            let by_numpy = json!({"size": info.size, "fields": fields});
+            assert_eq!(theirs["numpy"][name], by_numpy, "{name}");
+            let by_ctypes = json!({"size": info.size, "align": info.align, "fields": fields});
+            assert_eq!(theirs["ctypes"][name], by_ctypes, "{name}");
+            assert_eq!(
+                theirs["hashes"][name],
+                format!("{:016x}", info.hash),
+                "{name}"
+            );
+        }
+    }
+}
+
+fn send(publisher: &Publisher<SensorLine>, number: u64) {
+    let mut frame = LineFrame {
+        link_epoch: u32::try_from(number).expect("a small number"),
+        state: LineState::FourWay.into(),
+        ..LineFrame::default()
+    };
+    frame.bits = (number & 0x7FF) as u16;
+    publisher.send(Cause::OWN, frame).expect("it is sent");
+}
+
+/// Publishes at a thousand a second and reads along.
+fn stream(publisher: &Publisher<SensorLine>, beside: &mut Subscriber<SensorLine>, frames: u64) {
+    let start = Instant::now();
+    for number in 0..frames {
+        send(publisher, number);
+        while beside.receive().expect("it is read").is_some() {}
+        let due = start + Duration::from_millis(number + 1);
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+    }
+}
+
+fn bridge(domain: &Domain) -> Bus {
+    Bus::open(&domain.bus("r1", 1.0), Role::Bridge).expect("the bus opens")
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn python_reads_what_rust_reads_and_counts_what_it_missed() {
+    let domain = Domain::new();
+    let frames = frames();
+    let bus = bridge(&domain);
+    let mut reader = Led::start(&domain, "reading.py", frames);
+    assert_eq!(reader.says()["ready"], true);
+    let mut beside = domain
+        .observe("r1", 1.0)
+        .subscriber::<SensorLine>()
+        .unwrap();
+    let publisher = bus.publisher::<SensorLine>().expect("a publisher");
+    let distances = bus.publisher::<SensorDistance>().expect("a publisher");
+
+    stream(&publisher, &mut beside, frames);
+    let read = reader.says();
+    println!("of {frames}: Rust {}, Python {read}", beside.received());
+    let [received, lost] = ["received", "lost"].map(|key| read[key].as_u64().unwrap());
+    assert_eq!(beside.received() + beside.lost(), frames);
+    assert_eq!(received + lost, frames);
+
+    // 256 fit into its queue.
+    (frames..frames + 1000).for_each(|number| send(&publisher, number));
+    reader.tell("burst");
+    let burst = json!({"received": received + 256, "lost": lost + 744, "last": frames + 999});
+    assert_eq!(reader.says(), burst);
+
+    (frames + 1000..frames + 1004).for_each(|number| send(&publisher, number));
+    let maps = bus.publisher::<NavMap>().expect("a publisher");
+    let mut map = WarehouseMap::default();
+    map.products[1].id = 7;
+    maps.send(Cause::OWN, map).expect("it is sent");
+    reader.tell("four more");
+    assert_eq!(reader.says()["late"], true);
+    maps.tick();
+    reader.tell("map");
+    assert_eq!(reader.says()["done"], true);
+    assert!(reader.child.wait().expect("a child").success());
+    drop((publisher, distances, maps, beside, bus));
+    domain.assert_clean();
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn python_counts_losses_by_rusts_laws() {
+    let output = python().arg(program("streams.py")).output();
+    let output = output.expect("Python starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn the_package_is_typed_and_a_wrong_field_is_found() {
+    let domain = Domain::new();
+    let wrong = domain.folder().join("wrong.py");
+    let right = std::fs::read_to_string(program("typed.py")).expect("a program");
+    std::fs::write(&wrong, right.replace("data.bits", "data.bite")).expect("a file");
+    let mypy = |file: &Path| {
+        let mut command = python();
+        command.args(["-m", "mypy", "--strict", "--cache-dir"]);
+        command.arg(domain.folder().join("mypy"));
+        command.current_dir(PACKAGE).arg("lagerrobot").arg(file);
+        let output = command.output().expect("mypy starts");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        (output.status.success(), said)
+    };
+    let (accepted, said) = mypy(&program("typed.py"));
+    assert!(accepted, "{said}");
+    let (accepted, said) = mypy(&wrong);
+    assert!(
+        !accepted && said.contains("\"LineFrame\" has no attribute \"bite\""),
+        "{said}"
+    );
+}
