@@ -2,7 +2,8 @@
 //!
 //! Three kinds of line differ in what they carry besides the ball: the same header as the typed
 //! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and
-//! iceoryx2's own defaults. A receiver looks without pause, or sleeps on an iceoryx2 event that the
+//! iceoryx2's own defaults. The same limits include the transport's configuration, which is the
+//! robot's own ([`Member::join`]). A receiver looks without pause, or sleeps on an iceoryx2 event that the
 //! sender notifies after publishing.
 
 use core::fmt::Debug;
@@ -15,8 +16,7 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
-    FileName, LogLevel, Node, NodeBuilder, Path, SemanticString, ServiceName, SignalHandlingMode,
-    ZeroCopySend, ipc, set_log_level,
+    LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
 };
 use lager_ports::{BusConfig, Clock};
 use lager_topics::{Qos, Stamp};
@@ -75,12 +75,23 @@ pub(crate) struct Member {
 }
 
 impl Member {
-    /// Joins the transport of that bus.
+    /// Joins the transport of that bus, configured as the typed ports are: among others with as
+    /// many places for what writers that have ended left unread.
     pub(crate) fn join(bus: &BusConfig) -> Result<Self, BenchError> {
+        Self::configured(&config(bus)?)
+    }
+
+    /// Joins it with iceoryx2's own defaults for all that is no matter of the place.
+    pub(crate) fn join_with_defaults(bus: &BusConfig) -> Result<Self, BenchError> {
+        let mut config = config(bus)?;
+        config.defaults = Config::default().defaults;
+        Self::configured(&config)
+    }
+
+    fn configured(config: &Config) -> Result<Self, BenchError> {
         set_log_level(LogLevel::Fatal);
-        let config = config(bus)?;
         let node = NodeBuilder::new()
-            .config(&config)
+            .config(config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create()
             .map_err(|error| failed("bare iceoryx2 could not be joined", error))?;
@@ -197,18 +208,11 @@ impl Member {
     }
 }
 
+/// What `lager config --iceoryx2` shows.
 fn config(bus: &BusConfig) -> Result<Config, BenchError> {
     const WHAT: &str = "bare iceoryx2 could not be configured";
-    let place = bus.place().map_err(|error| failed(WHAT, error))?;
-    let mut config = Config::default();
-    config.global.prefix =
-        FileName::new(place.prefix().as_bytes()).map_err(|error| failed(WHAT, error))?;
-    let root = Path::new(place.transport_folder().as_os_str().as_encoded_bytes())
-        .map_err(|error| failed(WHAT, error))?;
-    config.global.set_root_path(&root);
-    config.global.creation_timeout = Duration::from_millis(500);
-    config.global.service.cleanup_dead_nodes_on_open = false;
-    Ok(config)
+    let shown = bus.iceoryx2_toml().map_err(|error| failed(WHAT, error))?;
+    toml::from_str(&shown).map_err(|error| failed(WHAT, error))
 }
 
 fn service_name(name: &str) -> ServiceName {
@@ -354,4 +358,26 @@ pub(crate) fn receive<H: Header>(
 /// A fault of a port.
 pub(crate) fn broken(error: impl Debug) -> Fault {
     Fault::Broken(format!("{error:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::Domain;
+
+    #[test]
+    fn the_same_limits_are_those_of_the_typed_ports_and_not_the_defaults() {
+        let domain = Domain::new().unwrap();
+        let ours = config(&domain.config()).unwrap();
+        let places = |config: &Config| {
+            let streams = &config.defaults.publish_subscribe;
+            streams.subscriber_expired_connection_buffer
+        };
+        assert_eq!(places(&ours), 16);
+        assert_ne!(places(&Config::default()), 16);
+        assert_eq!(
+            toml::to_string(&ours).unwrap(),
+            domain.config().iceoryx2_toml().unwrap()
+        );
+    }
 }

@@ -45,7 +45,8 @@ impl From<rustix::io::Errno> for Fault {
     }
 }
 
-/// Looks without pause until `look` finds something, at most [`LIMIT`].
+/// Looks without pause until `look` finds something, at most [`LIMIT`]. Between two looks it tells
+/// the processor that it spins, as a waiter of the typed ports does.
 pub(crate) fn spin<T>(mut look: impl FnMut() -> Result<Option<T>, Fault>) -> Result<T, Fault> {
     // Reading the clock costs as much as looking, so it is read now and then.
     const LOOKS: u32 = 10_000;
@@ -55,6 +56,7 @@ pub(crate) fn spin<T>(mut look: impl FnMut() -> Result<Option<T>, Fault>) -> Res
             if let Some(found) = look()? {
                 return Ok(found);
             }
+            core::hint::spin_loop();
         }
         if start.elapsed() > LIMIT {
             return Err(Fault::Silent);

@@ -304,15 +304,16 @@ impl Table<'_> {
                 player.typed_ports(&self.config, policy, self, round)
             }
             Contender::IceoryxHeader => {
-                let end = self.polling::<Stamp>(first, Some(()))?;
+                let end = self.polling::<Stamp>(first)?;
                 self.with(player, end, round)
             }
             Contender::IceoryxBare => {
-                let end = self.polling::<()>(first, Some(()))?;
+                let end = self.polling::<()>(first)?;
                 self.with(player, end, round)
             }
             Contender::IceoryxDefaults => {
-                let end = self.polling::<()>(first, None)?;
+                let member = Member::join_with_defaults(&self.config)?;
+                let end = Polling::<()>::new(member, names(first), None)?;
                 self.with(player, end, round)
             }
             Contender::IceoryxEvent => {
@@ -343,10 +344,8 @@ impl Table<'_> {
     fn polling<H: crate::baseline::iceoryx::Header>(
         &self,
         first: bool,
-        limits: Option<()>,
     ) -> Result<Polling<H>, BenchError> {
-        let limits = limits.map(|()| &SensorLine::QOS);
-        Polling::new(self.member()?, names(first), limits)
+        Polling::new(self.member()?, names(first), Some(&SensorLine::QOS))
     }
 
     #[cfg(feature = "zenoh")]
