@@ -100,6 +100,7 @@ class Role(enum.IntEnum):
     Supervisor = 8
     Operator = 9
     Observer = 10
+    Guest = 11
 
 
 class FailureKind(enum.IntEnum):
@@ -133,6 +134,7 @@ class FailureKind(enum.IntEnum):
     ProductTwice = 27
     Unreachable = 28
     MarkUnseen = 29
+    CornerUnseen = 30
 
 
 class Remedy(enum.IntEnum):
@@ -148,6 +150,7 @@ class Remedy(enum.IntEnum):
     Charge = 9
     Resume = 10
     Mode = 11
+    Link = 12
 
 
 class Phase(enum.IntEnum):
@@ -199,6 +202,7 @@ class Hold(enum.IntEnum):
     Unheard = 2
     Arm = 3
     Battery = 4
+    Link = 5
 
 
 class Side(enum.IntEnum):
@@ -233,6 +237,10 @@ class InputKind(enum.IntEnum):
     OrderCancelled = 5
     OrderMovedUp = 6
     QueueCleared = 7
+    LinkLost = 8
+    LinkBack = 9
+    SwitchedToManual = 10
+    SwitchedToAutonomous = 11
 
 
 class ThoughtKind(enum.IntEnum):
@@ -288,6 +296,10 @@ class ThoughtKind(enum.IntEnum):
     OrderMovedUp = 49
     QueueCleared = 50
     StationPassed = 51
+    LinkLost = 52
+    LinkBack = 53
+    ParkedWithoutLink = 54
+    CornerMissed = 55
 
 
 class Joint(enum.IntEnum):
@@ -448,7 +460,7 @@ class BoardHealth(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0x904A9D24C614BD54
+    _hash_ = 0x81A5006536B1462C
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
@@ -493,7 +505,7 @@ class Health(Layout):
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0x84FAF5FA1B2D1010
+    _hash_ = 0xA00DE0A8674C5A1C
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -513,7 +525,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x359C279576A6DD94
+    _hash_ = 0x2B427698950AA43A
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -730,7 +742,7 @@ class OrderQueue(Layout):
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0x3C6CD92B9C2EF11D
+    _hash_ = 0x97B514E2194F9694
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -751,7 +763,7 @@ class Event(Layout):
 
 class Input(Layout):
     _type_name_ = "lager::Input"
-    _hash_ = 0xA5CFAC28A7A2790E
+    _hash_ = 0x5674D36BA114814C
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -771,7 +783,7 @@ class Input(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0xDE6841CF6F894102
+    _hash_ = 0x77D514524D1C2FC9
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

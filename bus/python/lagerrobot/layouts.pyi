@@ -91,6 +91,7 @@ class Role(enum.IntEnum):
     Supervisor = 8
     Operator = 9
     Observer = 10
+    Guest = 11
 
 class FailureKind(enum.IntEnum):
     None_ = 0
@@ -123,6 +124,7 @@ class FailureKind(enum.IntEnum):
     ProductTwice = 27
     Unreachable = 28
     MarkUnseen = 29
+    CornerUnseen = 30
 
 class Remedy(enum.IntEnum):
     None_ = 0
@@ -137,6 +139,7 @@ class Remedy(enum.IntEnum):
     Charge = 9
     Resume = 10
     Mode = 11
+    Link = 12
 
 class Phase(enum.IntEnum):
     WaitingForMap = 0
@@ -183,6 +186,7 @@ class Hold(enum.IntEnum):
     Unheard = 2
     Arm = 3
     Battery = 4
+    Link = 5
 
 class Side(enum.IntEnum):
     Left = 0
@@ -213,6 +217,10 @@ class InputKind(enum.IntEnum):
     OrderCancelled = 5
     OrderMovedUp = 6
     QueueCleared = 7
+    LinkLost = 8
+    LinkBack = 9
+    SwitchedToManual = 10
+    SwitchedToAutonomous = 11
 
 class ThoughtKind(enum.IntEnum):
     None_ = 0
@@ -267,6 +275,10 @@ class ThoughtKind(enum.IntEnum):
     OrderMovedUp = 49
     QueueCleared = 50
     StationPassed = 51
+    LinkLost = 52
+    LinkBack = 53
+    ParkedWithoutLink = 54
+    CornerMissed = 55
 
 class Joint(enum.IntEnum):
     Base = 0
