@@ -61,7 +61,13 @@ impl Watch {
         while seen < 20 {
             let truth = wait_for("the world", || self.truth.latest().expect("readable"));
             if truth.stamp().publish_time_ns > from {
-                assert_eq!((truth.left_duty, truth.right_duty), (0, 0));
+                assert_eq!(
+                    (truth.left_duty, truth.right_duty),
+                    (0, 0),
+                    "the robot moves, by {:?}; {:?}",
+                    self.steering.latest().expect("readable").as_deref(),
+                    self.health.latest().expect("readable").as_deref(),
+                );
                 seen += 1;
             }
             drop(truth);

@@ -246,9 +246,30 @@ fn is_released_stop(path: &Path) -> bool {
         && StopWord::read(path).is_ok_and(|told| told.is_some_and(|told| told.stop().is_none()))
 }
 
+impl Domain {
+    /// Prints the last lines of every log that is not empty.
+    fn show_logs(&self) {
+        const LINES: usize = 40;
+        for entry in fs::read_dir(&self.folder).into_iter().flatten().flatten() {
+            let log = fs::read(entry.path()).unwrap_or_default();
+            let log = String::from_utf8_lossy(&log);
+            if entry.path().extension().is_some_and(|end| end == "log") && !log.is_empty() {
+                let skipped = log.lines().count().saturating_sub(LINES);
+                eprintln!("--- {}", entry.file_name().to_string_lossy());
+                log.lines()
+                    .skip(skipped)
+                    .for_each(|line| eprintln!("{line}"));
+            }
+        }
+    }
+}
+
 impl Drop for Domain {
-    /// Removes the test's own folder and bus.
+    /// Removes the test's own folder and bus. A test that fails shows first what its processes logged.
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.show_logs();
+        }
         let _ = fs::remove_dir_all(&self.folder);
         if let Ok(place) = self.bus("r1", 1.0).place() {
             place.remove();

@@ -460,7 +460,7 @@ class BoardHealth(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0x81A5006536B1462C
+    _hash_ = 0x7455BDBC8959268E
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
@@ -492,13 +492,14 @@ class Health(Layout):
         ("calibrations_ended", ctypes.c_uint8),
         ("stop_cause", ctypes.c_uint8),
         ("stop_origin", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 6),
+        ("mode_chosen", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 5),
     ]
     _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ArmProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role}
     _dtype_ = {
-        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "stop_cause", "stop_origin", "reserved"],
-        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (6,))],
-        "offsets": [0, 48, 96, 104, 112, 120, 124, 128, 132, 136, 140, 156, 158, 160, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178],
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (5,))],
+        "offsets": [0, 48, 96, 104, 112, 120, 124, 128, 132, 136, 140, 156, 158, 160, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179],
         "itemsize": 184,
     }
 

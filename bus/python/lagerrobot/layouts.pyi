@@ -393,6 +393,7 @@ class Health(Layout):
     calibrations_ended: int
     stop_cause: int
     stop_origin: int
+    mode_chosen: int
     reserved: Sequence[int]
 
 class Failure(Layout):

@@ -8,7 +8,8 @@
 //!   and in virtual time                    other, as `lager queue add` does
 //! ```
 //! Either way it is watched here. A product counts as delivered when logic says so. The robot is put
-//! into autonomous mode once at the beginning; from then on that is a person's.
+//! into autonomous mode at the beginning, unless somebody has set its mode before; from then on that
+//! is a person's.
 //!
 //! A process that takes a mission over from a killed one starts from its [`Mission`]: an order that
 //! logic has not shown yet is given again under its number, which logic takes for a repeat.
@@ -67,7 +68,7 @@ pub struct Mission {
     delivered: Vec<i32>,
     /// The orders that logic has not shown yet; none where a station gives them.
     unseen: VecDeque<(u32, i32)>,
-    /// The robot was in autonomous mode.
+    /// The robot was in autonomous mode, or somebody has set its mode.
     begun: bool,
     /// What logic had counted as delivered when it was looked at last.
     counted: Option<u32>,
@@ -178,7 +179,7 @@ impl Watch {
             self.mission.give_up(&why);
             return None;
         }
-        if !self.mission.begun && takes_orders(&health) {
+        if !self.mission.begun && is_whole(&health) && health.mode_chosen != 0 {
             self.mission.begun = true;
             self.acted = None;
         }
@@ -194,8 +195,7 @@ impl Watch {
     fn act(&self, status: &NavigatorStatus, queue: &OrderQueue) -> Option<Act> {
         if !self.mission.begun {
             return Some(Act::Ask(Ask {
-                kind: AskKind::SetMode.into(),
-                mode: Mode::Autonomous.into(),
+                kind: AskKind::Begin.into(),
                 ..Ask::default()
             }));
         }
@@ -270,8 +270,12 @@ impl Watch {
 
 /// Whether logic steers and both boards are there.
 fn takes_orders(health: &Health) -> bool {
-    let is_whole = health.sensor.up != 0 && health.steering.up != 0;
-    is_whole && health.mode.get() == Some(Mode::Autonomous)
+    is_whole(health) && health.mode.get() == Some(Mode::Autonomous)
+}
+
+/// Whether both boards are there.
+fn is_whole(health: &Health) -> bool {
+    health.sensor.up != 0 && health.steering.up != 0
 }
 
 #[cfg(test)]
@@ -282,6 +286,7 @@ mod tests {
     fn seen(phase: Phase, status: NavigatorStatus) -> Seen {
         let mut health = Health {
             mode: Mode::Autonomous.into(),
+            mode_chosen: 1,
             ..Health::default()
         };
         (health.sensor.up, health.steering.up) = (1, 1);
@@ -323,6 +328,24 @@ mod tests {
         heir.step(seconds(3), &seen(Phase::BackingOff, delivered(4, 3)));
         assert_eq!(heir.mission().outcome(), Some(Ok(())));
         assert_eq!(heir.mission().delivered(), [1, 3, 3]);
+    }
+
+    #[test]
+    fn a_person_who_has_set_the_mode_before_the_mission_began_keeps_it() {
+        let mut ready = seen(Phase::WaitingForOrder, delivered(0, 0));
+        let health = ready.health.as_mut().expect("health");
+        (health.mode, health.mode_chosen) = (Mode::Manual.into(), 0);
+        let mut watch = Watch::new(Mission::of_robot(&[5], 40));
+        let begins = |act: Option<Act>| match act {
+            Some(Act::Ask(ask)) => ask.kind == AskKind::Begin,
+            _ => false,
+        };
+        assert!(begins(watch.step(seconds(1), &ready)));
+        ready.health.as_mut().expect("health").mode_chosen = 1;
+        for second in 2..100 {
+            assert!(!begins(watch.step(seconds(second), &ready)));
+        }
+        assert_eq!(watch.mission().outcome(), None);
     }
 
     #[test]

@@ -177,9 +177,11 @@ payload! {
         pub stop_cause: Tag<StopCause>,
         /// Who has set the stop that is latched; without meaning if none is.
         pub stop_origin: Tag<Role>,
+        /// 1 once somebody has set the mode since the robot was switched on.
+        pub mode_chosen: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 6],
+        pub reserved: [u8; 5],
     }
 }
 

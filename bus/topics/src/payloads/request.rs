@@ -20,6 +20,9 @@ coded! {
         Calibrate = 3,
         /// Restart both boards.
         ResetBoards = 4,
+        /// Let logic drive from the start: done, without effect, if somebody has set the mode since
+        /// the robot was switched on.
+        Begin = 5,
     }
 }
 

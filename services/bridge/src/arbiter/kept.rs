@@ -22,6 +22,7 @@ impl Arbiter {
     pub fn resume(kept: &Health) -> Self {
         let mut arbiter = Self {
             mode: kept.mode.get().unwrap_or(Mode::Manual),
+            mode_is_chosen: kept.mode_chosen != 0,
             stopped: kept.stopped != 0,
             orders_refused: kept.orders_refused,
             leases_expired: kept.leases_expired,
@@ -81,6 +82,7 @@ impl Arbiter {
     /// Writes the arbiter's part of `link/health`: all that [`Arbiter::resume`] needs.
     pub fn fill(&self, now: Duration, health: &mut Health) {
         health.mode = self.mode.into();
+        health.mode_chosen = self.mode_is_chosen.into();
         health.stopped = self.stopped.into();
         health.orders_refused = self.orders_refused;
         health.leases_expired = self.leases_expired;

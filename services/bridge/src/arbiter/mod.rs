@@ -128,6 +128,8 @@ struct Grant {
 #[derive(Clone, Debug)]
 pub struct Arbiter {
     mode: Mode,
+    /// Somebody has set the mode since the robot was switched on.
+    mode_is_chosen: bool,
     stopped: bool,
     parked: bool,
     running: Option<Running>,
@@ -183,6 +185,7 @@ impl Arbiter {
     pub fn new() -> Self {
         Self {
             mode: Mode::Manual,
+            mode_is_chosen: false,
             stopped: false,
             parked: false,
             running: None,
@@ -243,6 +246,10 @@ impl Arbiter {
 
     /// Changes who drives. The order in force ends.
     pub fn set_mode(&mut self, mode: Mode) {
+        if !self.mode_is_chosen {
+            self.mode_is_chosen = true;
+            self.revision = self.revision.wrapping_add(1);
+        }
         if self.mode != mode {
             self.mode = mode;
             self.quiet();
@@ -287,6 +294,11 @@ impl Arbiter {
     /// Who drives.
     pub fn mode(&self) -> Mode {
         self.mode
+    }
+
+    /// Whether somebody has set the mode since the robot was switched on.
+    pub fn is_mode_chosen(&self) -> bool {
+        self.mode_is_chosen
     }
 
     /// Whether a stop is latched.

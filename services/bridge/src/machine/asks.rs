@@ -5,7 +5,7 @@
 
 use core::time::Duration;
 
-use lager_topics::{Answer, Ask, AskKind, Outcome};
+use lager_topics::{Answer, Ask, AskKind, Mode, Outcome};
 use lager_wire::{Callsign, SettingKey, Version};
 
 use super::action::News;
@@ -26,6 +26,13 @@ impl BridgeCore {
             (Some(AskKind::SetMode), Some(mode)) => {
                 self.say(News::ModeSet(mode));
                 self.arbiter.set_mode(mode);
+                Answered(Outcome::Done)
+            }
+            (Some(AskKind::Begin), _) => {
+                if !self.arbiter.is_mode_chosen() {
+                    self.say(News::ModeSet(Mode::Autonomous));
+                    self.arbiter.set_mode(Mode::Autonomous);
+                }
                 Answered(Outcome::Done)
             }
             // It releases the stop that its asker knew of and none that was set after he asked.

@@ -259,8 +259,8 @@ impl BridgeCore {
     pub fn switch(&mut self, mode: Mode) {
         if self.arbiter.mode() != mode {
             self.say(News::Pressed(mode));
-            self.arbiter.set_mode(mode);
         }
+        self.arbiter.set_mode(mode);
     }
 
     /// The stop word has been set: standby is due before everything else.

@@ -177,6 +177,41 @@ fn a_request_whose_asker_has_given_up_changes_nothing() {
 }
 
 #[test]
+fn a_robot_that_begins_by_itself_leaves_the_mode_that_somebody_has_set() {
+    let begin = Ask {
+        issued_ns: at(1_002).ns,
+        lifetime_ms: 500,
+        kind: AskKind::Begin.into(),
+        ..Ask::default()
+    };
+    let manual = Ask {
+        kind: AskKind::SetMode.into(),
+        mode: Mode::Manual.into(),
+        ..begin
+    };
+    let done = |core: &mut BridgeCore, ask: &Ask| {
+        core.ask(at(1_002), ask);
+        turn(core, 1_002);
+        assert_eq!(
+            core.answer().map(|answer| answer.outcome.get()),
+            Some(Some(Outcome::Done))
+        );
+        core.mode()
+    };
+    let mut core = core();
+    assert_eq!(done(&mut core, &begin), Mode::Autonomous);
+    assert_eq!(done(&mut core, &manual), Mode::Manual);
+    assert_eq!(done(&mut core, &begin), Mode::Manual);
+    // It was in manual mode, and somebody wants it to be; the switch says so, too.
+    let mut core = self::core();
+    assert_eq!(done(&mut core, &manual), Mode::Manual);
+    assert_eq!(done(&mut core, &begin), Mode::Manual);
+    let mut core = self::core();
+    core.switch(Mode::Manual);
+    assert_eq!(done(&mut core, &begin), Mode::Manual);
+}
+
+#[test]
 fn what_the_last_stage_of_a_turn_finds_out_is_told_in_that_turn() {
     let mut core = core();
     for millis in 1_002..1_300 {
