@@ -2,11 +2,17 @@
 //!
 //! Nothing is measured here; the same code runs under criterion and in the guard.
 
+mod command;
+mod robot;
 mod stop;
+mod times;
+
+use std::fmt;
 
 use anyhow::{Context, Result, ensure};
 use lager_benches::chip::{self, ChipReport, Programs};
 use lager_benches::{Mode, Options, Regime, fanout, hop, path};
+use serde::Serialize;
 
 use crate::cli::{BenchArgs, Scenario};
 use crate::config::ChipSection;
@@ -20,7 +26,7 @@ pub fn run(args: &BenchArgs) -> Result<String> {
         Scenario::Path => ("path", path::measure(&options)),
         Scenario::Fanout => ("fanout", fanout::measure(&options)),
         Scenario::Chip => return run_chip(args),
-        Scenario::Stop => return run_stop(args),
+        Scenario::Stop | Scenario::Command => return run_robot(args),
     };
     let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
     Ok(if args.json {
@@ -61,19 +67,31 @@ fn run_chip(args: &BenchArgs) -> Result<String> {
     })
 }
 
-/// How often a robot is stopped: for a first look, and in full.
-const STOPS: [usize; 2] = [20, 200];
+/// How often a robot is stopped or given a command: for a first look, and in full.
+const TIMES: [usize; 2] = [20, 200];
 
 /// The processes that people run, on a robot of the measurement's own.
-fn run_stop(args: &BenchArgs) -> Result<String> {
+fn run_robot(args: &BenchArgs) -> Result<String> {
+    let times = args.runs.unwrap_or(TIMES[usize::from(!args.quick)]);
+    let is_stop = args.scenario == Scenario::Stop;
+    let name = if is_stop { "stop" } else { "command" };
     ensure!(
         args.mode.is_empty() && args.regime.is_empty(),
-        "`lager bench stop` runs the robot as `lager up` does: it takes --runs, --quick and --json"
+        Usage(format!(
+            "`lager bench {name}` runs the robot as `lager up` does: it takes --runs, --quick and --json"
+        ))
     );
-    let stops = args.runs.unwrap_or(STOPS[usize::from(!args.quick)]);
-    let report = stop::measure(stops).context("`lager bench stop` has no result")?;
+    let failed = || format!("`lager bench {name}` has no result");
+    match is_stop {
+        true => told(args, &stop::measure(times).with_context(failed)?),
+        false => told(args, &command::measure(times).with_context(failed)?),
+    }
+}
+
+/// As a line of JSON or as a table.
+fn told<R: Serialize + fmt::Display>(args: &BenchArgs, report: &R) -> Result<String> {
     Ok(match args.json {
-        true => serde_json::to_string(&report)?,
+        true => serde_json::to_string(report)?,
         false => report.to_string().trim_end().to_owned(),
     })
 }
@@ -150,7 +168,7 @@ mod tests {
     #[test]
     fn wrong_choices_say_what_there_is() {
         for (flags, words) in [
-            (&["leap"][..], "hop, path, fanout, chip, stop"),
+            (&["leap"][..], "hop, path, fanout, chip, stop, command"),
             (&["hop", "--mode", "busy"], "spin, adaptive or block"),
             (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
             (&["hop", "--runs", "0"], "the least"),

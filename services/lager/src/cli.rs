@@ -565,6 +565,8 @@ pub enum Scenario {
     Chip,
     /// From the start of `lager stop` until a robot at full speed reports wheels at rest
     Stop,
+    /// From a command that a GaG sends to the station until the motors of its robot obey
+    Command,
 }
 
 #[cfg(test)]

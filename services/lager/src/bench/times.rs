@@ -1,0 +1,63 @@
+//! Times of many repetitions, as people read them.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// A distribution, in milliseconds.
+#[derive(Debug, Serialize)]
+pub(super) struct Times {
+    p50_ms: f64,
+    p99_ms: f64,
+    max_ms: f64,
+}
+
+impl Times {
+    pub(super) fn of(mut ns: Vec<u64>) -> Self {
+        ns.sort_unstable();
+        let at = |part: f64| {
+            let rank = (part * ns.len() as f64).ceil() as usize;
+            ns[rank.clamp(1, ns.len()) - 1] as f64 / 1e6
+        };
+        Self {
+            p50_ms: at(0.5),
+            p99_ms: at(0.99),
+            max_ms: at(1.0),
+        }
+    }
+}
+
+/// Writes a row for each of `rows`, under a first column's head.
+pub(super) fn table(
+    formatter: &mut fmt::Formatter<'_>,
+    head: &str,
+    rows: &[(&str, &Times)],
+) -> fmt::Result {
+    writeln!(formatter, "{head:26}     p50      p99      max")?;
+    for (name, times) in rows {
+        let Times {
+            p50_ms,
+            p99_ms,
+            max_ms,
+        } = times;
+        writeln!(
+            formatter,
+            "{name:26} {p50_ms:7.1}  {p99_ms:7.1}  {max_ms:7.1}"
+        )?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_of_the_sorted_times() {
+        let times = Times::of((1..=200).rev().map(|ms| ms * 1_000_000).collect());
+        assert_eq!(
+            (times.p50_ms, times.p99_ms, times.max_ms),
+            (100.0, 198.0, 200.0)
+        );
+    }
+}
