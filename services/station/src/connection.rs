@@ -63,6 +63,9 @@ pub(crate) struct Connection {
     stream: Stream,
     splitter: LineSplitter,
     unread: Vec<u8>,
+    /// Whether the peer takes nothing any more. What it has said before it went is still read, up
+    /// to the end of the connection.
+    is_deaf: bool,
     /// Whether the peer has read a part of the first line of that.
     is_begun: bool,
     /// Since when there is something the peer has not read.
@@ -81,6 +84,7 @@ impl Connection {
             stream,
             splitter: LineSplitter::new(),
             unread: Vec::new(),
+            is_deaf: false,
             is_begun: false,
             unread_since: now,
             begun_since: None,
@@ -130,7 +134,7 @@ impl Connection {
     ///
     /// # Errors
     ///
-    /// The connection has ended, or the peer has left too much unread.
+    /// The peer has left too much unread.
     pub(crate) fn say(&mut self, now: Instant, line: &str) -> io::Result<()> {
         self.put(now, self.unread.len(), line)
     }
@@ -147,36 +151,37 @@ impl Connection {
     }
 
     fn put(&mut self, now: Instant, place: usize, line: &str) -> io::Result<()> {
+        if self.is_deaf {
+            return Ok(());
+        }
         if self.unread.is_empty() {
             self.unread_since = now;
         }
         self.unread.splice(place..place, line.bytes());
-        self.write(now)?;
+        self.write(now);
         if self.unread.len() > MOST_UNREAD {
             return Err(io::Error::other("it does not read what it is told"));
         }
         Ok(())
     }
 
-    /// Writes what waits, as far as the peer takes it.
-    ///
-    /// # Errors
-    ///
-    /// The connection has ended.
-    pub(crate) fn write(&mut self, now: Instant) -> io::Result<()> {
+    /// Writes what waits, as far as the peer takes it. That it has gone, [`Connection::read`] finds
+    /// behind what it has said.
+    pub(crate) fn write(&mut self, now: Instant) {
         while !self.unread.is_empty() {
             match self.stream.write(&self.unread) {
-                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-                Ok(count) => {
+                Ok(count @ 1..) => {
                     self.is_begun = self.unread[count - 1] != b'\n';
                     self.unread.drain(..count);
                     self.unread_since = now;
                 }
-                Err(error) if is_nothing(&error) => return Ok(()),
-                Err(error) => return Err(error),
+                Err(error) if is_nothing(&error) => return,
+                Ok(0) | Err(_) => {
+                    self.is_deaf = true;
+                    self.unread.clear();
+                }
             }
         }
-        Ok(())
     }
 
     /// Why it is closed now, if its peer has taken too long over something.
@@ -210,6 +215,28 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_a_peer_said_before_it_went_is_heard_though_it_takes_nothing_more() {
+        let (ours, mut theirs) = UnixStream::pair().expect("sockets");
+        ours.set_nonblocking(true).expect("a socket");
+        let now = Instant::now();
+        let mut connection = Connection::new(Stream::Unix(ours), now, false);
+        theirs.write_all(b"fetchprod 2\n").expect("it is there");
+        drop(theirs);
+        connection
+            .say(now, "thought I am back\n")
+            .expect("no reason to close it");
+        let mut heard = Vec::new();
+        let hear = |line: Result<&str, LineError>| heard.push(line.expect("a line").to_owned());
+        connection.read(now, hear).expect("it has said something");
+        assert_eq!(heard, ["fetchprod 2"]);
+        let end = connection.read(now, |_| {});
+        assert_eq!(
+            end.expect_err("it has gone").kind(),
+            io::ErrorKind::UnexpectedEof
+        );
+    }
+
+    #[test]
     fn what_is_said_first_overtakes_whole_lines_that_wait() {
         let (ours, mut theirs) = UnixStream::pair().expect("sockets");
         ours.set_nonblocking(true).expect("a socket");
@@ -218,7 +245,7 @@ mod tests {
         // One line that the machine takes in part only.
         let long = "x".repeat(4 << 20) + "\n";
         connection.unread.extend_from_slice(long.as_bytes());
-        connection.write(now).expect("it is there");
+        connection.write(now);
         assert!(connection.is_begun && connection.wants_to_write());
         // What waits behind it, as `say` would refuse for so long a line.
         connection.unread.extend_from_slice(b"do 1 clear\n");
@@ -234,7 +261,7 @@ mod tests {
         });
         connection.say(now, "do 3 clear\n").ok();
         while connection.wants_to_write() {
-            connection.write(now).expect("it is there");
+            connection.write(now);
             std::thread::yield_now();
         }
         drop(connection);

@@ -200,9 +200,8 @@ impl Server {
             let now = Instant::now();
             self.handle.turn();
             for peer in ready.write {
-                let written = self.connections.get_mut(&peer).map(|one| one.write(now));
-                if let Some(Err(error)) = written {
-                    self.end(peer, &error.to_string());
+                if let Some(connection) = self.connections.get_mut(&peer) {
+                    connection.write(now);
                 }
             }
             for peer in ready.read {
