@@ -8,12 +8,19 @@ use lager_topics::{Heading, MapProduct, NavigatorStatus, Phase, Side, WarehouseM
 /// duty × µs of both motors: some 2 cm.
 const KNOWN_BY_HAND: u64 = 50_000_000;
 
+/// How well a robot knows where it is when it sees a mark.
+const UNSURE_AT_MARK_MM: u32 = 20;
+/// What part of the way since then its odometry may be wrong by: motors differ by a tenth (`firmware/plant`).
+const UNSURE_PART: u32 = 8;
+
 /// A place in the warehouse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pose {
     pub(crate) x_mm: i32,
     pub(crate) y_mm: i32,
     pub(crate) heading: Degrees,
+    /// How far it may be from there.
+    pub(crate) unsure_mm: u32,
 }
 
 /// Whether logic knows its place. `by_hand` is what the bridge says of the wheels in manual mode.
@@ -57,6 +64,7 @@ pub(crate) fn pose(status: &NavigatorStatus, map: &WarehouseMap) -> Option<Pose>
         x_mm: i32::from(status.x) * side_mm + right * way_mm,
         y_mm: i32::from(status.y) * side_mm + up * way_mm,
         heading: Degrees::new(degrees(looks) + i32::from(turned_deg)),
+        unsure_mm: UNSURE_AT_MARK_MM + status.travelled_mm.unsigned_abs() / UNSURE_PART,
     })
 }
 

@@ -219,6 +219,7 @@ fn put_place(state: &mut State, known: &Known) {
         state.x_mm = Some(pose.x_mm);
         state.y_mm = Some(pose.y_mm);
         state.heading_deg = Some(pose.heading);
+        state.unsure_mm = Some(pose.unsure_mm);
     }
 }
 

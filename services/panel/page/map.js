@@ -42,6 +42,7 @@ export class WarehouseMap {
     this.trail = make("polyline", { class: "trail" }, svg);
     this.route = make("polyline", { class: "route" }, svg);
     this.next = make("circle", { class: "next", r: 70 }, svg);
+    this.unsure = make("circle", { class: "unsure" }, svg);
     this.ghost = robotShape(svg, "ghost");
     this.body = robotShape(svg, "robot");
     this.shown = null;
@@ -110,10 +111,23 @@ export class WarehouseMap {
       path += `A${radius} ${radius} 0 0 ${side > 0 ? 0 : 1} ${at.x} ${-at.y}`;
     }
     if (arcs.length) go(length_cm * 10 - first - bent);
-    make("path", { class: "tape", d: path, fill: "none" }, this.floor);
+    this.wayOut = make("path", { class: "tape", d: path, fill: "none" }, this.floor);
     const [dx, dy] = [Math.sin(at.heading) * BAR / 2, Math.cos(at.heading) * BAR / 2];
     make("line", { class: "bar", x1: at.x + dx, y1: -at.y + dy, x2: at.x - dx, y2: -at.y - dy }, this.floor);
     this.end = at;
+  }
+
+  /** Odometry counts the way out as if it were straight: where a pose on it is. */
+  onWayOut(pose) {
+    if (!this.warehouse) return pose;
+    const [x, y] = this.warehouse.delivery.map((number) => number * this.side);
+    const outwards = x === 0 ? -1 : 1;
+    const far = (pose.x - x) * outwards;
+    if (far <= 0 || Math.abs(pose.y - y) >= 1) return pose;
+    const end = this.wayOut.getTotalLength() - 1;
+    const [at, ahead] = [0, 1].map((mm) => this.wayOut.getPointAtLength(Math.min(far, end) + mm));
+    const along = (Math.atan2(ahead.x - at.x, at.y - ahead.y) * 180) / Math.PI;
+    return { x: at.x, y: -at.y, heading: pose.heading + along - outwards * 90 };
   }
 
   /** A box in its square, at the side from which it is reached. */
@@ -131,14 +145,18 @@ export class WarehouseMap {
   /** Moves a robot to where it is now; called before each picture. */
   move(robot, now) {
     const known = robot && robot.state.x_mm !== undefined;
-    for (const part of [this.body, this.trail, this.route, this.next]) part.toggleAttribute("hidden", !known);
+    for (const part of [this.body, this.unsure, this.trail, this.route, this.next]) part.toggleAttribute("hidden", !known);
     this.ghost.toggleAttribute("hidden", !robot?.truth);
     if (!known) return;
     const stale = robot.isStale(now);
     this.svg.classList.toggle("stale", stale);
-    const aim = { x: Number(robot.state.x_mm), y: Number(robot.state.y_mm), heading: Number(robot.state.heading_deg ?? 0) };
-    const pose = this.glide(aim, now, stale);
+    const told = { x: Number(robot.state.x_mm), y: Number(robot.state.y_mm), heading: Number(robot.state.heading_deg ?? 0) };
+    const pose = this.glide(this.onWayOut(told), now, stale);
     place(this.body, pose);
+    // Where the axle may be: as wide as odometry is wrong, until the next mark.
+    set(this.unsure, "cx", Math.round(pose.x));
+    set(this.unsure, "cy", Math.round(-pose.y));
+    set(this.unsure, "r", robot.state.unsure_mm ?? 0);
     if (robot.truth) place(this.ghost, robot.truth);
     if (this.following) this.centre(pose.x, -pose.y);
   }
@@ -158,7 +176,8 @@ export class WarehouseMap {
     const shown = this.shown;
     const jump = !shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500;
     const part = jump ? 1 : Math.min(1, (now - shown.at) / GLIDE_MS);
-    const turn = jump ? 0 : ((aim.heading - shown.heading + 540) % 360) - 180;
+    // From -180 to 180, however often it has turned round.
+    const turn = jump ? 0 : ((((aim.heading - shown.heading + 180) % 360) + 360) % 360) - 180;
     const pose = {
       x: jump ? aim.x : shown.x + (aim.x - shown.x) * part,
       y: jump ? aim.y : shown.y + (aim.y - shown.y) * part,
@@ -178,7 +197,9 @@ export class WarehouseMap {
     for (let i = robot.past.length - 1; i >= 0; i -= 4) {
       const { at, x, y } = robot.past[i];
       if (now - at > SPAN_MS) break;
-      if (x !== null && y !== null) points.push(`${x},${-y}`);
+      if (x === null || y === null) continue;
+      const drawn = this.onWayOut({ x, y, heading: 0 });
+      points.push(`${Math.round(drawn.x)},${-Math.round(drawn.y)}`);
     }
     set(this.trail, "points", points.join(" "));
   }

@@ -22,6 +22,8 @@ fields! {
         y_mm: i32 = "a way in mm",
         /// Where the robot looks, by odometry.
         heading_deg: Degrees = "an angle from 0 to 359 degrees",
+        /// How far the axle may be from there: odometry's error grows until the next mark.
+        unsure_mm: u32 = "a way from 0 to 4294967295 mm",
         /// The node last passed.
         node: Coord = "a node such as 2,1",
         /// Where the robot looks along the grid.

@@ -137,11 +137,11 @@ fn degrees() -> impl Strategy<Value = Degrees> {
 prop_compose! {
     fn place()(
         time_ms in of(any::<u64>()), x_mm in of(any::<i32>()), y_mm in of(any::<i32>()),
-        heading_deg in of(degrees()), node in of(coord()), looks in of(direction()),
+        heading_deg in of(degrees()), unsure_mm in of(any::<u32>()), node in of(coord()), looks in of(direction()),
         next in of(coord()), phase in of(name()), hold in of(name()), mode in of(mode()),
     ) -> State {
         State {
-            time_ms, x_mm, y_mm, heading_deg, node, looks, next, phase, hold, mode,
+            time_ms, x_mm, y_mm, heading_deg, unsure_mm, node, looks, next, phase, hold, mode,
             ..State::default()
         }
     }

@@ -125,7 +125,7 @@ fn a_station_is_told_the_state_twenty_times_a_second() {
         .collect();
     assert_eq!(states.len(), 20, "{:?}", robot.shown);
     for field in [
-        " x_mm=550 y_mm=800 heading_deg=90 node=1,2 looks=right ",
+        " x_mm=550 y_mm=800 heading_deg=90 unsure_mm=38 node=1,2 looks=right ",
         " phase=waiting_for_order hold=none mode=autonomous stopped=0 ",
         " line_bits=00001110000 ",
         " distance_cm=52 ",
