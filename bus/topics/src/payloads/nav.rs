@@ -212,7 +212,8 @@ payload! {
         /// 1 = a person said that the goods are held although the claw did not feel them.
         pub forced: u8,
         /// Headings that are possible besides `heading` since a turn was disturbed: bit n = n
-        /// quarters further to the right; bit 0 = the turn under way was disturbed.
+        /// quarters further to the right; bit 0 = the turn under way was disturbed; bit 4 = its
+        /// quarter before ended without tape.
         pub doubt: u8,
         /// For each of these headings, from one quarter on, the node last passed.
         pub doubt_x: [u8; 3],

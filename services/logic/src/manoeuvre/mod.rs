@@ -36,6 +36,8 @@ use crate::heading::{Compass, Spin};
 use crate::marks::Mark;
 use helm::{Pause, turning_place};
 
+/// In a status's doubt: the quarter before the one at hand ended without tape.
+const FROM_BARE: u8 = 16;
 /// How old a distance may be that tells whether there is room to turn.
 const IN_SIGHT: Duration = Duration::from_millis(500);
 
@@ -307,6 +309,7 @@ impl Manoeuvre {
             Self::Turn(turn) => {
                 turn.tries = status.tries;
                 turn.disturbed = status.doubt & 1 != 0;
+                turn.from_bare = status.doubt & FROM_BARE != 0;
             }
             Self::Arm(arm) => {
                 arm.restore(status.arm_attempt, status.arm_moves, status.tries, ordered);
@@ -322,7 +325,8 @@ impl Manoeuvre {
             Self::Follow(follow) => status.step = follow.step.into(),
             Self::Turn(turn) => {
                 status.tries = turn.tries;
-                status.doubt = turn.disturbed.into();
+                let from_bare = if turn.from_bare { FROM_BARE } else { 0 };
+                status.doubt = u8::from(turn.disturbed) | from_bare;
             }
             Self::Arm(arm) => {
                 status.tries = arm.tries;

@@ -15,7 +15,7 @@ use lager_wire::{Command, LineState, WheelCommand};
 use super::helm::{Helm, Pause, STANDBY, Senses};
 use super::outcome::Outcome;
 use crate::heading::{Compass, Spin};
-use crate::turn::{Turned, done, interrupted};
+use crate::turn::{Turned, done, interrupted, is_bare};
 
 /// Where a turn takes place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +39,8 @@ pub(crate) struct Turn {
     pub(crate) tries: u8,
     /// It was cut short, or went on unheard.
     pub(crate) disturbed: bool,
+    /// The quarter before ended without tape under the sensors.
+    pub(crate) from_bare: bool,
     pub(crate) pause: Pause,
 }
 
@@ -51,6 +53,7 @@ impl Turn {
             half,
             tries: 0,
             disturbed: false,
+            from_bare: false,
             pause: Pause::None,
         }
     }
@@ -100,7 +103,9 @@ impl Turn {
                     .senses
                     .sight
                     .map_or(LineState::NotOnLine, |(_, seen)| seen);
-                let turned = done(self.angle(helm.senses, *helm.heading), seen);
+                let angle = self.angle(helm.senses, *helm.heading);
+                let turned = done(angle, seen, self.from_bare);
+                self.from_bare |= is_bare(seen);
                 self.judged(turned, helm)
             }
         }
@@ -165,6 +170,5 @@ impl Turn {
 
 /// Whether there is surely no tape under the sensors.
 fn sees_no_tape(senses: &Senses) -> bool {
-    let is_bare = |seen| matches!(seen, LineState::NotOnLine | LineState::DropStation);
     senses.sure_sight.is_some_and(is_bare) && senses.sight.is_some_and(|(_, seen)| is_bare(seen))
 }
