@@ -16,7 +16,7 @@ use crate::payloads::{
     WarehouseMap, WorldAnswer, WorldAsk,
 };
 use crate::role::Role;
-use crate::schema::{FieldInfo, Payload, Schema, StructInfo};
+use crate::schema::{Payload, StructInfo};
 
 /// Observers that can be attached to one topic at the same time.
 pub const OBSERVERS: usize = 64;
@@ -140,15 +140,7 @@ pub struct TopicEntry {
     pub name: &'static str,
     /// The name as a number, as stamps carry it.
     pub id: u32,
-    /// The payload's name across processes and languages.
-    pub type_name: &'static str,
-    /// Hash of the payload's layout.
-    pub hash: u64,
-    /// Bytes of one payload.
-    pub size: usize,
-    /// The payload's fields.
-    pub fields: &'static [FieldInfo],
-    /// How the payload lies in memory, with everything inside.
+    /// The payload's name, and how it lies in memory with everything inside.
     pub layout: StructInfo,
     /// How it is published.
     pub qos: Qos,
@@ -204,10 +196,6 @@ macro_rules! topics {
             $( TopicEntry {
                 name: $name,
                 id: <$topic as Topic>::ID,
-                type_name: <$payload as Schema>::TYPE_NAME,
-                hash: <$payload as Schema>::HASH,
-                size: size_of::<$payload>(),
-                fields: <$payload as Schema>::FIELDS,
                 layout: StructInfo::of::<$payload>(),
                 qos: <$topic as Topic>::QOS,
                 summary: $summary,
@@ -333,6 +321,7 @@ impl Request for WorldRequest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::schema::Schema;
 
     struct TypeName;
 
@@ -347,7 +336,7 @@ mod tests {
     #[test]
     fn every_topic_of_the_table_is_found_by_its_name() {
         for entry in TOPICS {
-            assert_eq!(visit(entry.name, TypeName), Ok(entry.type_name));
+            assert_eq!(visit(entry.name, TypeName), Ok(entry.layout.type_name));
         }
     }
 
@@ -363,8 +352,8 @@ mod tests {
             for other in &TOPICS[..index] {
                 assert_ne!(entry.name, other.name);
                 assert_ne!(entry.id, other.id);
-                assert_ne!(entry.type_name, other.type_name);
-                assert_ne!(entry.hash, other.hash);
+                assert_ne!(entry.layout.type_name, other.layout.type_name);
+                assert_ne!(entry.layout.hash, other.layout.hash);
             }
         }
     }

@@ -10,7 +10,7 @@ const KNOWN_BY_HAND: u64 = 50_000_000;
 
 /// How well a robot knows where it is when it sees a mark.
 const UNSURE_AT_MARK_MM: u32 = 20;
-/// What part of the way since then its odometry may be wrong by: motors differ by a tenth (`firmware/plant`).
+/// What part of the way since then its odometry may be wrong by: motors differ by a tenth.
 const UNSURE_PART: u32 = 8;
 
 /// A place in the warehouse.

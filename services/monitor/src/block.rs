@@ -537,7 +537,12 @@ mod tests {
         }
         for entry in lager_topics::TOPICS {
             let told = lager_topics::visit(entry.name, Blank).expect("a topic of the table");
-            for field in entry.fields.iter().filter(|field| field.name != "reserved") {
+            for field in entry
+                .layout
+                .fields
+                .iter()
+                .filter(|field| field.name != "reserved")
+            {
                 let (short, _) = unit(field.name);
                 assert!(told.contains(short), "{short} is missing:\n{told}");
             }

@@ -67,6 +67,7 @@ impl<W: Write> Tools<'_, W> {
         let Some(entry) = TOPICS.iter().find(|entry| entry.name == name) else {
             return self.info_of_found(name);
         };
+        let layout = entry.layout;
         let live = self
             .watchdog
             .over("looking at the topic", || {
@@ -83,7 +84,7 @@ impl<W: Write> Tools<'_, W> {
             .collect();
         let actors: Vec<String> = entry.qos.actors.iter().map(ToString::to_string).collect();
         if self.as_json {
-            let fields: Vec<_> = entry
+            let fields: Vec<_> = layout
                 .fields
                 .iter()
                 .map(|field| {
@@ -91,8 +92,8 @@ impl<W: Write> Tools<'_, W> {
                 })
                 .collect();
             let value = json!({
-                "name": name, "summary": entry.summary, "type": entry.type_name,
-                "hash": format!("{:016x}", entry.hash), "size": entry.size, "fields": fields,
+                "name": name, "summary": entry.summary, "type": layout.type_name,
+                "hash": format!("{:016x}", layout.hash), "size": layout.size, "fields": fields,
                 "buffer": entry.qos.buffer, "history": entry.qos.history, "actors": actors,
                 "publishers": publishers, "subscribers": subscribers, "woken": woken,
             });
@@ -104,11 +105,11 @@ impl<W: Write> Tools<'_, W> {
         writeln!(
             out,
             "  carries     {}, {}, schema {:016x}",
-            entry.type_name,
-            Count(entry.size, "byte"),
-            entry.hash
+            layout.type_name,
+            Count(layout.size, "byte"),
+            layout.hash
         )?;
-        for field in entry.fields {
+        for field in layout.fields {
             writeln!(
                 out,
                 "    {:4}  {:24} {}",

@@ -3,9 +3,10 @@
 //!
 //! They are observers: they poll, hold no listener and never slow the path. They know no topic,
 //! except for the sentences of some samples (`sentence.rs`). The table leads from a name to its
-//! static type; a topic that is in no table brings its description along. Each tool writes text or one JSON value a line to the writer that it is given, and
-//! says how many samples it lost. Every call into the bus is made under a watchdog, so that a tool
-//! reports a bus that does not answer and does not wait for it.
+//! static type; a topic that is in no table brings its description along. Each tool writes text or
+//! one JSON value a line to the writer that it is given, and says how many samples it lost. Every
+//! call into the bus is made under a watchdog, so that a tool reports a bus that does not answer and
+//! does not wait for it.
 
 mod block;
 mod describe;

@@ -179,6 +179,7 @@ impl Connection {
                 Ok(0) | Err(_) => {
                     self.is_deaf = true;
                     self.unread.clear();
+                    self.unread_since = now;
                 }
             }
         }
@@ -187,7 +188,8 @@ impl Connection {
     /// Why it is closed now, if its peer has taken too long over something.
     pub(crate) fn overdue(&self, now: Instant) -> Option<&'static str> {
         let over = |since: Instant, most| now.saturating_duration_since(since) > most;
-        if self.wants_to_write() && over(self.unread_since, SLOWEST) {
+        // One that takes nothing more may send on, but not for ever.
+        if (self.is_deaf || self.wants_to_write()) && over(self.unread_since, SLOWEST) {
             return Some("it does not read what it is told");
         }
         if self.begun_since.is_some_and(|since| over(since, SLOWEST)) {
@@ -229,6 +231,12 @@ mod tests {
         let hear = |line: Result<&str, LineError>| heard.push(line.expect("a line").to_owned());
         connection.read(now, hear).expect("it has said something");
         assert_eq!(heard, ["fetchprod 2"]);
+        assert!(connection.overdue(now + SLOWEST).is_none());
+        let too_long = now + SLOWEST + Duration::from_millis(1);
+        assert!(
+            connection.overdue(too_long).is_some(),
+            "it may not stay so for ever"
+        );
         let end = connection.read(now, |_| {});
         assert_eq!(
             end.expect_err("it has gone").kind(),

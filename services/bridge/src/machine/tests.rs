@@ -20,15 +20,18 @@ fn at(millis: u64) -> Moment {
     Moment { robot, ns }
 }
 
-/// A core with a steering board that has reported, in the hands of a person.
-fn core() -> BridgeCore {
-    let options = CoreOptions {
+fn options() -> CoreOptions {
+    CoreOptions {
         baud: 500_000,
         raw_line: false,
         original_boards: false,
         arm: ArmProfile::default(),
-    };
-    let mut core = BridgeCore::new(options, None);
+    }
+}
+
+/// A core with a steering board that has reported, in the hands of a person.
+fn core() -> BridgeCore {
+    let mut core = BridgeCore::new(options(), None);
     let up = Up {
         callsign: Callsign::Steering,
         version: Version::One,
@@ -209,6 +212,11 @@ fn a_robot_that_begins_by_itself_leaves_the_mode_that_somebody_has_set() {
     let mut core = self::core();
     core.switch(Mode::Manual);
     assert_eq!(done(&mut core, &begin), Mode::Manual);
+    // The bridge's successor knows that it was set.
+    let mut kept = Health::default();
+    core.fill_health(at(1_002).robot, &crate::Counts::default(), &mut kept);
+    let mut heir = BridgeCore::new(options(), Some(&kept));
+    assert_eq!(done(&mut heir, &begin), Mode::Manual);
 }
 
 #[test]
