@@ -38,6 +38,9 @@ const GIVE_UP: Duration = Duration::from_millis(20);
 /// From one truth to the next, in chip time.
 const TRUTH_PERIOD: Duration = Duration::from_millis(20);
 
+/// Both boards have sent their first bytes by then, in chip time: they start up for 65 ms.
+const FIRST_BYTES: Duration = Duration::from_millis(100);
+
 /// From one look at the EEPROMs to the next, in chip time.
 const EEPROM_PERIOD: Duration = Duration::from_millis(100);
 
@@ -121,6 +124,9 @@ pub fn run(
             eeproms.push((board, EepromFile::load(&path, rig.chip(board))?));
         }
     }
+    // Nobody follows the clock yet, so wrong images end the start, and not a robot that runs.
+    rig.run_for(FIRST_BYTES);
+    check_baud(&rig, config.rig.baud)?;
     let ports = [
         Port::create(&config.sensor_link)?,
         Port::create(&config.steering_link)?,
@@ -251,15 +257,8 @@ impl Shell {
 
     /// What has arrived at the Pi's end is handed over.
     fn speak(&mut self) -> Result<(), RunError> {
+        check_baud(&self.rig, self.baud)?;
         for board in Board::BOTH {
-            if let Some(found) = self.rig.foreign_baud(board) {
-                let wanted = self.baud;
-                return Err(RunError::Baud {
-                    board,
-                    found,
-                    wanted,
-                });
-            }
             self.bytes.clear();
             let arrived = self.rig.read(board);
             self.bytes.extend(arrived.iter().map(|(_, byte)| byte));
@@ -298,6 +297,20 @@ impl Shell {
         // An interrupted sleep is only a shorter one.
         let _ = poll(&mut fds, Some(&time));
     }
+}
+
+/// Whether both boards send at the rate of the Pi's end, as far as they have sent.
+fn check_baud(rig: &Rig, wanted: u32) -> Result<(), RunError> {
+    for board in Board::BOTH {
+        if let Some(found) = rig.foreign_baud(board) {
+            return Err(RunError::Baud {
+                board,
+                found,
+                wanted,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Writes a line of JSON to standard output.
