@@ -9,6 +9,9 @@
 //! mean counts only when a mark comes, and neither at the delivery's bar, where the line ends, nor
 //! at the next mark behind it, where the way back does. The corrections that bring the robot to its
 //! line after a turn say nothing about the sides, and a station's mark may come soon after a turn.
+//! The bias is exact to a fraction of a duty step, and is rounded up and down in turn: near the duty
+//! at which the wheels break loose, one step may be a tenth of the speed, and half a step too much
+//! bends a way without a line by 5 degrees in 150 mm.
 //! The bias is added wherever both sides should turn alike: to every correction, to turns on the
 //! spot, which would otherwise wander, and to the commands by hand.
 
@@ -22,10 +25,10 @@ use crate::{Motor, PWM_STANDARD};
 const PERIOD_US: u32 = 20_000;
 /// The mean is over 2^6 of them.
 const MEAN_BITS: u8 = 6;
-/// So many at the beginning of a following do not count: the robot comes to its line in these 2 s.
-const SETTLED: u8 = 100;
+/// So many at the beginning of a following do not count: the robot comes to its line in these 3 s.
+const SETTLED: u8 = 150;
 /// A mean counts after this many.
-const LEAST: u8 = 175;
+const LEAST: u8 = 225;
 /// The most bias, in duty steps.
 const MOST: i16 = 12;
 /// For so many words the line may look like one after tape to both sides, as the bar does that is
@@ -41,6 +44,7 @@ pub struct Sides {
     mean: i16,
     seen: u8,
     due_us: u32,
+    /// In 256ths of a duty step.
     bias: i16,
     /// The bias before the last mark.
     before: i16,
@@ -81,7 +85,7 @@ impl Sides {
                     self.pause();
                 } else if self.seen >= LEAST {
                     self.before = self.bias;
-                    self.bias = ((self.mean + 128) >> 8).clamp(-MOST, MOST);
+                    self.bias = self.mean.clamp(-MOST << 8, MOST << 8);
                     self.seen = SETTLED;
                 }
             }
@@ -108,17 +112,19 @@ impl Sides {
 
     /// The robot does not follow a line.
     pub fn pause(&mut self) {
-        self.mean = self.bias << 8;
+        self.mean = self.bias;
         self.seen = 0;
     }
 
-    /// What is added to the left side and taken from the right, in duty steps.
-    pub fn bias(&self) -> i16 {
-        self.bias
+    /// What is added to the left side and taken from the right, in duty steps: over all `round`s the
+    /// mean is exact to a 256th of a step.
+    pub fn bias(&self, round: u8) -> i16 {
+        (self.bias + i16::from(round)) >> 8
     }
 
     /// Duties that are to move both sides alike.
-    pub fn alike(&self, motors: Motors) -> Motors {
+    pub fn alike(&self, motors: Motors, round: u8) -> Motors {
+        let bias = self.bias(round);
         let with = |motor: Motor, bias: i16| Motor {
             duty: if motor.duty == PWM_STANDARD {
                 (i16::from(PWM_STANDARD) + bias) as u8
@@ -127,7 +133,7 @@ impl Sides {
             },
             ..motor
         };
-        (with(motors.0, self.bias), with(motors.1, -self.bias))
+        (with(motors.0, bias), with(motors.1, -bias))
     }
 }
 
@@ -138,6 +144,12 @@ mod tests {
     const LINE: LineState = LineState::OnLine;
     const MARK: LineState = LineState::FourWay;
 
+    /// The mean over all rounds.
+    fn bias(sides: &Sides) -> f32 {
+        let sum: i32 = (0..=255).map(|round| i32::from(sides.bias(round))).sum();
+        sum as f32 / 256.0
+    }
+
     fn follow(sides: &mut Sides, correction: i16, ms: u32, state: LineState) {
         let start_us = sides.due_us;
         for at_ms in 0..ms {
@@ -146,20 +158,39 @@ mod tests {
         }
     }
 
+    /// A mean of a second and a half has not forgotten all that was before.
+    fn assert_about(bias: f32, expected: f32) {
+        assert!((bias - expected).abs() < 0.25, "{bias} for {expected}");
+    }
+
     #[test]
     fn what_is_always_added_before_a_mark_is_learnt() {
         let mut sides = Sides::new();
-        follow(&mut sides, 4, 6_000, LINE);
-        assert_eq!(sides.bias(), 0, "it may be a curve");
+        follow(&mut sides, 4, 8_000, LINE);
+        assert_about(bias(&sides), 0.0);
         follow(&mut sides, 4, 100, MARK);
-        assert_eq!(sides.bias(), 4);
+        assert_about(bias(&sides), 4.0);
         let turning = (Motor::backward(100), Motor::forward(100));
-        let both = sides.alike(turning);
+        let both = sides.alike(turning, u8::MAX);
         assert_eq!(both, (Motor::backward(104), Motor::forward(96)));
         assert_eq!(
-            sides.alike((Motor::OFF, Motor::OFF)),
+            sides.alike((Motor::OFF, Motor::OFF), 0),
             (Motor::OFF, Motor::OFF)
         );
+    }
+
+    #[test]
+    fn a_part_of_a_step_is_learnt_and_given_as_a_mean() {
+        let mut sides = Sides::new();
+        // Three quarters of a step, as the regulator gives it.
+        for round in 0..400 {
+            let correction = i16::from(round % 4 != 0);
+            follow(&mut sides, correction, 20, LINE);
+        }
+        follow(&mut sides, 1, 100, MARK);
+        let bias = bias(&sides);
+        assert!((0.6..0.8).contains(&bias), "{bias}");
+        assert!((0..=255).all(|round| [0, 1].contains(&sides.bias(round))));
     }
 
     #[test]
@@ -167,54 +198,54 @@ mod tests {
         let mut sides = Sides::new();
         follow(&mut sides, 20, 3_000, LINE);
         follow(&mut sides, 20, 100, MARK);
-        assert_eq!(sides.bias(), 0);
+        assert_about(bias(&sides), 0.0);
         sides.pause();
         follow(&mut sides, 20, 1_900, LINE);
         follow(&mut sides, 0, 2_000, LINE);
         follow(&mut sides, 0, 100, MARK);
-        assert_eq!(sides.bias(), 0);
+        assert_about(bias(&sides), 0.0);
         sides.pause();
         follow(&mut sides, 20, 5_000, LINE);
-        follow(&mut sides, 0, 6_000, LINE);
+        follow(&mut sides, 0, 8_000, LINE);
         follow(&mut sides, 0, 100, MARK);
-        assert_eq!(sides.bias(), 0);
+        assert_about(bias(&sides), 0.0);
     }
 
     #[test]
     fn the_way_to_the_delivery_and_back_teaches_nothing() {
         let mut sides = Sides::new();
-        follow(&mut sides, 4, 6_000, LINE);
+        follow(&mut sides, 4, 8_000, LINE);
         follow(&mut sides, 4, 100, MARK);
         for _ in 0..2 {
             // A bend, the bar and its end; a bend and the corner.
-            follow(&mut sides, 20, 6_000, LINE);
+            follow(&mut sides, 20, 8_000, LINE);
             follow(&mut sides, 20, 100, MARK);
             follow(&mut sides, 20, 100, LineState::DropStation);
-            assert_eq!(sides.bias(), 4);
+            assert_about(bias(&sides), 4.0);
             sides.pause();
-            follow(&mut sides, -20, 6_000, LINE);
+            follow(&mut sides, -20, 8_000, LINE);
             follow(&mut sides, -20, 100, MARK);
-            assert_eq!(sides.bias(), 4);
+            assert_about(bias(&sides), 4.0);
         }
-        follow(&mut sides, 7, 6_000, LINE);
+        follow(&mut sides, 7, 8_000, LINE);
         follow(&mut sides, 7, 100, MARK);
-        assert_eq!(sides.bias(), 7);
+        assert_about(bias(&sides), 7.0);
     }
 
     #[test]
     fn the_bar_may_be_left_at_an_angle() {
         let mut sides = Sides::new();
-        follow(&mut sides, 20, 6_000, LINE);
+        follow(&mut sides, 20, 8_000, LINE);
         follow(&mut sides, 20, 15, LineState::StationToRight);
         follow(&mut sides, 20, 20, MARK);
-        assert_eq!(sides.bias(), MOST);
+        assert_about(bias(&sides), f32::from(MOST));
         follow(&mut sides, 20, 20, LineState::RightOfLine);
         follow(&mut sides, 20, 20, LineState::NotOnLine);
-        assert_eq!(sides.bias(), 0);
+        assert_about(bias(&sides), 0.0);
         // The corner, on the way back.
-        follow(&mut sides, -20, 6_000, LINE);
+        follow(&mut sides, -20, 8_000, LINE);
         follow(&mut sides, -20, 100, MARK);
-        assert_eq!(sides.bias(), 0);
+        assert_about(bias(&sides), 0.0);
     }
 
     #[test]
@@ -223,7 +254,7 @@ mod tests {
             let mut sides = Sides::new();
             follow(&mut sides, way * 2_000, 20_000, LINE);
             follow(&mut sides, 0, 10, MARK);
-            assert_eq!(sides.bias(), way * MOST);
+            assert_about(bias(&sides), f32::from(way * MOST));
         }
     }
 }

@@ -64,13 +64,13 @@ impl Supply {
         }
     }
 
-    /// What the drivers are given for these duties.
-    pub(crate) fn at_pins(&self, motors: Motors) -> Motors {
-        (self.scaled(motors.0), self.scaled(motors.1))
+    /// What the drivers are given for these duties: over all `round`s the mean is exact.
+    pub(crate) fn at_pins(&self, motors: Motors, round: u8) -> Motors {
+        (self.scaled(motors.0, round), self.scaled(motors.1, round))
     }
 
-    fn scaled(&self, motor: Motor) -> Motor {
-        let scaled = u16::from(motor.duty) * u16::from(self.factor) + u16::from(ONE / 2);
+    fn scaled(&self, motor: Motor, round: u8) -> Motor {
+        let scaled = u16::from(motor.duty) * u16::from(self.factor) + u16::from(round % ONE);
         Motor {
             duty: (scaled / u16::from(ONE)).min(255) as u8,
             ..motor
@@ -93,35 +93,39 @@ fn factor(mean: u16) -> u8 {
 mod tests {
     use super::*;
 
-    fn at(decivolts: u8, duty: u8) -> u8 {
+    /// The mean over all rounds.
+    fn at(decivolts: u8, duty: u8) -> f32 {
         let mut supply = Supply::new();
         for _ in 0..100 {
             supply.observe(decivolts);
         }
         let motors = (Motor::forward(duty), Motor::backward(duty));
-        let (left, right) = supply.at_pins(motors);
-        assert_eq!((left.duty, left.reverse), (right.duty, false));
-        assert!(right.reverse);
-        left.duty
+        let mut sum = 0.0;
+        for round in 0..=u8::MAX {
+            let (left, right) = supply.at_pins(motors, round);
+            assert_eq!((left.duty, left.reverse), (right.duty, false));
+            assert!(right.reverse);
+            sum += f32::from(left.duty);
+        }
+        sum / 256.0
     }
 
     #[test]
     fn a_duty_means_the_same_voltage_on_every_battery() {
-        for (decivolts, duty) in [(100, 110), (105, 105), (118, 94), (126, 88)] {
-            assert!(
-                at(decivolts, 100).abs_diff(duty) <= 1,
-                "{decivolts}: {}",
-                at(decivolts, 100)
-            );
+        for decivolts in [100, 105, 118, 126] {
+            let duty = 100.0 * 11.1 / (f32::from(decivolts) / 10.0 + 0.05);
+            let at = at(decivolts, 100);
+            // The factor has a step of a 128th.
+            assert!((at - duty).abs() <= 0.5, "{decivolts}: {at}");
         }
-        assert_eq!(at(90, 255), 255, "there is no more than all");
-        assert_eq!(at(126, 0), 0);
+        assert_eq!(at(90, 255), 255.0, "there is no more than all");
+        assert_eq!(at(126, 0), 0.0);
     }
 
     #[test]
     fn about_the_nominal_battery_and_without_one_nothing_is_corrected() {
         for decivolts in [0, 50, 110, 111, 150, 255] {
-            assert_eq!(at(decivolts, 100), 100, "{decivolts}");
+            assert_eq!(at(decivolts, 100), 100.0, "{decivolts}");
         }
     }
 
@@ -132,7 +136,7 @@ mod tests {
             supply.observe(111);
         }
         supply.observe(130);
-        let (left, _) = supply.at_pins((Motor::forward(100), Motor::OFF));
+        let (left, _) = supply.at_pins((Motor::forward(100), Motor::OFF), 0);
         assert!((98..=100).contains(&left.duty), "{}", left.duty);
     }
 }

@@ -57,11 +57,14 @@ pub struct LogicConfig {
     /// Distance of a thing between two nodes at which the robot stops before it, in cm: it must be
     /// able to turn round there.
     pub halt_cm: u8,
-    /// Distance of a thing at a node, in cm, that is too near to turn: the body's front corners
-    /// reach 192 mm from the axle, the ranger sees from 100 mm on and is 5 cm wrong there.
+    /// Distance of a thing at a node, in cm, from which there is room to turn: the body's front
+    /// corners reach 192 mm from the axle, and a ranger may tell 13 cm where 10 are left.
     pub turn_room_cm: u8,
-    /// How far the robot backs up to have room to turn, in mm. Its sensors still come over the
-    /// tape that it turns to.
+    /// How far the robot backs up for each cm that is missing, in mm; and at all, where it has not
+    /// seen what is behind it.
+    pub turn_back_mm: f32,
+    /// The most that it backs up to have room to turn, in mm from the node. Its sensors still come
+    /// over the tape that it turns to.
     pub turn_room_mm: f32,
     /// How far behind the next node a thing still blocks the way to it, in mm.
     pub beyond_node_mm: f32,
@@ -79,6 +82,8 @@ pub struct LogicConfig {
     /// How far a joint may be from the carry pose while the robot drives with goods, in servo
     /// units of 0.29 degrees.
     pub carry_tolerance: u16,
+    /// How long goods must have been in the claw for the grip to be believed.
+    pub grip_proof: Duration,
     /// How far the claw must be kept from closing to be holding something, in servo units.
     pub held_margin: u16,
     /// Battery, in tenths of a volt, below which the robot stands at the next node; 0 = none.
@@ -137,7 +142,8 @@ impl Default for LogicConfig {
             ranger_ahead_mm: 100.0,
             ranger_margin_cm: 10,
             halt_cm: 25,
-            turn_room_cm: 17,
+            turn_room_cm: 13,
+            turn_back_mm: 8.0,
             turn_room_mm: 25.0,
             beyond_node_mm: 100.0,
             ranger_lag: Duration::from_millis(100),
@@ -146,6 +152,7 @@ impl Default for LogicConfig {
             pick: Pick::Manual,
             arm: ArmProfile::default(),
             carry_tolerance: 20,
+            grip_proof: Duration::from_secs(6),
             held_margin: 40,
             low_battery_decivolts: 100,
             charged_by_decivolts: 4,

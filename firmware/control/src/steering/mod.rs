@@ -85,6 +85,9 @@ const LONGEST_SLEEP_US: u32 = 20_000;
 /// A step is put off so long while a word comes in, in microseconds, unless its last bit comes
 /// first.
 const WORD_US: u32 = 300;
+/// From one rounding of duties to the next: odd, so that all 256 come in turn, and far, so that two
+/// in a row differ.
+const ROUND_STRIDE: u8 = 157;
 
 /// What the line sensors say, as far as the wheels care.
 #[derive(Debug, Clone)]
@@ -127,6 +130,8 @@ pub struct SteeringUnit {
     motors: Option<Motors>,
     /// What the drivers were given for them.
     at_pins: Option<Motors>,
+    /// How parts of a duty step are rounded now: low to down, high to up.
+    round: u8,
     supply: Supply,
     reports: Reports,
     load: Load,
@@ -164,6 +169,7 @@ impl SteeringUnit {
             profile: config.arm.profile.values(),
             motors: None,
             at_pins: None,
+            round: 0,
             supply: Supply::new(),
             reports: Reports::new(now_us),
             load: Load::new(now_us),
@@ -253,7 +259,14 @@ impl SteeringUnit {
             let bits = LineBits::new(word);
             let reading = self.line.reader.read(bits, at_us);
             let correction = self.line.pd.update(reading.error, at_us);
-            self.line.correction = correction + self.line.sides.bias();
+            // Over a mark nothing tells where the line is, and what was last needed would bend the
+            // way by degrees: the wheels turn alike.
+            let is_mark = matches!(
+                reading.state,
+                LineState::StationToLeft | LineState::StationToRight | LineState::FourWay
+            );
+            let correction = if is_mark { 0 } else { correction };
+            self.line.correction = correction + self.line.sides.bias(self.round);
             self.line.fresh_since_us = Some(at_us);
             self.wheels.on_word(bits, at_us);
             seen = Some((reading.state, at_us));
@@ -307,19 +320,20 @@ impl SteeringUnit {
         if let Some(seq) = self.wheels.advance(may_turn, now_us) {
             self.end(seq, End::Done, now_us);
         }
+        self.round = self.round.wrapping_add(ROUND_STRIDE);
         let correction = self.line.fresh_since_us.map(|_| self.line.correction);
         let motors = if may_turn {
             let motors = self.wheels.motors(correction);
             if self.wheels.follows() {
                 motors
             } else {
-                self.line.sides.alike(motors)
+                self.line.sides.alike(motors, self.round)
             }
         } else {
             STILL
         };
         self.motors = Some(motors);
-        let at_pins = self.supply.at_pins(motors);
+        let at_pins = self.supply.at_pins(motors, self.round);
         if self.at_pins != Some(at_pins) {
             self.at_pins = Some(at_pins);
             board.set_motors(at_pins.0, at_pins.1);

@@ -2,13 +2,18 @@
 //! runs once.
 //!
 //! ```text
-//!   pick:  aim, open -> reach, close -> lift to the carry pose -> something in the claw? -> Done
-//!              ^                                                     | nothing
-//!              +----------------- aim elsewhere, five times ---------+----------> Failed
+//!   pick:  aim, open -> reach, close -> lift, hold -> to the carry pose -> something there? -> Done
+//!              ^                              | nothing                      | nothing
+//!              +-- aim elsewhere, five times -+------------------------------+-------> Failed
 //! ```
+//!
+//! What was gripped badly slips out after seconds. So the goods are held over their stand until they
+//! would have slipped: there they fall back onto it, and can be gripped better.
 //!
 //! The robot stands while the arm works. Its progress is published, so that a successor goes on
 //! with the same attempt; it repeats a move that may already have been made.
+
+use core::time::Duration;
 
 use lager_topics::{FailureKind, Finish};
 use lager_wire::{ArmCommand, ArmProfile, Command};
@@ -29,7 +34,7 @@ const REACH_ELBOW: u16 = 488;
 /// The shoulder for that.
 const REACH_SHOULDER: u16 = 311;
 /// Moves of one attempt.
-const MOVES: u8 = 8;
+const MOVES: u8 = 9;
 
 /// One move of an attempt.
 enum Move {
@@ -37,6 +42,8 @@ enum Move {
     Once(ArmCommand),
     /// Step a joint until it stands at a position.
     Bring(&'static Joint, u16),
+    /// Hold what was gripped, and see whether it stays.
+    Hold,
 }
 
 /// One joint, and the commands that step it.
@@ -97,6 +104,8 @@ pub(crate) struct ArmSequence {
     steps: u16,
     /// The step at work.
     step: Option<ArmCommand>,
+    /// When the claw was closed.
+    gripped_at: Option<Duration>,
     /// How often the step at hand has been begun anew.
     pub(crate) tries: u8,
     pub(crate) pause: Pause,
@@ -111,6 +120,7 @@ impl ArmSequence {
             moves: 0,
             steps: 0,
             step: None,
+            gripped_at: None,
             tries: 0,
             pause: Pause::Wanted,
         }
@@ -142,13 +152,16 @@ impl ArmSequence {
     }
 
     /// The order for the step has ended.
-    pub(crate) fn ended(&mut self, finish: Finish) -> Option<Outcome> {
+    pub(crate) fn ended(&mut self, finish: Finish, now: Duration) -> Option<Outcome> {
         match finish {
             Finish::None => None,
             Finish::Done if self.task == Task::Drop => Some(Outcome::Done),
             Finish::Done => {
                 let step = self.step.take();
                 self.tries = 0;
+                if step == Some(ArmCommand::Squeeze) {
+                    self.gripped_at = Some(now);
+                }
                 self.moves += u8::from(matches!(
                     step,
                     Some(ArmCommand::Release | ArmCommand::Squeeze)
@@ -172,6 +185,7 @@ impl ArmSequence {
                 return None;
             }
             self.tries += 1;
+            helm.out.status_changed = true;
             let (most, tries) = (helm.config.tries, self.tries);
             if tries > most {
                 let (most, tries) = (f32::from(most), f32::from(tries));
@@ -196,11 +210,23 @@ impl ArmSequence {
     /// Gives the next step of the attempt, or judges it.
     fn pick(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
         let (profile, arm) = (&helm.config.arm, helm.senses.arm);
+        let is_empty = arm
+            .claw_is_empty(profile, helm.config.held_margin)
+            .is_some();
+        let before = self.moves;
         while self.moves < MOVES {
             match next_move(self.moves, AIMS[usize::from(self.attempt)], profile) {
                 Move::Once(command) => {
                     self.give(command, helm);
                     return None;
+                }
+                Move::Hold if is_empty => break,
+                Move::Hold => {
+                    let gripped_at = *self.gripped_at.get_or_insert(helm.now);
+                    if helm.now.saturating_sub(gripped_at) < helm.config.grip_proof {
+                        helm.out.status_changed |= self.moves != before;
+                        return None;
+                    }
                 }
                 Move::Bring(joint, to) => {
                     if let Some(step) = joint.step_towards(to, &arm) {
@@ -218,10 +244,7 @@ impl ArmSequence {
             self.moves += 1;
             self.steps = 0;
         }
-        if arm
-            .claw_is_empty(profile, helm.config.held_margin)
-            .is_none()
-        {
+        if !is_empty {
             return Some(Outcome::Done);
         }
         let attempts = AIMS.len() as u8;
@@ -245,7 +268,8 @@ fn next_move(done: u8, aim: i16, profile: &ArmProfile) -> Move {
         3 => Move::Bring(&SHOULDER_JOINT, REACH_SHOULDER),
         4 => Move::Once(ArmCommand::Squeeze),
         5 => Move::Bring(&SHOULDER_JOINT, carry.shoulder),
-        6 => Move::Bring(&ELBOW_JOINT, carry.elbow),
+        6 => Move::Hold,
+        7 => Move::Bring(&ELBOW_JOINT, carry.elbow),
         _ => Move::Bring(&BASE_JOINT, carry.base),
     }
 }

@@ -92,6 +92,7 @@ impl Follow {
             self.step = Step::NearNode;
         }
         helm.senses.marks.clear();
+        helm.senses.free_behind = true;
         self.watched = Some(helm.now);
     }
 

@@ -34,6 +34,8 @@ pub(crate) struct Senses {
     pub(crate) distance: Option<(Duration, u8)>,
     /// When the robot last turned.
     pub(crate) turned_at: Duration,
+    /// It came along the line that it looks along, so nothing stands close behind it.
+    pub(crate) free_behind: bool,
 }
 
 impl Senses {

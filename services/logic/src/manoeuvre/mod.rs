@@ -170,11 +170,15 @@ impl Manoeuvre {
     pub(crate) fn begin(&mut self, helm: &mut Helm<'_>) {
         if let Self::Turn(turn) = self {
             let travelled_mm = helm.senses.odometer.travelled_mm;
-            let room_mm = helm.config.turn_room_mm;
+            let most_mm = match helm.senses.free_behind {
+                true => helm.config.turn_room_mm,
+                false => helm.config.turn_back_mm,
+            };
+            let back_to_mm = (travelled_mm - missing_room_mm(helm)).max(-most_mm);
             if matches!(turn.spot, Spot::Along(_)) && travelled_mm < helm.config.nearest_turn_mm() {
                 *self = Self::Retreat(helm.config.coast_mm);
-            } else if turn.spot == Spot::Node && travelled_mm > -room_mm && is_close(helm) {
-                *self = Self::Retreat(-room_mm);
+            } else if turn.spot == Spot::Node && travelled_mm > back_to_mm {
+                *self = Self::Retreat(back_to_mm);
             }
         }
         match self {
@@ -219,7 +223,7 @@ impl Manoeuvre {
     pub(crate) fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
         match self {
             Self::Turn(turn) => turn.ended(finish, helm),
-            Self::Arm(arm) => arm.ended(finish),
+            Self::Arm(arm) => arm.ended(finish, helm.now),
             Self::Search(search) => search.ended(finish, helm),
             Self::Stand | Self::Look(_) | Self::Follow(_) | Self::BackUp | Self::Retreat(_) => None,
         }
@@ -302,7 +306,8 @@ impl Manoeuvre {
             Self::Follow(follow) => follow.step = step,
             Self::Turn(turn) if ordered == Command::Wheel(WheelCommand::ManualBackward) => {
                 *self = Self::Retreat(match turn.spot {
-                    Spot::Node => -config.turn_room_mm,
+                    // It ends here, and what room there is now is looked at anew.
+                    Spot::Node => status.travelled_mm as f32,
                     Spot::Edge(_) | Spot::Along(_) => config.coast_mm,
                 });
             }
@@ -338,13 +343,16 @@ impl Manoeuvre {
     }
 }
 
-/// Whether something stands so close ahead that a corner of the body would touch it in a turn.
-fn is_close(helm: &Helm<'_>) -> bool {
+/// By how much the robot must back up for its corners to pass what stands close ahead, in mm.
+fn missing_room_mm(helm: &Helm<'_>) -> f32 {
     let Helm { senses, config, .. } = helm;
-    let has_seen = |(seen_at, cm): (Duration, u8)| {
-        seen_at > senses.turned_at
-            && helm.now.saturating_sub(seen_at) <= IN_SIGHT
-            && cm <= config.turn_room_cm
+    let is_of_now = |(seen_at, _): &(Duration, u8)| {
+        *seen_at > senses.turned_at && helm.now.saturating_sub(*seen_at) <= IN_SIGHT
     };
-    config.ranger_cm > 0 && senses.distance.is_some_and(has_seen)
+    let seen = senses.distance.filter(is_of_now);
+    let missing_cm = seen.map_or(0, |(_, cm)| config.turn_room_cm.saturating_sub(cm));
+    match config.ranger_cm {
+        0 => 0.0,
+        _ => f32::from(missing_cm) * config.turn_back_mm,
+    }
 }

@@ -139,6 +139,7 @@ impl Turn {
         *helm.heading = helm.heading.turned(spin, quarters);
         let senses = &mut *helm.senses;
         senses.odometer.turned_deg -= 90.0 * f32::from(quarters) * spin.sign();
+        senses.free_behind = false;
         if *helm.heading != self.target {
             helm.order.give_anew();
             return None;

@@ -87,6 +87,8 @@ pub(crate) struct Body {
     error: i8,
     pd: Pd,
     sides: Sides,
+    /// How the board rounds parts of a duty step now.
+    round: u8,
     after_bar: bool,
     pub(crate) autonomous: bool,
     pub(crate) stopped: bool,
@@ -131,6 +133,7 @@ impl Body {
             error: 0,
             pd: Pd::new(Gains::default()),
             sides: Sides::new(),
+            round: 0,
             after_bar: false,
             autonomous: true,
             stopped: false,
@@ -289,7 +292,16 @@ impl Body {
             self.end_work(Finish::Aborted);
         }
         let now_us = self.now.as_micros() as u32;
-        let correction = self.pd.update(self.error, now_us) + self.sides.bias();
+        self.round = self.round.wrapping_add(157);
+        let is_mark = matches!(
+            state,
+            LineState::StationToLeft | LineState::StationToRight | LineState::FourWay
+        );
+        let correction = match self.pd.update(self.error, now_us) {
+            _ if is_mark => 0,
+            correction => correction,
+        };
+        let correction = correction + self.sides.bias(self.round);
         let Some(work) = &mut self.work else {
             self.sides.pause();
             self.duties = (self.manual_duty, self.manual_duty);
@@ -305,7 +317,7 @@ impl Body {
             _ => self.sides.pause(),
         }
         let correction = f64::from(correction);
-        let bias = f64::from(self.sides.bias());
+        let bias = f64::from(self.sides.bias(self.round));
         let alike =
             |left: f64, right: f64| (left + bias * left.signum(), right - bias * right.signum());
         let age = self.now - work.since;

@@ -227,32 +227,28 @@ fn killed(mut trial: Trial, kills: impl IntoIterator<Item = (u64, u64)>) -> Tria
     trial
 }
 
-/// Two robots that will pass their delivery corner without seeing its mark. The board has learnt on
-/// a short line that the wheels are less alike than they are, so each drives beside its line and at
-/// an angle, and a mark to that side is too short for its sensors.
+/// Two robots on their way back, pushed aside so shortly before the delivery corner that they pass it
+/// without seeing its mark: on their side of the line it is too short for the sensors.
 fn beside_their_lines() -> [Trial; 2] {
-    let often = [
-        (20_075, 830),
-        (8_810, 520),
-        (23_260, 1_046),
-        (14_674, 147),
-        (5_608, 398),
-    ];
-    let once = [(3_797, 674)];
-    let robot = |size, delivery, product, gains, seed| {
+    let robot = |size, delivery, product, aside_mm: f64| {
         let map = warehouse(size, delivery, 50, &[product]);
-        let trouble = Trouble {
-            frame_ms: 10,
-            lost: 20,
-            noise: 2,
-            gains,
-        };
-        Trial::new(map, Exit::Straight(600.0), trouble, seed)
+        let mut trial = Trial::new(map, Exit::Straight(600.0), Trouble::NONE, 761);
+        trial.order(1, 1);
+        let nears_corner =
+            |trial: &Trial| trial.phase() == Phase::Returning && trial.body.x > -200.0;
+        assert!(
+            trial.run_until(Duration::from_secs(400), nears_corner),
+            "{}",
+            trial.story()
+        );
+        trial.body.y = f64::from(trial.map().delivery().y) * 500.0 + aside_mm;
+        trial
     };
     let (below, left) = ((0, 1, Side::Down), (1, 1, Side::Left));
-    let first = robot((1, 2), (0, 0), below, (1.006_673, 1.004_693), 761);
-    let second = robot((2, 2), (0, 2), left, (1.016_617, 0.991_688), 364);
-    [killed(first, often), killed(second, once)]
+    [
+        robot((1, 2), (0, 0), below, -24.0),
+        robot((2, 2), (0, 2), left, 24.0),
+    ]
 }
 
 #[test]
@@ -267,8 +263,6 @@ fn a_robot_that_has_not_seen_the_delivery_corner_drives_on_to_the_next_and_comes
 #[test]
 fn a_robot_that_has_not_seen_the_delivery_corner_says_so_where_the_way_on_is_blocked() {
     for mut trial in beside_their_lines() {
-        let on_its_way_back = |trial: &Trial| trial.phase() == Phase::Returning;
-        assert!(trial.run_until(Duration::from_secs(400), on_its_way_back));
         trial.tell(Input::Way {
             node: trial.map().delivery(),
             heading: trial.map().exit().back(),
