@@ -216,13 +216,26 @@ impl Page {
 
     /// Clicks at a place of the warehouse, in mm from node (0, 0).
     pub(crate) fn click_at_mm(&mut self, right: f64, up: f64) {
+        // A view that has just opened gives the map another size some frames later.
+        let mut at = self.place_of_mm(right, up);
+        loop {
+            std::thread::sleep(Duration::from_millis(150));
+            let now = self.place_of_mm(right, up);
+            if std::mem::replace(&mut at, now) == now {
+                break;
+            }
+        }
+        self.click_at(at);
+    }
+
+    /// Where a spot of the floor is on the page.
+    fn place_of_mm(&mut self, right: f64, up: f64) -> (f64, f64) {
         let at = self.value(&format!(
             "(() => {{ const map = document.querySelector('#map'); \
              const at = new DOMPoint({right}, -{up}).matrixTransform(map.getScreenCTM()); \
              return [at.x, at.y]; }})()"
         ));
-        let at = (at[0].as_f64().expect("x"), at[1].as_f64().expect("y"));
-        self.click_at(at);
+        (at[0].as_f64().expect("x"), at[1].as_f64().expect("y"))
     }
 
     /// Shows the page in a theme and a size.
