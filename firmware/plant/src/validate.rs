@@ -253,8 +253,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_built_is_refused_with_a_sentence() {
-        let cases: [(WarehouseError, &str); 11] = [
+        let cases: [(WarehouseError, &str); 12] = [
             (error(|w| w.size = [0, 2]), "size is 0 x 2"),
+            (error(|w| w.size = [2, 100]), "size is 2 x 100"),
             (error(|w| w.side_length_cm = 39), "side must be from 40"),
             (error(|w| w.delivery = [1, 0]), "corner of the warehouse"),
             (error(|w| w.floor.tape = 50), "floor reads 45"),

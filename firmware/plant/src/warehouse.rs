@@ -15,8 +15,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Squares along one axis, at most; it keeps a way through all nodes within 256 of them.
-pub const MAX_SQUARES: u8 = 15;
+/// Squares along one axis, at most: the robot's map has up to 100 nodes there.
+pub const MAX_SQUARES: u8 = 99;
 /// Products in one warehouse, at most.
 pub const MAX_PRODUCTS: usize = 64;
 /// Smallest side of a square in cm: the marks are 17 cm long and goods stand behind them.
