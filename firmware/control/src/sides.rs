@@ -85,7 +85,7 @@ impl Sides {
                     self.pause();
                 } else if self.seen >= LEAST {
                     self.before = self.bias;
-                    self.bias = self.mean.clamp(-MOST << 8, MOST << 8);
+                    self.bias = self.mean;
                     self.seen = SETTLED;
                 }
             }
@@ -104,7 +104,7 @@ impl Sides {
                 if self.seen <= SETTLED {
                     return;
                 }
-                let missing = (correction.clamp(-60, 60) << 8) - self.mean;
+                let missing = (correction.clamp(-MOST, MOST) << 8) - self.mean;
                 self.mean += (missing + (1 << (MEAN_BITS - 1))) >> MEAN_BITS;
             }
         }
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn what_is_always_added_before_a_mark_is_learnt() {
         let mut sides = Sides::new();
-        follow(&mut sides, 4, 8_000, LINE);
+        follow(&mut sides, 4, 10_000, LINE);
         assert_about(bias(&sides), 0.0);
         follow(&mut sides, 4, 100, MARK);
         assert_about(bias(&sides), 4.0);
@@ -206,7 +206,7 @@ mod tests {
         assert_about(bias(&sides), 0.0);
         sides.pause();
         follow(&mut sides, 20, 5_000, LINE);
-        follow(&mut sides, 0, 8_000, LINE);
+        follow(&mut sides, 0, 10_000, LINE);
         follow(&mut sides, 0, 100, MARK);
         assert_about(bias(&sides), 0.0);
     }
@@ -214,20 +214,20 @@ mod tests {
     #[test]
     fn the_way_to_the_delivery_and_back_teaches_nothing() {
         let mut sides = Sides::new();
-        follow(&mut sides, 4, 8_000, LINE);
+        follow(&mut sides, 4, 10_000, LINE);
         follow(&mut sides, 4, 100, MARK);
         for _ in 0..2 {
             // A bend, the bar and its end; a bend and the corner.
-            follow(&mut sides, 20, 8_000, LINE);
+            follow(&mut sides, 20, 10_000, LINE);
             follow(&mut sides, 20, 100, MARK);
             follow(&mut sides, 20, 100, LineState::DropStation);
             assert_about(bias(&sides), 4.0);
             sides.pause();
-            follow(&mut sides, -20, 8_000, LINE);
+            follow(&mut sides, -20, 10_000, LINE);
             follow(&mut sides, -20, 100, MARK);
             assert_about(bias(&sides), 4.0);
         }
-        follow(&mut sides, 7, 8_000, LINE);
+        follow(&mut sides, 7, 10_000, LINE);
         follow(&mut sides, 7, 100, MARK);
         assert_about(bias(&sides), 7.0);
     }
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn the_bar_may_be_left_at_an_angle() {
         let mut sides = Sides::new();
-        follow(&mut sides, 20, 8_000, LINE);
+        follow(&mut sides, 20, 10_000, LINE);
         follow(&mut sides, 20, 15, LineState::StationToRight);
         follow(&mut sides, 20, 20, MARK);
         assert_about(bias(&sides), f32::from(MOST));
@@ -243,7 +243,7 @@ mod tests {
         follow(&mut sides, 20, 20, LineState::NotOnLine);
         assert_about(bias(&sides), 0.0);
         // The corner, on the way back.
-        follow(&mut sides, -20, 8_000, LINE);
+        follow(&mut sides, -20, 10_000, LINE);
         follow(&mut sides, -20, 100, MARK);
         assert_about(bias(&sides), 0.0);
     }
