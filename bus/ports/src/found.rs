@@ -44,9 +44,17 @@ impl Found {
     /// # Errors
     /// The transport failed.
     pub fn receive(&mut self) -> Result<Option<FoundSample<'_>>, ReceiveError> {
+        Ok(self.receive_counted()?.map(|(sample, _)| sample))
+    }
+
+    /// The next sample, and how many were missed up to it.
+    pub(crate) fn receive_counted(
+        &mut self,
+    ) -> Result<Option<(FoundSample<'_>, u64)>, ReceiveError> {
         let description = &self.description;
         let taken = self.reader.receive()?;
-        Ok(taken.map(|taken| FoundSample { taken, description }))
+        let lost = self.reader.streams().lost();
+        Ok(taken.map(|taken| (FoundSample { taken, description }, lost)))
     }
 
     /// Samples missed, as [`crate::Subscriber::lost`] counts them.

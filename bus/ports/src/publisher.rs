@@ -79,6 +79,16 @@ impl<T: Topic> Publisher<T> {
         self.writer.sent()
     }
 
+    /// Sends a recorded sample with the stamp that it had: times, writer, epoch and number. For
+    /// players of recordings; readers take it for that writer's, as old as it is.
+    ///
+    /// # Errors
+    /// As [`Publisher::loan`] and [`Loan::send`].
+    pub fn replay(&self, payload: T::Payload, stamp: Stamp) -> Result<(), SendError> {
+        let loan = self.filled(payload)?;
+        self.writer.deliver_stamped(loan.lent, stamp, Ring::Actors)
+    }
+
     /// Sends with the times of an earlier sample of another writer.
     pub(crate) fn resend(&self, payload: T::Payload, original: &Stamp) -> Result<(), SendError> {
         let mut loan = self.filled(payload)?;

@@ -12,6 +12,8 @@
 //! **Invariant:** the text comes from another process and may be anything. Reading it allocates
 //! no more than the text is long, and a sample is read only if it has exactly the described size.
 
+mod json_schema;
+
 use core::fmt::{self, Write};
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -133,6 +133,88 @@ fn every_topic_of_the_table_is_described_as_it_is() {
     }
 }
 
+/// What of `value` does not fit `schema`, as far as this crate writes schemas.
+fn misfit(schema: &Value, value: &Value) -> Option<String> {
+    let is_of_type = match schema["type"].as_str().expect("a type") {
+        "object" => {
+            let Some(fields) = value.as_object() else {
+                return Some(format!("{value} is no object"));
+            };
+            let required = schema["required"].as_array().expect("names");
+            let is_there = |name: &&Value| fields.contains_key(name.as_str().expect("a name"));
+            if let Some(name) = required.iter().find(|name| !is_there(name)) {
+                return Some(format!("{name} is missing"));
+            }
+            return fields.iter().find_map(|(name, value)| {
+                let Some(schema) = schema["properties"].get(name) else {
+                    return Some(format!("{name} is in no schema"));
+                };
+                misfit(schema, value)
+            });
+        }
+        "array" => {
+            let items = value.as_array().expect("a list");
+            let most = schema["maxItems"].as_u64().expect("a length");
+            items.len() as u64 <= most
+                && items
+                    .iter()
+                    .all(|item| misfit(&schema["items"], item).is_none())
+        }
+        "integer" => {
+            let number = value.as_i64().map(i128::from);
+            let number = number.or(value.as_u64().map(i128::from));
+            let limit = |name: &str| {
+                let limit = &schema[name];
+                let number = limit.as_i64().map(i128::from);
+                number.or(limit.as_u64().map(i128::from)).expect("a limit")
+            };
+            number.is_some_and(|number| (limit("minimum")..=limit("maximum")).contains(&number))
+        }
+        "number" => value.is_number(),
+        "string" => schema["enum"].as_array().expect("names").contains(value),
+        other => panic!("no schema of ours says {other}"),
+    };
+    (!is_of_type).then(|| format!("{value} does not fit {schema}"))
+}
+
+#[test]
+fn every_topic_of_the_table_fits_its_schema() {
+    struct SchemaOf;
+    impl TopicVisitor for SchemaOf {
+        type Output = Value;
+
+        fn visit<T: Topic>(self) -> Value {
+            let description = Description::parse(&describe(&T::Payload::MAKE)).unwrap();
+            serde_json::to_value(description.json_schema()).unwrap()
+        }
+    }
+    for entry in TOPICS {
+        let schema = visit(entry.name, SchemaOf).unwrap();
+        let (own, described) = visit(entry.name, Both).unwrap();
+        assert_eq!(misfit(&schema, &own), None, "{}", entry.name);
+        assert_eq!(misfit(&schema, &described), None, "{}", entry.name);
+    }
+}
+
+#[test]
+fn a_schema_says_what_may_stand_where() {
+    let description = Description::parse(&describe(&Weather::MAKE)).unwrap();
+    let schema = serde_json::to_value(description.json_schema()).unwrap();
+    let fits = |text: &str| misfit(&schema, &serde_json::from_str(text).unwrap()).is_none();
+    assert!(fits(
+        r#"{"wind":1.5,"gusts":[{"mm_s":-32768,"sky":"Fog"}],"sky":"Clear"}"#
+    ));
+    for wrong in [
+        r#"{"wind":1.5,"gusts":[]}"#,
+        r#"{"wind":1.5,"gusts":[],"sky":"Rain"}"#,
+        r#"{"wind":"x","gusts":[],"sky":"Fog"}"#,
+        r#"{"wind":1,"gusts":[{"mm_s":32768,"sky":"Fog"}],"sky":"Fog"}"#,
+        r#"{"wind":1,"gusts":[{},{},{},{}],"sky":"Fog"}"#,
+    ] {
+        assert!(!fits(wrong), "{wrong}");
+    }
+}
+
 /// The bytes of a description that one service carries: seven of its eight attributes.
 const ROOM: usize = 7 * 256;
 

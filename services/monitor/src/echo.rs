@@ -4,12 +4,12 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::time::Instant;
 
-use lager_ports::Clock;
+use lager_ports::{Clock, Source};
 use lager_topics::{Stamp, Topic, TopicVisitor, by_id, visit};
 use serde_json::{Value, json};
 
 use crate::block::Blocks;
-use crate::source::Source;
+use crate::source::Shown;
 use crate::{Count, ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
@@ -72,7 +72,7 @@ impl<W: Write> Tools<'_, W> {
         let (mut shown, mut lost) = (0, 0);
         let mut heard = Instant::now();
         while !self.shutdown.is_requested() && count.is_none_or(|count| shown < count) {
-            let Some((stamp, payload)) = self.receive(&mut from, Source::next_as_json)? else {
+            let Some((stamp, payload)) = self.receive(&mut from, Shown)? else {
                 self.out.flush()?;
                 self.pause(heard)?;
                 continue;

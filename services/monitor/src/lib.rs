@@ -21,10 +21,10 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use lager_ports::{
-    Bus, Found, IntrospectError, PortError, ReceiveError, Shortage, Shutdown, Subscriber, Watchdog,
+    Bus, Found, IntrospectError, Look, PortError, ReceiveError, Shortage, Shutdown, Source,
+    Subscriber, Watchdog,
 };
 use lager_topics::{Topic, UnknownTopic};
-use source::Source;
 
 pub use python::write_python;
 
@@ -60,12 +60,13 @@ impl<W: Write> Tools<'_, W> {
         found.ok_or(ToolError::Unknown(unknown))
     }
 
-    fn receive<S: Source, R>(
+    fn receive<L: Look>(
         &self,
-        from: &mut S,
-        next: impl Fn(&mut S) -> Result<Option<R>, ReceiveError>,
-    ) -> Result<Option<R>, ToolError> {
-        Ok(self.watchdog.over("reading the topic", || next(from))?)
+        from: &mut impl Source,
+        look: L,
+    ) -> Result<Option<L::Output>, ToolError> {
+        let receive = || from.next(look);
+        Ok(self.watchdog.over("reading the topic", receive)?)
     }
 
     /// Waits a moment for the next sample. A subscriber that cannot reach a writer for want of

@@ -3,11 +3,11 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::Clock;
+use lager_ports::{Clock, Source};
 use lager_topics::{Stamp, Topic, TopicVisitor, visit};
 use serde_json::json;
 
-use crate::source::Source;
+use crate::source::Stamped;
 use crate::{ToolError, Tools};
 
 /// One line is printed for each window.
@@ -100,7 +100,7 @@ impl<W: Write> Tools<'_, W> {
                 if self.shutdown.is_requested() {
                     return Ok(());
                 }
-                while let Some(stamp) = self.receive(&mut from, Source::next_stamp)? {
+                while let Some(stamp) = self.receive(&mut from, Stamped)? {
                     window.add(&stamp, Clock::monotonic_ns());
                     heard = Instant::now();
                 }

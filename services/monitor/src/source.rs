@@ -1,50 +1,28 @@
-//! Where samples come from: a topic of the table, or one that brings its description along.
+//! What the tools take of a sample.
 
-use lager_ports::{Found, ReceiveError, Subscriber};
-use lager_topics::{Stamp, Topic};
+use lager_ports::Look;
+use lager_topics::Stamp;
+use serde::Serialize;
 use serde_json::{Value, to_value};
 
-/// The next sample's stamp and payload.
-type Shown = (Stamp, serde_json::Result<Value>);
+/// Its stamp and payload, for tools that show it.
+pub(crate) struct Shown;
 
-/// A reading end, whatever its payload is.
-pub(crate) trait Source {
-    /// The next sample, if there is one.
-    fn next_as_json(&mut self) -> Result<Option<Shown>, ReceiveError>;
+impl Look for Shown {
+    type Output = (Stamp, serde_json::Result<Value>);
 
-    /// The stamp of the next sample, if there is one.
-    fn next_stamp(&mut self) -> Result<Option<Stamp>, ReceiveError>;
-
-    /// Samples missed.
-    fn lost(&self) -> u64;
-}
-
-impl<T: Topic> Source for Subscriber<T> {
-    fn next_as_json(&mut self) -> Result<Option<Shown>, ReceiveError> {
-        let sample = self.receive()?;
-        Ok(sample.map(|sample| (*sample.stamp(), to_value(*sample))))
-    }
-
-    fn next_stamp(&mut self) -> Result<Option<Stamp>, ReceiveError> {
-        Ok(self.receive()?.map(|sample| *sample.stamp()))
-    }
-
-    fn lost(&self) -> u64 {
-        Self::lost(self)
+    fn look<P: Serialize>(self, stamp: &Stamp, _lost: u64, payload: &P) -> Self::Output {
+        (*stamp, to_value(payload))
     }
 }
 
-impl Source for Found {
-    fn next_as_json(&mut self) -> Result<Option<Shown>, ReceiveError> {
-        let sample = self.receive()?;
-        Ok(sample.map(|sample| (*sample.stamp(), to_value(sample.payload()))))
-    }
+/// Its stamp alone, for tools that measure.
+pub(crate) struct Stamped;
 
-    fn next_stamp(&mut self) -> Result<Option<Stamp>, ReceiveError> {
-        Ok(self.receive()?.map(|sample| *sample.stamp()))
-    }
+impl Look for Stamped {
+    type Output = Stamp;
 
-    fn lost(&self) -> u64 {
-        Self::lost(self)
+    fn look<P: Serialize>(self, stamp: &Stamp, _lost: u64, _payload: &P) -> Stamp {
+        *stamp
     }
 }

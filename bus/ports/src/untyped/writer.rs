@@ -135,7 +135,7 @@ impl Writer {
     #[inline(never)]
     pub(crate) fn deliver(
         &self,
-        mut lent: Lent,
+        lent: Lent,
         cause: Cause,
         publish_time_ns: u64,
         ring: Ring,
@@ -149,6 +149,22 @@ impl Writer {
             writer: self.writer,
             ..Stamp::default()
         });
+        self.hand_over(lent, stamp, ring)
+    }
+
+    /// Sends a sample with that stamp.
+    #[inline(never)]
+    pub(crate) fn deliver_stamped(
+        &self,
+        lent: Lent,
+        stamp: Stamp,
+        ring: Ring,
+    ) -> Result<(), SendError> {
+        self.hand_over(lent, stamp, ring)
+    }
+
+    #[inline(always)]
+    fn hand_over(&self, mut lent: Lent, stamp: Stamp, ring: Ring) -> Result<(), SendError> {
         let header = NonNull::from(lent.sample.user_header_mut()).cast::<Stamp>();
         // SAFETY: the service's header is a `Stamp` (`Kind::header`), and the loan is ours.
         unsafe { header.write(stamp) };

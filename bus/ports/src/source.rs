@@ -1,0 +1,51 @@
+//! Reading ends whatever their payload is, for tools that show or keep samples.
+
+use lager_topics::{Stamp, Topic};
+use serde::Serialize;
+
+use crate::error::ReceiveError;
+use crate::found::Found;
+use crate::subscriber::Subscriber;
+
+/// Work to be done with one sample, whose payload serde writes.
+pub trait Look {
+    /// What the work yields.
+    type Output;
+
+    /// Does it. `lost` samples were missed so far, this one's own gap included.
+    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P) -> Self::Output;
+}
+
+/// A reading end: of a topic of the table, or of one that brings its description along.
+pub trait Source {
+    /// Looks at the next sample, oldest first; `None` when there is nothing more.
+    ///
+    /// # Errors
+    /// The transport failed.
+    fn next<L: Look>(&mut self, look: L) -> Result<Option<L::Output>, ReceiveError>;
+
+    /// Samples missed, as [`Subscriber::lost`] counts them.
+    fn lost(&self) -> u64;
+}
+
+impl<T: Topic> Source for Subscriber<T> {
+    fn next<L: Look>(&mut self, look: L) -> Result<Option<L::Output>, ReceiveError> {
+        let sample = self.receive()?;
+        Ok(sample.map(|sample| look.look(sample.stamp(), Self::lost(self), &*sample)))
+    }
+
+    fn lost(&self) -> u64 {
+        Self::lost(self)
+    }
+}
+
+impl Source for Found {
+    fn next<L: Look>(&mut self, look: L) -> Result<Option<L::Output>, ReceiveError> {
+        let sample = self.receive_counted()?;
+        Ok(sample.map(|(sample, lost)| look.look(sample.stamp(), lost, &sample.payload())))
+    }
+
+    fn lost(&self) -> u64 {
+        Self::lost(self)
+    }
+}
