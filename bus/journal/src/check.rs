@@ -1,0 +1,252 @@
+//! Whether a file is what its writer wrote: every CRC, every number, and its own sums.
+//!
+//! Each topic's numbers must rise within each stream, and no more of them may be skipped than the
+//! file says were lost or dropped. That is exact in one direction only: of a stream that began
+//! before the recording nobody knows what came before its first sample.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt;
+
+use mcap::records::{ChunkIndex, Statistics};
+use serde::de::IgnoredAny;
+
+use crate::counts::{self, Count, Counts};
+use crate::envelope::Envelope;
+use crate::numbers::Numbers;
+use crate::walk::{Damage, Message, Visit};
+use crate::write::{RECORDING, Start};
+
+/// So many faults are kept; a file with more of them is not worth reading.
+const MOST: usize = 100;
+
+/// What is wrong with a file.
+#[derive(Debug)]
+pub enum Fault {
+    /// Its bytes are not what was written.
+    Damage(Damage),
+    /// Messages that the index counts are not there, or others are.
+    Statistics {
+        /// The topic.
+        topic: String,
+        /// Messages as the index has it.
+        told: u64,
+        /// Messages that are there.
+        there: u64,
+    },
+    /// The index leads to chunks that are not there, or not to all that are.
+    Index {
+        /// How many chunks are meant by only one of both.
+        chunks: usize,
+    },
+    /// A message is not JSON as the recorder writes it.
+    Message {
+        /// The topic.
+        topic: String,
+        /// Why it cannot be read.
+        why: String,
+    },
+    /// A sample's number is not above the one before it.
+    Backwards {
+        /// The topic.
+        topic: String,
+        /// The number.
+        number: u64,
+        /// The number that could come at the earliest.
+        expected: u64,
+    },
+    /// More samples are missing than the file says.
+    Missing {
+        /// The topic.
+        topic: String,
+        /// Numbers that were skipped.
+        gaps: u64,
+        /// Samples that the file says were lost or dropped.
+        told: u64,
+    },
+    /// It does not say what was lost.
+    NoCounts,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Damage(damage) => damage.fmt(formatter),
+            Self::Statistics { topic, told, there } => write!(
+                formatter,
+                "{topic}: the index says {told} messages, and {there} are there"
+            ),
+            Self::Index { chunks } => {
+                write!(formatter, "the index is wrong about {chunks} chunks")
+            }
+            Self::Message { topic, why } => {
+                write!(formatter, "{topic}: a message is not readable: {why}")
+            }
+            Self::Backwards {
+                topic,
+                number,
+                expected,
+            } => write!(
+                formatter,
+                "{topic}: number {number} comes where {expected} or a greater one should"
+            ),
+            Self::Missing { topic, gaps, told } => write!(
+                formatter,
+                "{topic}: {gaps} samples are missing, and the file says {told}"
+            ),
+            Self::NoCounts => write!(formatter, "it does not say what was lost"),
+        }
+    }
+}
+
+/// What was found of one topic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TopicReport {
+    /// Messages that are there.
+    pub messages: u64,
+    /// Numbers that were skipped between them.
+    pub gaps: u64,
+    /// What the file says.
+    pub count: Option<Count>,
+}
+
+/// What was found.
+#[derive(Debug, Default)]
+pub struct Report {
+    /// Whether `lager bag record` or `recover` wrote the file; numbers of others are not looked at.
+    pub is_ours: bool,
+    /// By topic.
+    pub topics: BTreeMap<String, TopicReport>,
+    /// Chunks that are whole.
+    pub chunks: u64,
+    /// What is wrong, as far as it was kept.
+    pub faults: Vec<Fault>,
+    /// How much is wrong.
+    pub faults_found: u64,
+}
+
+/// Looks at a file that a [`crate::Walk`] goes through.
+#[derive(Debug, Default)]
+pub struct Check {
+    report: Report,
+    start: Option<Start>,
+    counts: Option<Counts>,
+    numbers: BTreeMap<String, Numbers>,
+    /// Names and messages of the topics, by their numbers in the file.
+    channels: HashMap<u16, (String, u64)>,
+    chunks: HashSet<u64>,
+    indexed: HashSet<u64>,
+    statistics: Option<Statistics>,
+}
+
+impl Check {
+    /// Of which robot the file is.
+    pub fn start(&self) -> Option<&Start> {
+        self.start.as_ref()
+    }
+
+    /// What was found, when the walk is over.
+    pub fn finish(mut self) -> Report {
+        for (name, numbers) in std::mem::take(&mut self.numbers) {
+            let count = self.counts.as_ref().and_then(|counts| counts.get(&name));
+            let count = count.copied();
+            let told = count.unwrap_or_default().missing();
+            if self.counts.is_some() && numbers.gaps > told {
+                self.fault(Fault::Missing {
+                    topic: name.clone(),
+                    gaps: numbers.gaps,
+                    told,
+                });
+            }
+            let topic = self.report.topics.entry(name).or_default();
+            (topic.gaps, topic.count) = (numbers.gaps, count);
+        }
+        let is_whole = self.report.faults.is_empty();
+        if is_whole && self.report.is_ours && self.counts.is_none() {
+            self.fault(Fault::NoCounts);
+        }
+        self.compare_with_index();
+        self.report
+    }
+
+    /// An index that was not reached is not compared.
+    fn compare_with_index(&mut self) {
+        let Some(statistics) = self.statistics.take() else {
+            return;
+        };
+        for (id, (topic, there)) in std::mem::take(&mut self.channels) {
+            let told = statistics.channel_message_counts.get(&id).copied();
+            let told = told.unwrap_or_default();
+            if told != there {
+                self.fault(Fault::Statistics { topic, told, there });
+            }
+        }
+        let chunks = self.chunks.symmetric_difference(&self.indexed).count();
+        if chunks > 0 {
+            self.fault(Fault::Index { chunks });
+        }
+    }
+
+    fn fault(&mut self, fault: Fault) {
+        self.report.faults_found += 1;
+        if self.report.faults.len() < MOST {
+            self.report.faults.push(fault);
+        }
+    }
+}
+
+impl Visit for Check {
+    fn message(&mut self, message: &Message<'_>) {
+        let name = &message.topic.name;
+        let topic = self.report.topics.entry(name.clone()).or_default();
+        topic.messages += 1;
+        let channel = self.channels.entry(message.channel);
+        channel.or_insert_with(|| (name.clone(), 0)).1 += 1;
+        if !self.report.is_ours {
+            return;
+        }
+        let fault = match serde_json::from_slice::<Envelope<IgnoredAny>>(message.data) {
+            Ok(envelope) => {
+                let numbers = self.numbers.entry(name.clone()).or_default();
+                let noted = numbers.note(&envelope.stamp, envelope.lost, envelope.dropped);
+                noted.err().map(|backwards| Fault::Backwards {
+                    topic: name.clone(),
+                    number: envelope.stamp.sequence,
+                    expected: backwards.expected,
+                })
+            }
+            Err(error) => Some(Fault::Message {
+                topic: name.clone(),
+                why: error.to_string(),
+            }),
+        };
+        if let Some(fault) = fault {
+            self.fault(fault);
+        }
+    }
+
+    fn note(&mut self, name: &str, texts: &BTreeMap<String, String>) {
+        if name == RECORDING {
+            self.report.is_ours = true;
+            self.start = Some(Start::of_texts(texts));
+        } else if name == counts::NAME {
+            self.counts = Some(counts::of_texts(texts));
+        }
+    }
+
+    fn chunk(&mut self, at: u64) {
+        self.report.chunks += 1;
+        self.chunks.insert(at);
+    }
+
+    fn chunk_index(&mut self, index: &ChunkIndex) {
+        self.indexed.insert(index.chunk_start_offset);
+    }
+
+    fn statistics(&mut self, statistics: &Statistics) {
+        self.statistics = Some(statistics.clone());
+    }
+
+    fn damage(&mut self, damage: Damage) {
+        self.fault(Fault::Damage(damage));
+    }
+}

@@ -1,0 +1,77 @@
+//! One message: a sample's stamp and payload, and what its topic lacks before it.
+
+use std::collections::BTreeMap;
+
+use lager_topics::{Description, Field, Stamp, describe};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+/// A message. `P` is anything that serde writes or reads as a payload.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Envelope<P> {
+    /// The sample's stamp, as its writer sent it.
+    pub stamp: Stamp,
+    /// Samples of this topic that never reached the recorder, since it began.
+    pub lost: u64,
+    /// Samples of this topic that the recorder had no time for, since it began.
+    pub dropped: u64,
+    /// The sample.
+    pub payload: P,
+}
+
+/// The schema of a topic's messages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EnvelopeSchema {
+    /// The payload's name, such as `LineFrame`.
+    pub name: String,
+    /// JSON Schema (2020-12).
+    pub text: Vec<u8>,
+}
+
+impl EnvelopeSchema {
+    /// Of a topic whose payload is laid out like this.
+    ///
+    /// # Panics
+    /// Never: a schema is always JSON.
+    pub fn of(payload: &Description) -> Self {
+        let stamp = Description::parse(&describe(&Stamp::MAKE)).expect("our own stamp");
+        let count = json!({"type": "integer", "minimum": 0});
+        let schema = json!({
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": payload.name(),
+            "type": "object",
+            "properties": {
+                "stamp": as_value(&stamp), "lost": count, "dropped": count,
+                "payload": as_value(payload),
+            },
+            "required": ["stamp", "lost", "dropped", "payload"],
+        });
+        Self {
+            name: payload.name().to_owned(),
+            text: schema.to_string().into_bytes(),
+        }
+    }
+}
+
+impl EnvelopeSchema {
+    /// Whether messages of a topic with the schema `text` are read and written as these are.
+    pub fn fits(&self, text: &[u8]) -> bool {
+        let parsed = |text| serde_json::from_slice::<serde_json::Value>(text).ok();
+        // Two builds may write the same members in another order.
+        parsed(text).is_some_and(|other| parsed(&self.text) == Some(other))
+    }
+}
+
+fn as_value(description: &Description) -> serde_json::Value {
+    serde_json::to_value(description.json_schema()).expect("a schema is JSON")
+}
+
+/// The channel's metadata: what a stranger wants to know of the times in it.
+pub(crate) fn channel_notes() -> BTreeMap<String, String> {
+    [(
+        "times",
+        "stamp: ns of CLOCK_MONOTONIC; log and publish time: ns since 1970",
+    )]
+    .map(|(name, text)| (name.to_owned(), text.to_owned()))
+    .into()
+}

@@ -1,0 +1,141 @@
+//! A new file of what is whole in another one that was cut off or damaged.
+//!
+//! Every chunk whose CRC is right is copied, message by message, and the new file gets an index, its
+//! counts and an end. The old file is not touched. Whoever uses this reads the new file again with a
+//! [`crate::Check`] before it says that anything was saved.
+
+use std::collections::{BTreeMap, HashMap};
+
+use serde::de::IgnoredAny;
+
+use crate::counts::{self, Counts};
+use crate::envelope::{Envelope, EnvelopeSchema};
+use crate::numbers::Numbers;
+use crate::walk::{Damage, Message, Visit};
+use crate::write::{Channel, Journal, RECORDING, Start, WriteError};
+
+/// What was recovered.
+#[derive(Debug, Default)]
+pub struct Recovered {
+    /// Messages that were copied.
+    pub messages: u64,
+    /// Chunks that were copied.
+    pub chunks: u64,
+    /// What is wrong with the old file; empty if nothing is.
+    pub damage: Vec<Damage>,
+}
+
+/// Makes the new file of the old one that a [`crate::Walk`] goes through, the second time: the
+/// first learns the topics, should the chunk that names them be damaged.
+#[derive(Default)]
+pub struct Recovery {
+    journal: Option<Journal>,
+    start: Start,
+    channels: HashMap<u16, Channel>,
+    numbers: BTreeMap<String, Numbers>,
+    counts: Option<Counts>,
+    recovered: Recovered,
+    failed: Option<WriteError>,
+}
+
+impl Recovery {
+    /// Moves the new file's bytes that are ready to the end of `into`.
+    pub fn take(&mut self, into: &mut Vec<u8>) {
+        if let Some(journal) = &mut self.journal {
+            journal.take(into);
+        }
+    }
+
+    /// The last bytes of the new file, and what is in it. No bytes mean that the old file is no
+    /// recording of ours, or that nothing of it is left.
+    ///
+    /// # Errors
+    /// A message cannot be packed again.
+    pub fn finish(mut self) -> Result<(Vec<u8>, Recovered), WriteError> {
+        if let Some(failed) = self.failed {
+            return Err(failed);
+        }
+        let Some(journal) = self.journal.take() else {
+            return Ok((Vec::new(), self.recovered));
+        };
+        // What the old file says itself is right as long as all of it was copied.
+        let lacks =
+            |damage: &Damage| matches!(damage, Damage::Chunk { .. } | Damage::Nameless { .. });
+        let told = self
+            .counts
+            .filter(|_| !self.recovered.damage.iter().any(lacks));
+        let counts = told.unwrap_or_else(|| {
+            let numbers = self.numbers.iter();
+            let is_first = self.start.part == 0;
+            numbers
+                .map(|(name, numbers)| (name.clone(), numbers.count(is_first)))
+                .collect()
+        });
+        Ok((journal.end(&counts)?, self.recovered))
+    }
+
+    fn copy(&mut self, message: &Message<'_>) -> Result<(), WriteError> {
+        let Some(journal) = &mut self.journal else {
+            return Ok(());
+        };
+        // Whoever wrote another message than the recorder gets it back, and no number is counted.
+        let envelope = serde_json::from_slice::<Envelope<IgnoredAny>>(message.data);
+        let stamp = envelope.map(|envelope| {
+            let numbers = self.numbers.entry(message.topic.name.clone()).or_default();
+            // A number that is not above the last one stays as it is; `check` tells.
+            let _ = numbers.note(&envelope.stamp, envelope.lost, envelope.dropped);
+            envelope.stamp.sequence
+        });
+        let channel = match self.channels.get(&message.channel) {
+            Some(channel) => *channel,
+            None => {
+                let schema = EnvelopeSchema {
+                    name: message.topic.schema.clone(),
+                    text: message.topic.schema_text.clone(),
+                };
+                let channel = journal.topic(&message.topic.name, &schema)?;
+                self.channels.insert(message.channel, channel);
+                channel
+            }
+        };
+        let number = stamp.unwrap_or_default();
+        journal.write(channel, message.times, number, message.data)?;
+        self.recovered.messages += 1;
+        Ok(())
+    }
+
+    fn note_failure(&mut self, done: Result<(), WriteError>) {
+        if let Err(error) = done {
+            self.failed.get_or_insert(error);
+        }
+    }
+}
+
+impl Visit for Recovery {
+    fn message(&mut self, message: &Message<'_>) {
+        let copied = self.copy(message);
+        self.note_failure(copied);
+    }
+
+    fn note(&mut self, name: &str, texts: &BTreeMap<String, String>) {
+        if name == counts::NAME {
+            self.counts = Some(counts::of_texts(texts));
+        } else if name == RECORDING && self.journal.is_none() {
+            self.start = Start::of_texts(texts);
+            match Journal::begin(&self.start) {
+                Ok(journal) => self.journal = Some(journal),
+                Err(error) => self.note_failure(Err(error)),
+            }
+        }
+    }
+
+    fn chunk(&mut self, _at: u64) {
+        let flushed = self.journal.as_mut().map_or(Ok(()), Journal::flush);
+        self.note_failure(flushed);
+        self.recovered.chunks += 1;
+    }
+
+    fn damage(&mut self, damage: Damage) {
+        self.recovered.damage.push(damage);
+    }
+}

@@ -1,0 +1,317 @@
+//! A file read from its first byte to its last, without its index.
+//!
+//! Bytes come in pieces of any size. A chunk is opened and its CRC compared before any message of it
+//! is handed on, so a message that comes out is as it was written. A chunk that is damaged is told,
+//! and the walk goes on behind it.
+//!
+//! The topics' names stand in a file's first chunk and again in its index. So if the first chunk is
+//! damaged, a second walk that has [`Learnt`] from the first knows them.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
+
+use mcap::records::{ChunkIndex, MessageHeader, Record, Statistics, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{MAGIC, McapError};
+
+use crate::write::Times;
+
+/// Longer records are taken for damage.
+const LONGEST: usize = 256 << 20;
+/// Bytes of an operation code and a length in front of each record.
+const PREFIX: u64 = 9;
+
+/// What is wrong with a file's bytes.
+#[derive(Debug)]
+pub enum Damage {
+    /// It does not begin as MCAP does.
+    NotMcap,
+    /// It ends before its end.
+    Cut {
+        /// Bytes from the start that are whole.
+        whole: u64,
+    },
+    /// A chunk cannot be opened.
+    Chunk {
+        /// Where it begins, in bytes.
+        at: u64,
+        /// Why.
+        why: McapError,
+    },
+    /// A chunk has messages of topics whose names stood in a chunk that is damaged.
+    Nameless {
+        /// Where it begins, in bytes.
+        at: u64,
+        /// How many.
+        messages: u64,
+    },
+    /// What follows cannot be read.
+    Record {
+        /// Where it begins, in bytes.
+        at: u64,
+        /// Why.
+        why: McapError,
+    },
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotMcap => write!(formatter, "it is not an MCAP file"),
+            Self::Cut { whole } => write!(
+                formatter,
+                "it was cut off: {whole} bytes are whole, and the end is missing"
+            ),
+            Self::Chunk { at, why } => {
+                write!(formatter, "the chunk at byte {at} is damaged: {why}")
+            }
+            Self::Nameless { at, messages } => write!(
+                formatter,
+                "the chunk at byte {at} has {messages} messages of topics whose names are lost"
+            ),
+            Self::Record { at, why } => {
+                write!(formatter, "what stands at byte {at} is damaged: {why}")
+            }
+        }
+    }
+}
+
+/// A topic of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// The schema's name; empty without one.
+    pub schema: String,
+    /// The schema.
+    pub schema_text: Vec<u8>,
+}
+
+/// A message as it stands in a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Message<'a> {
+    /// The topic's number in the file.
+    pub channel: u16,
+    /// The topic.
+    pub topic: &'a Topic,
+    /// When it was.
+    pub times: Times,
+    /// The message.
+    pub data: &'a [u8],
+}
+
+/// What is told of a file on the way.
+pub trait Visit {
+    /// A message of a chunk that is whole.
+    fn message(&mut self, message: &Message<'_>);
+    /// A metadata record.
+    fn note(&mut self, name: &str, texts: &BTreeMap<String, String>);
+    /// All messages of a chunk have been handed on.
+    fn chunk(&mut self, _at: u64) {}
+    /// What the index says of a chunk.
+    fn chunk_index(&mut self, _index: &ChunkIndex) {}
+    /// What the index says of all.
+    fn statistics(&mut self, _statistics: &Statistics) {}
+    /// A chunk that is not readable, or why the walk ends here.
+    fn damage(&mut self, damage: Damage);
+}
+
+/// A walk through one file.
+pub struct Walk {
+    reader: LinearReader,
+    known: Learnt,
+    at: u64,
+    /// Over all bytes up to here. The reader has such a CRC too, and stops when it is wrong.
+    crc: crc32fast::Hasher,
+    is_over: bool,
+}
+
+/// The topics of a file, as far as a walk has met them.
+#[derive(Clone, Debug, Default)]
+pub struct Learnt {
+    schemas: HashMap<u16, (String, Vec<u8>)>,
+    topics: HashMap<u16, Topic>,
+    /// Messages since the last chunk whose topic is not known.
+    nameless: u64,
+}
+
+impl Default for Walk {
+    fn default() -> Self {
+        Self::knowing(Learnt::default())
+    }
+}
+
+impl Walk {
+    /// A walk through a file of which another walk has learnt the topics.
+    pub fn knowing(known: Learnt) -> Self {
+        let options = LinearReaderOptions::default()
+            .with_emit_chunks(true)
+            .with_validate_summary_section_crc(true)
+            .with_check_finishes_after_end_magic(true)
+            .with_record_length_limit(LONGEST);
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(MAGIC);
+        Self {
+            reader: LinearReader::new_with_options(options),
+            known,
+            at: MAGIC.len() as u64,
+            crc,
+            is_over: false,
+        }
+    }
+
+    /// Takes the next bytes of the file.
+    pub fn feed(&mut self, bytes: &[u8], visit: &mut impl Visit) {
+        if bytes.is_empty() || self.is_over {
+            return;
+        }
+        self.reader.insert(bytes.len()).copy_from_slice(bytes);
+        self.reader.notify_read(bytes.len());
+        self.go_on(visit);
+    }
+
+    /// The file ends here. Returns what was learnt of its topics.
+    pub fn finish(mut self, visit: &mut impl Visit) -> Learnt {
+        if !self.is_over {
+            self.reader.notify_read(0);
+            self.go_on(visit);
+        }
+        self.known
+    }
+
+    fn go_on(&mut self, visit: &mut impl Visit) {
+        loop {
+            match self.reader.next_event() {
+                Some(Ok(LinearReadEvent::ReadRequest(_))) => return,
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
+                    let at = self.at;
+                    self.at += PREFIX + data.len() as u64;
+                    let saved = data_crc(opcode, data);
+                    let calculated = self.crc.clone().finalize();
+                    if let Some(saved) = saved.filter(|saved| ![0, calculated].contains(saved)) {
+                        let why = McapError::BadDataCrc { saved, calculated };
+                        visit.damage(Damage::Record { at, why });
+                    }
+                    self.crc.update(&[opcode]);
+                    self.crc.update(&(data.len() as u64).to_le_bytes());
+                    self.crc.update(data);
+                    if opcode == op::CHUNK {
+                        self.known.tell_chunk(at, data, visit);
+                        continue;
+                    }
+                    match mcap::parse_record(opcode, data) {
+                        Ok(record) => self.known.tell(record, visit),
+                        // Its length was right, or what follows is no record and ends the walk.
+                        Err(why) => visit.damage(Damage::Record { at, why }),
+                    }
+                }
+                Some(Err(why)) => {
+                    visit.damage(match why {
+                        McapError::BadMagic if self.at == MAGIC.len() as u64 => Damage::NotMcap,
+                        McapError::UnexpectedEof => Damage::Cut { whole: self.at },
+                        why => Damage::Record { at: self.at, why },
+                    });
+                    break;
+                }
+                None => break,
+            }
+        }
+        self.is_over = true;
+    }
+}
+
+impl Learnt {
+    /// Hands on the chunk that stands at `at`.
+    fn tell_chunk(&mut self, at: u64, chunk: &[u8], visit: &mut impl Visit) {
+        if let Err(why) = self.open(chunk, visit) {
+            visit.damage(Damage::Chunk { at, why });
+            return;
+        }
+        let messages = std::mem::take(&mut self.nameless);
+        if messages > 0 {
+            visit.damage(Damage::Nameless { at, messages });
+        }
+        visit.chunk(at);
+    }
+
+    /// Hands on a record outside of chunks.
+    fn tell(&mut self, record: Record<'_>, visit: &mut impl Visit) {
+        match record {
+            Record::Metadata(note) => visit.note(&note.name, &note.metadata),
+            Record::ChunkIndex(index) => visit.chunk_index(&index),
+            Record::Statistics(statistics) => visit.statistics(&statistics),
+            other => self.tell_content(&other, visit),
+        }
+    }
+
+    /// Hands on what is in a chunk, once its CRC is right.
+    ///
+    /// A reader of its own opens it, since only one that compares the CRC beforehand takes no
+    /// length of a damaged chunk at its word.
+    fn open(&mut self, chunk: &[u8], visit: &mut impl Visit) -> Result<(), McapError> {
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LONGEST);
+        let mut reader = LinearReader::new_with_options(options);
+        let length = (chunk.len() as u64).to_le_bytes();
+        let record = [&[op::CHUNK][..], &length, chunk].concat();
+        reader.insert(record.len()).copy_from_slice(&record);
+        reader.notify_read(record.len());
+        loop {
+            match reader.next_event() {
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
+                    self.tell_content(&mcap::parse_record(opcode, data)?, visit);
+                }
+                // All of the chunk is there, so a wish for more comes after its end.
+                Some(Ok(LinearReadEvent::ReadRequest(_))) | None => return Ok(()),
+                Some(Err(error)) => return Err(error),
+            }
+        }
+    }
+
+    /// Hands on what may stand in a chunk, and in files of other programs outside of one.
+    fn tell_content(&mut self, record: &Record<'_>, visit: &mut impl Visit) {
+        match record {
+            Record::Schema { header, data } => {
+                let schema = (header.name.clone(), data.to_vec());
+                self.schemas.insert(header.id, schema);
+            }
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id).cloned();
+                let (schema, schema_text) = schema.unwrap_or_default();
+                let topic = Topic {
+                    name: channel.topic.clone(),
+                    schema,
+                    schema_text,
+                };
+                self.topics.insert(channel.id, topic);
+            }
+            Record::Message { header, data } => self.tell_message(header, data, visit),
+            _ => {}
+        }
+    }
+
+    fn tell_message(&mut self, header: &MessageHeader, data: &[u8], visit: &mut impl Visit) {
+        let Some(topic) = self.topics.get(&header.channel_id) else {
+            self.nameless += 1;
+            return;
+        };
+        visit.message(&Message {
+            channel: header.channel_id,
+            topic,
+            times: Times {
+                log: header.log_time,
+                publish: header.publish_time,
+            },
+            data,
+        });
+    }
+}
+
+/// The CRC that the end of the data has of all before it; 0 means that it has none.
+fn data_crc(opcode: u8, record: &[u8]) -> Option<u32> {
+    let saved = record.first_chunk().filter(|_| opcode == op::DATA_END)?;
+    Some(u32::from_le_bytes(*saved))
+}

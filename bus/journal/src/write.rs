@@ -1,0 +1,293 @@
+//! Writing a file: samples in, bytes out.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io::{self, Seek, SeekFrom, Write};
+use std::rc::Rc;
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Compression, McapError, WriteOptions};
+
+use crate::counts::{self, Counts};
+use crate::envelope::{EnvelopeSchema, channel_notes};
+
+/// The metadata record that says what a file is of.
+pub(crate) const RECORDING: &str = "lager.recording";
+/// MCAP's word for who laid out the channels.
+const PROFILE: &str = "lager";
+/// How schemas are written.
+const SCHEMA_ENCODING: &str = "jsonschema";
+/// How messages are written.
+const MESSAGE_ENCODING: &str = "json";
+
+/// Bytes of an operation code and a length in front of each record.
+const PREFIX: u64 = 9;
+/// Bytes of one topic in `lager.counts` besides its name: two lengths, and three numbers in JSON.
+const COUNT: u64 = 8 + 110;
+
+/// What a file is of.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Start {
+    /// The robot's name.
+    pub robot: String,
+    /// Which file of the recording this is, from 0.
+    pub part: u32,
+    /// What a reader adds to a stamp's time to get ns since 1970.
+    pub unix_offset_ns: i64,
+}
+
+impl Start {
+    pub(crate) fn to_texts(&self) -> BTreeMap<String, String> {
+        [
+            ("robot", self.robot.clone()),
+            ("part", self.part.to_string()),
+            ("unix_offset_ns", self.unix_offset_ns.to_string()),
+        ]
+        .map(|(name, text)| (name.to_owned(), text))
+        .into()
+    }
+
+    /// What is not readable is blank.
+    pub(crate) fn of_texts(texts: &BTreeMap<String, String>) -> Self {
+        let text = |name: &str| texts.get(name).map_or("", String::as_str);
+        Self {
+            robot: text("robot").to_owned(),
+            part: text("part").parse().unwrap_or_default(),
+            unix_offset_ns: text("unix_offset_ns").parse().unwrap_or_default(),
+        }
+    }
+}
+
+/// A topic within one file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Channel(u16);
+
+/// When a sample was, in ns since 1970.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Times {
+    /// Where it stands in the recording.
+    pub log: u64,
+    /// When its writer published it.
+    pub publish: u64,
+}
+
+/// Why something cannot stand in a file.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The format numbers its topics with 16 bits.
+    #[error("a recording has at most 65535 topics; record fewer with --topic")]
+    TooManyTopics,
+    /// It cannot be packed.
+    #[error("the recording cannot be packed: {0}")]
+    Format(McapError),
+}
+
+impl From<McapError> for WriteError {
+    fn from(error: McapError) -> Self {
+        match error {
+            McapError::TooManyChannels | McapError::TooManySchemas => Self::TooManyTopics,
+            other => Self::Format(other),
+        }
+    }
+}
+
+/// One file that is being written. Bytes come out of [`Journal::take`] in their order.
+pub struct Journal {
+    out: Out,
+    writer: mcap::Writer<Out>,
+    /// Bytes of schemas and channels, which the end repeats.
+    described: u64,
+    /// Bytes of the names of all topics.
+    names: u64,
+    topics: u64,
+    /// Bytes of the chunks' indexes, which stand at the end.
+    indexes: u64,
+    chunk: Chunk,
+}
+
+/// The chunk that is open.
+#[derive(Default)]
+struct Chunk {
+    /// Bytes before packing.
+    bytes: u64,
+    messages: u64,
+}
+
+impl Journal {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// Never in practice: the beginning can always be packed.
+    pub fn begin(start: &Start) -> Result<Self, WriteError> {
+        let out = Out::default();
+        let writer = WriteOptions::new()
+            .profile(PROFILE)
+            .library(concat!("lager ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Lz4))
+            // A chunk ends where the caller says so.
+            .chunk_size(None)
+            // A chunk is packed as a whole before it comes out.
+            .disable_seeking(true)
+            .create(out.clone())?;
+        let mut journal = Self {
+            out,
+            writer,
+            described: 0,
+            names: 0,
+            topics: 0,
+            indexes: 0,
+            chunk: Chunk::default(),
+        };
+        journal.note(RECORDING, start.to_texts())?;
+        Ok(journal)
+    }
+
+    /// Adds a topic. It stands in the chunk that is open, or in the next.
+    ///
+    /// # Errors
+    /// There are too many.
+    pub fn topic(&mut self, name: &str, schema: &EnvelopeSchema) -> Result<Channel, WriteError> {
+        let id = self
+            .writer
+            .add_schema(&schema.name, SCHEMA_ENCODING, &schema.text)?;
+        let notes = channel_notes();
+        let channel = self
+            .writer
+            .add_channel(id, name, MESSAGE_ENCODING, &notes)?;
+        let notes: usize = notes.iter().map(|(a, b)| 8 + a.len() + b.len()).sum();
+        let described =
+            2 * PREFIX + 64 + (schema.name.len() + schema.text.len() + name.len() + notes) as u64;
+        self.described += described;
+        self.chunk.bytes += described;
+        self.names += name.len() as u64;
+        self.topics += 1;
+        Ok(Channel(channel))
+    }
+
+    /// Adds a message to the chunk that is open, or begins one.
+    ///
+    /// # Errors
+    /// Never in practice: any bytes can be packed.
+    pub fn write(
+        &mut self,
+        channel: Channel,
+        times: Times,
+        sequence: u64,
+        message: &[u8],
+    ) -> Result<(), WriteError> {
+        let header = MessageHeader {
+            channel_id: channel.0,
+            // MCAP has 32 bits; the whole number stands in the stamp.
+            sequence: sequence as u32,
+            log_time: times.log,
+            publish_time: times.publish,
+        };
+        self.writer.write_to_known_channel(&header, message)?;
+        self.chunk.bytes += PREFIX + 22 + message.len() as u64;
+        self.chunk.messages += 1;
+        Ok(())
+    }
+
+    /// Ends the chunk that is open. Its bytes can then be taken, and survive whatever follows.
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn flush(&mut self) -> Result<(), WriteError> {
+        if self.chunk.bytes > 0 {
+            self.writer.flush()?;
+            self.chunk = Chunk::default();
+            self.indexes += self.index();
+        }
+        Ok(())
+    }
+
+    /// Moves all bytes that are ready to the end of `into`.
+    pub fn take(&mut self, into: &mut Vec<u8>) {
+        into.append(&mut self.out.0.borrow_mut().ready);
+    }
+
+    /// Bytes of the file so far, without the chunk that is open.
+    pub fn length(&self) -> u64 {
+        self.out.0.borrow().length
+    }
+
+    /// Bytes in the chunk that is open, before they are packed.
+    pub fn open(&self) -> u64 {
+        self.chunk.bytes
+    }
+
+    /// How many bytes the file grows at the most, if `more` bytes of messages are added to the chunk
+    /// that is open and the file is then ended. A message is no shorter than a stamp in JSON, so a
+    /// chunk's index is shorter than the chunk.
+    pub fn room(&self, more: u64) -> u64 {
+        let chunk = self.chunk.bytes + more;
+        // LZ4 adds one byte in 255 to what it cannot pack; the index has 16 bytes for a message.
+        let packed = 2 * chunk + 1024;
+        packed + self.indexes + self.index() + self.end_without_indexes()
+    }
+
+    /// Ends the file with `counts`, its index and its CRCs, and returns the last bytes.
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn end(mut self, counts: &Counts) -> Result<Vec<u8>, WriteError> {
+        self.flush()?;
+        self.note(counts::NAME, counts::to_texts(counts))?;
+        self.writer.finish()?;
+        let mut last = Vec::new();
+        self.take(&mut last);
+        Ok(last)
+    }
+
+    fn note(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result<(), WriteError> {
+        let name = name.to_owned();
+        self.writer.write_metadata(&Metadata { name, metadata })?;
+        Ok(())
+    }
+
+    /// The bytes of one chunk's index at the end.
+    fn index(&self) -> u64 {
+        PREFIX + 80 + 10 * self.topics
+    }
+
+    fn end_without_indexes(&self) -> u64 {
+        let counts = PREFIX + 32 + self.names + COUNT * self.topics;
+        let statistics = PREFIX + 64 + 10 * self.topics;
+        // Two metadata indexes, six offsets, end of data, footer and magic.
+        counts + self.described + statistics + 2 * (PREFIX + 40) + 6 * (PREFIX + 17) + 64
+    }
+}
+
+/// Where the bytes wait until they are taken; clones share it.
+#[derive(Clone, Default)]
+struct Out(Rc<RefCell<Waiting>>);
+
+#[derive(Default)]
+struct Waiting {
+    ready: Vec<u8>,
+    /// All bytes that ever came, taken or not.
+    length: u64,
+}
+
+impl Write for Out {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut waiting = self.0.borrow_mut();
+        waiting.ready.extend_from_slice(bytes);
+        waiting.length += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Out {
+    /// Tells the position, and nothing else: what has been taken cannot be changed.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match to {
+            SeekFrom::Current(0) => Ok(self.0.borrow().length),
+            _ => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+}
