@@ -41,6 +41,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["lager-ports", "lager-topics", "lager-wire"],
     ),
     ("lager-monitor", &["lager-ports", "lager-topics"]),
+    (
+        "lager-recorder",
+        &["lager-journal", "lager-ports", "lager-topics"],
+    ),
     // The robot's side of the lines, between the network and the bus.
     (
         "lager-comm",
@@ -89,6 +93,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "lager-bridge",
             "lager-logic",
             "lager-monitor",
+            "lager-recorder",
             "lager-simulator",
             "lager-benches",
         ],

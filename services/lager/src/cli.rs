@@ -1,5 +1,6 @@
 //! The command line: every subcommand, flag and example. No behaviour lives here.
 
+mod bag;
 pub mod help;
 mod realtime;
 mod values;
@@ -11,6 +12,7 @@ use clap::{Args, Parser, Subcommand};
 use lager_benches::{Mode, Regime};
 use lager_wire::OperatorCommand;
 
+pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
 
 pub use values::Fetch;
@@ -31,6 +33,7 @@ use crate::steer::Place;
   lager up --realtime 20 --lock-memory --core bridge=0 --core logic=1
   lager simulate --seeds 1..20 --warehouse large --mission 1,2 --obstacles 4
   lager topic echo link/health
+  lager bag record
   lager bench hop --quick
   lager drive follow-forward
 
@@ -116,6 +119,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Look at any topic of the bus
     Topic(TopicArgs),
+    /// Record the bus, and look at recordings, mend and play them
+    Bag(BagArgs),
     /// Measure the bus on this machine, beside its baselines in the same run
     Bench(BenchArgs),
     /// Steer by hand in manual mode, renewed until it is done or Ctrl-C

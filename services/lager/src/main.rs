@@ -7,6 +7,7 @@
 )]
 
 mod attend;
+mod bag;
 mod bench;
 mod cli;
 mod comm;
@@ -215,6 +216,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             topic(&config, args, cli.global.name.is_none(), &patience()?)?;
             return Ok(ExitCode::SUCCESS);
         }
+        Command::Bag(args) => return bag::run(&config, args, &shutdown),
         Command::Bench(args) => {
             // It has a bus of its own and gives up by itself; on Ctrl-C it takes the time to sweep.
             cut_short::say_so()?;

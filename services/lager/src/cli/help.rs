@@ -32,7 +32,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "gag",
         ],
     ),
-    ("Look at it", &["topic"]),
+    ("Look at it", &["topic", "bag"]),
     ("Measure", &["bench"]),
     ("Set up and mend", &["doctor", "config"]),
     (

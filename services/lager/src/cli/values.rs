@@ -20,6 +20,8 @@ use crate::config::{BAUD_RATES, SPEEDS};
 const LONGEST_DRIVE_S: f64 = 86_400.0;
 /// The longest virtual time of `lager simulate`, in seconds: a year.
 const LONGEST_RUN_S: u64 = 365 * 86_400;
+/// How many times as fast as it was recorded a recording is played.
+const RATES: RangeInclusive<f64> = 0.01..=100.0;
 
 /// A host and a port.
 pub fn address(text: &str) -> Result<String, String> {
@@ -215,6 +217,44 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// How large a file may become, in MiB.
+pub fn split_size(text: &str) -> Result<u64, String> {
+    whole(text, 1..=1 << 20, "a file has from 1 MiB to 1048576 MiB")
+}
+
+/// How many samples may wait.
+pub fn queue(text: &str) -> Result<usize, String> {
+    whole(
+        text,
+        1..=10_000_000,
+        "a queue has from 1 to 10000000 samples",
+    )
+}
+
+/// How many times as fast as it was recorded.
+pub fn rate(text: &str) -> Result<f64, String> {
+    let rate: f64 = text.parse().map_err(said)?;
+    if RATES.contains(&rate) {
+        Ok(rate)
+    } else {
+        Err(format!(
+            "a recording is played from {} to {} times as fast as it was recorded",
+            RATES.start(),
+            RATES.end()
+        ))
+    }
+}
+
+/// A moment of a recording, in seconds from its begin.
+pub fn moment(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(said)?;
+    if (0.0..=LONGEST_RUN_S as f64).contains(&seconds) {
+        Ok(seconds)
+    } else {
+        Err("give the seconds from the recording's begin, 0 or more".to_owned())
+    }
+}
+
 /// A whole number within `range`, or `rule`.
 fn whole<T: FromStr + PartialOrd>(
     text: &str,
@@ -284,6 +324,13 @@ mod tests {
             (&["gains", "1", "256"], "0 to 255"),
             (&["bench", "hop", "--runs", "-2"], "one run"),
             (&["--name", "R 1", "stop"], "only a-z"),
+            (&["bag", "record", "--topic", "sensor/lime"], "sensor/line"),
+            (&["bag", "record", "--split-size", "0"], "from 1 MiB"),
+            (&["bag", "record", "--split-time", "-1"], "more than 0"),
+            (&["bag", "record", "--queue", "0"], "from 1 to"),
+            (&["bag", "play", "x.mcap", "--rate", "0"], "0.01 to 100"),
+            (&["bag", "play", "x.mcap", "--from", "-1"], "0 or more"),
+            (&["bag", "play", "x.mcap", "--to", "nan"], "0 or more"),
         ] {
             let told = refusal(words);
             assert!(told.contains(said), "{words:?}: {told}");

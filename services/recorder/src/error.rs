@@ -1,0 +1,86 @@
+//! Why a recording ends.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use lager_journal::WriteError;
+use lager_ports::{IntrospectError, PortError, ReceiveError};
+
+use crate::disk::is_full;
+
+/// Why a recording ended early or did not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// There is such a file.
+    #[error("{} is there already; choose another name, or move it away", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No file can be made there.
+    #[error("cannot make {}: {error}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// There is no room for a file.
+    #[error("there is no room for {}; make room, or record onto another disk", path.display())]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is no room for more.
+    #[error(
+        "the disk is full; {} ends here and is whole. Make room, or record fewer topics with --topic",
+        path.display()
+    )]
+    Full {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file cannot be written.
+    #[error(
+        "cannot write {}: {error}; `lager bag recover` saves what is on the disk",
+        path.display()
+    )]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// A message cannot be packed.
+    #[error(transparent)]
+    Pack(#[from] WriteError),
+    /// A sample could not be put into JSON.
+    #[error("cannot put a sample into JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A topic cannot be opened.
+    #[error(transparent)]
+    Open(#[from] PortError),
+    /// A topic cannot be read.
+    #[error(transparent)]
+    Receive(ReceiveError),
+    /// The bus cannot be looked at.
+    #[error(transparent)]
+    Look(#[from] IntrospectError),
+    /// Nothing will come any more.
+    #[error("the bus was damaged and has been cleared since this began; start it again")]
+    Cleared,
+    /// There is no thread for the file.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+}
+
+impl RecordError {
+    pub(crate) fn create(path: &Path, error: io::Error) -> Self {
+        let path = path.to_owned();
+        match error.kind() {
+            io::ErrorKind::AlreadyExists => Self::Exists { path },
+            _ if is_full(&error) => Self::NoRoom { path },
+            _ => Self::Create { path, error },
+        }
+    }
+}

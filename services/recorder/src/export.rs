@@ -1,0 +1,170 @@
+//! `bag export --csv`: a table for each topic, for spreadsheets and scripts.
+//!
+//! A row is a message. Fields within fields are joined by dots, as in `failure.kind`; a list is one
+//! cell, as JSON. The first columns are the stamp's.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use lager_journal::{Envelope, Selection, Times};
+use serde_json::Value;
+
+use crate::bag::{Bag, BagError};
+
+/// The columns in front of the payload's.
+const STAMP: &str = "unix_ns,sequence,writer,epoch,source_time_ns,publish_time_ns,lost,dropped";
+
+/// Writes a table for each of `topics`, or of all if none are given, into the folder `to`, and names
+/// them.
+///
+/// # Errors
+/// The file cannot be read, has no such topic or is not ours, or a table cannot be written.
+pub fn export_csv(
+    file: &Path,
+    topics: &[String],
+    to: &Path,
+    out: &mut impl Write,
+) -> Result<(), BagError> {
+    let bag = Bag::open(file)?;
+    let overview = bag.overview()?;
+    bag.must_have(&overview, topics)?;
+    let selection = Selection {
+        topics: (!topics.is_empty()).then(|| topics.to_vec()),
+        ..Selection::default()
+    };
+    let mut tables: BTreeMap<String, Table<BufWriter<File>>> = BTreeMap::new();
+    fs::create_dir_all(to).map_err(|error| failed(to, error))?;
+    bag.ordered(&overview, &selection, |topic, times, message| {
+        if !tables.contains_key(topic) {
+            let path = to.join(format!("{}.csv", topic.replace('/', "-")));
+            let file = File::create(&path).map_err(|error| failed(&path, error))?;
+            let table = Table {
+                file: BufWriter::new(file),
+                columns: Vec::new(),
+                rows: 0,
+            };
+            tables.insert(topic.to_owned(), table);
+        }
+        let table = tables.get_mut(topic).expect("just made");
+        let written = table.row(times, message);
+        written.map_err(|error| failed(to, error))?;
+        Ok::<bool, BagError>(true)
+    })?;
+    for (topic, mut table) in tables {
+        table.file.flush().map_err(|error| failed(to, error))?;
+        let path = to.join(format!("{}.csv", topic.replace('/', "-")));
+        writeln!(out, "{}: {} rows", path.display(), table.rows)?;
+    }
+    Ok(())
+}
+
+fn failed(path: &Path, error: io::Error) -> BagError {
+    let path = path.to_owned();
+    BagError::Write { path, error }
+}
+
+struct Table<W> {
+    file: W,
+    /// The payload's columns, each as the names that lead there.
+    columns: Vec<Vec<String>>,
+    rows: u64,
+}
+
+impl<W: Write> Table<W> {
+    fn row(&mut self, times: Times, message: &[u8]) -> io::Result<()> {
+        let Envelope {
+            stamp,
+            lost,
+            dropped,
+            payload,
+        } = serde_json::from_slice::<Envelope<Value>>(message)?;
+        if self.rows == 0 {
+            columns(&payload, &mut Vec::new(), &mut self.columns);
+            write!(self.file, "{STAMP}")?;
+            for column in &self.columns {
+                write!(self.file, ",{}", cell(&column.join(".")))?;
+            }
+            writeln!(self.file)?;
+        }
+        write!(
+            self.file,
+            "{},{},{},{},{},{},{lost},{dropped}",
+            times.log,
+            stamp.sequence,
+            stamp.writer,
+            stamp.epoch,
+            stamp.source_time_ns,
+            stamp.publish_time_ns
+        )?;
+        for column in &self.columns {
+            let value = column
+                .iter()
+                .try_fold(&payload, |value, name| value.get(name));
+            let text = match value {
+                None | Some(Value::Null) => String::new(),
+                Some(Value::String(text)) => cell(text),
+                Some(value) => cell(&value.to_string()),
+            };
+            write!(self.file, ",{text}")?;
+        }
+        writeln!(self.file)?;
+        self.rows += 1;
+        Ok(())
+    }
+}
+
+/// The ways to every value that is made of no fields.
+fn columns(value: &Value, way: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                way.push(name.clone());
+                columns(value, way, found);
+                way.pop();
+            }
+        }
+        _ => found.push(way.clone()),
+    }
+}
+
+/// A cell, in quotes if it needs them.
+fn cell(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_become_columns_and_lists_cells() {
+        let mut table = Table {
+            file: Vec::new(),
+            columns: Vec::new(),
+            rows: 0,
+        };
+        let stamp = r#"{"sequence":7,"source_time_ns":1,"cause_publish_time_ns":0,
+            "cause_receive_time_ns":0,"publish_time_ns":2,"epoch":3,"writer":4,"cause_topic":0}"#;
+        for payload in [
+            r#"{"a":{"b":1,"c":"x, y"},"list":[1,2],"d":-0.5}"#,
+            r#"{"a":{"b":2,"c":"\""},"list":[],"d":null}"#,
+        ] {
+            let message =
+                format!(r#"{{"stamp":{stamp},"lost":5,"dropped":6,"payload":{payload}}}"#);
+            let times = Times { log: 9, publish: 9 };
+            table.row(times, message.as_bytes()).unwrap();
+        }
+        assert_eq!(
+            String::from_utf8(table.file).unwrap(),
+            "unix_ns,sequence,writer,epoch,source_time_ns,publish_time_ns,lost,dropped,a.b,a.c,list,d\n\
+             9,7,4,3,1,2,5,6,1,\"x, y\",\"[1,2]\",-0.5\n\
+             9,7,4,3,1,2,5,6,2,\"\"\"\",[],\n"
+        );
+    }
+}

@@ -1,0 +1,45 @@
+//! The recorder: what is on the bus into a file, and what is in a file back onto a bus or into text.
+//!
+//! ```text
+//!   bus ──polls──> listener ──queue──> keeper ──> file            (record)
+//!   file ──> info, check, recover, export
+//!   file ──> player ──> bus of a robot that is not up             (play)
+//! ```
+//!
+//! It is an observer: it polls, wakes nobody and is woken by nobody, and costs a writer one queue
+//! entry. The structure of a file is `lager-journal`'s; here are threads, clocks and files.
+//!
+//! **What is lost is counted, and where.** A sample may be overwritten before the listener looks
+//! (lost, from the stamps), or find the queue full because the disk is slow (dropped). Both stand in
+//! each message and in the file's counts.
+//!
+//! **What survives.** The keeper ends a chunk and calls `fdatasync` five times a second. A recorder
+//! that is killed loses at most what came since, and its file needs `lager bag recover`. On a full
+//! disk the file is ended in room that was reserved beforehand, so it is whole.
+//!
+//! **A player moves nothing.** See `play.rs`.
+
+mod bag;
+mod clock;
+mod config;
+mod disk;
+mod error;
+mod export;
+mod keeper;
+mod listener;
+mod look;
+mod part;
+mod play;
+mod record;
+mod recover;
+mod tally;
+
+pub use bag::BagError;
+pub use config::{RecordConfig, Split};
+pub use error::RecordError;
+pub use export::export_csv;
+pub use lager_journal::utc;
+pub use look::{check, info};
+pub use play::{PlayConfig, PlayError, Stamps, play};
+pub use record::{LiveCount, Progress, Recorded, record};
+pub use recover::recover;

@@ -1,0 +1,238 @@
+//! The thread that polls the bus: it takes samples out of it as JSON, and queues them.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use lager_journal::{Envelope, EnvelopeSchema, Times};
+use lager_ports::{Bus, Clock, Layout, Look, PortError, ReceiveError, Source, Watchdog};
+use lager_topics::{
+    Description, Field, Make, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, describe, visit,
+};
+use serde::Serialize;
+
+use crate::clock::to_unix;
+use crate::error::RecordError;
+use crate::tally::{Item, QueueIn, Topic, Topics};
+
+/// So many samples of one topic are taken before the next topic has its turn.
+const TURN: usize = 1_024;
+
+/// Everything that is listened to.
+pub(crate) struct Listener<'a> {
+    pub(crate) bus: &'a Bus,
+    pub(crate) watchdog: &'a Watchdog,
+    pub(crate) topics: Topics,
+    /// Topics that are wanted; empty for all.
+    pub(crate) wanted: &'a [String],
+    pub(crate) times: Timing,
+    pub(crate) queue: QueueIn,
+    pub(crate) feeds: Vec<Box<dyn Feed>>,
+    /// Topics that are listened to, or cannot be.
+    pub(crate) known: BTreeSet<String>,
+}
+
+/// How stamps become times of the file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timing {
+    /// What is added to a stamp's time to get ns since 1970.
+    pub(crate) offset_ns: i64,
+    /// When the recording began, by the stamps' clock.
+    pub(crate) began_ns: u64,
+}
+
+impl Timing {
+    fn of(self, stamp: &Stamp) -> Times {
+        let now = Clock::monotonic_ns().max(self.began_ns);
+        let log = stamp.publish_time_ns.clamp(self.began_ns, now);
+        Times {
+            log: to_unix(log, self.offset_ns),
+            publish: to_unix(stamp.publish_time_ns, self.offset_ns),
+        }
+    }
+}
+
+/// A topic that is listened to.
+pub(crate) trait Feed {
+    /// Queues what has come.
+    fn drain(&mut self, queue: &QueueIn) -> Result<(), RecordError>;
+}
+
+impl Listener<'_> {
+    fn wants(&self, name: &str) -> bool {
+        self.wanted.is_empty() || self.wanted.iter().any(|wanted| wanted == name)
+    }
+
+    /// Opens the topics of the table, whether somebody writes them yet or not. Returns why some of
+    /// them cannot be recorded; one that was asked for by name is an error.
+    pub(crate) fn open_table(&mut self) -> Result<Vec<String>, RecordError> {
+        let mut refused = Vec::new();
+        for entry in TOPICS {
+            if !self.wants(entry.name) {
+                continue;
+            }
+            self.known.insert(entry.name.to_owned());
+            let opened = visit(entry.name, Open { listener: self });
+            match opened.expect("a topic of the table") {
+                Ok(feed) => self.feeds.push(feed),
+                Err(error) if self.wanted.is_empty() => {
+                    refused.push(format!("{} is not recorded: {error}", entry.name));
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(refused)
+    }
+
+    /// Opens topics of other people's that have come. Returns why some cannot be recorded.
+    pub(crate) fn look_for_more(&mut self) -> Result<Vec<String>, RecordError> {
+        let mut refused = Vec::new();
+        let look = || self.bus.topics();
+        for topic in self.watchdog.over("listing the topics", look)? {
+            let is_new = topic.robot == *self.bus.robot()
+                && topic.entry.is_none()
+                && self.wants(&topic.name)
+                && !self.known.contains(&topic.name);
+            if !is_new {
+                continue;
+            }
+            let name = topic.name;
+            self.known.insert(name.clone());
+            if topic.layout != Layout::Described {
+                refused.push(format!(
+                    "{name} is not recorded: it does not say how its samples are laid out"
+                ));
+                continue;
+            }
+            let open = || self.bus.found(&name);
+            match self.watchdog.over("opening the topic", open) {
+                Ok(Some(found)) => {
+                    let schema = EnvelopeSchema::of(found.description());
+                    let feed = self.feed(found, &name, schema);
+                    self.feeds.push(feed);
+                }
+                // It went while it was looked at, and may come back.
+                Ok(None) => {
+                    self.known.remove(&name);
+                }
+                Err(error) => refused.push(format!("{name} is not recorded: {error}")),
+            }
+        }
+        Ok(refused)
+    }
+
+    /// Topics that were asked for and are not there.
+    pub(crate) fn absent(&self) -> Vec<String> {
+        let wanted = self.wanted.iter();
+        let absent = wanted.filter(|name| !self.known.contains(*name));
+        absent.cloned().collect()
+    }
+
+    /// Queues what has come on every topic.
+    pub(crate) fn drain(&mut self) -> Result<(), RecordError> {
+        self.watchdog.enter("reading the topics");
+        let drained = self
+            .feeds
+            .iter_mut()
+            .try_for_each(|feed| feed.drain(&self.queue));
+        self.watchdog.leave();
+        drained
+    }
+
+    fn feed<S: Source + 'static>(
+        &self,
+        from: S,
+        name: &str,
+        schema: EnvelopeSchema,
+    ) -> Box<dyn Feed> {
+        let (place, topic) = self.topics.add(Topic::new(name, schema));
+        Box::new(FeedOf {
+            from,
+            place,
+            topic,
+            times: self.times,
+        })
+    }
+}
+
+struct Open<'a, 'b> {
+    listener: &'a Listener<'b>,
+}
+
+impl TopicVisitor for Open<'_, '_> {
+    type Output = Result<Box<dyn Feed>, PortError>;
+
+    fn visit<T: TableTopic>(self) -> Self::Output {
+        let listener = self.listener;
+        let open = || listener.bus.subscriber::<T>();
+        let from = listener.watchdog.over("opening the topic", open)?;
+        Ok(listener.feed(from, T::NAME, schema(&T::Payload::MAKE)))
+    }
+}
+
+/// The schema of a topic of the table, by the same way as that of any other topic.
+fn schema(make: &Make) -> EnvelopeSchema {
+    let description = Description::parse(&describe(make)).expect("our own description");
+    EnvelopeSchema::of(&description)
+}
+
+struct FeedOf<S> {
+    from: S,
+    place: usize,
+    topic: Arc<Topic>,
+    times: Timing,
+}
+
+impl<S: Source> Feed for FeedOf<S> {
+    fn drain(&mut self, queue: &QueueIn) -> Result<(), RecordError> {
+        for _ in 0..TURN {
+            let packing = Packing {
+                place: self.place,
+                dropped: self.topic.count().dropped,
+                times: self.times,
+            };
+            let Some(item) = self.from.next(packing).map_err(received)? else {
+                break;
+            };
+            self.topic.receive();
+            if !queue.put(item?) {
+                self.topic.drop_one();
+            }
+        }
+        self.topic.lose(self.from.lost());
+        Ok(())
+    }
+}
+
+fn received(error: ReceiveError) -> RecordError {
+    RecordError::Receive(error)
+}
+
+/// Makes an item of a sample.
+struct Packing {
+    place: usize,
+    dropped: u64,
+    times: Timing,
+}
+
+impl Look for Packing {
+    type Output = Result<Item, RecordError>;
+
+    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P) -> Self::Output {
+        let mut message = Vec::with_capacity(512);
+        let envelope = Envelope {
+            stamp: *stamp,
+            lost,
+            dropped: self.dropped,
+            payload,
+        };
+        serde_json::to_writer(&mut message, &envelope)?;
+        Ok(Item {
+            topic: self.place,
+            times: self.times.of(stamp),
+            sequence: stamp.sequence,
+            lost,
+            dropped: self.dropped,
+            message,
+        })
+    }
+}

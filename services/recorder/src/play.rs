@@ -1,0 +1,313 @@
+//! `bag play`: a recording onto the bus of a robot that is not up.
+//!
+//! **A player never moves a robot.** While it plays it holds the locks of that robot's supervisor
+//! and of its bridge, which alone writes to the boards. So it refuses a robot that is up, and none
+//! of that name can be started until it ends. It also refuses a topic that somebody else writes,
+//! because readers would see two worlds at once. Programs that only read may run: they see the
+//! recording as if the robot were there.
+//!
+//! Stamps are new unless told otherwise, so that what looks at a sample's age sees a living robot.
+//! With the recorded ones readers see writer, number and times of then. Those times are of the
+//! machine's clock since its start: after a restart of the machine they may lie ahead, and readers
+//! count no losses in such a stream.
+//!
+//! Topics that are in no table of this build are not played, since nothing here can write them.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use lager_journal::{Envelope, EnvelopeSchema, Overview, Selection, TopicOverview};
+use lager_ports::{
+    Bus, Cause, IntrospectError, LockError, PortError, Publisher, SendError, Shutdown, Watchdog,
+};
+use lager_topics::{Description, Make, Role, TOPICS, Topic, TopicVisitor, describe, visit};
+
+use crate::bag::{Bag, BagError};
+
+/// How long readers get to find the player before its first sample, and to take the last ones.
+const MEET: Duration = Duration::from_millis(300);
+/// How often the wish to end is looked at, and late readers get the states.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Which stamps samples get.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stamps {
+    /// The player's own, as of now.
+    #[default]
+    New,
+    /// Those of the recording.
+    Recorded,
+}
+
+/// What is played and how.
+#[derive(Clone, Debug)]
+pub struct PlayConfig {
+    /// The recording.
+    pub file: PathBuf,
+    /// Names of topics; empty for all that this build can write.
+    pub topics: Vec<String>,
+    /// How many times as fast as it was recorded.
+    pub rate: f64,
+    /// Begin anew at the end, until somebody wishes the end.
+    pub repeat: bool,
+    /// Where to begin, from the recording's begin.
+    pub from: Duration,
+    /// Where to end, from the recording's begin.
+    pub to: Option<Duration>,
+    /// Which stamps.
+    pub stamps: Stamps,
+}
+
+/// Why a recording cannot be played.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Bag(#[from] BagError),
+    /// The robot is up, or another player plays onto its name.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// Somebody else writes a topic.
+    #[error(
+        "{topic} of robot `{robot}` is written by {writer}; end that one, or play onto another \
+         robot's name with --name, or play other topics with --topic"
+    )]
+    Written {
+        /// The topic.
+        topic: String,
+        /// The robot.
+        robot: String,
+        /// Who writes it.
+        writer: String,
+    },
+    /// Samples of then do not fit into samples of now.
+    #[error(
+        "{topic} was recorded by another build, whose samples have other fields; play it with that \
+         build, or play other topics with --topic"
+    )]
+    Layout {
+        /// The topic.
+        topic: String,
+    },
+    /// None of what was asked for can be played.
+    #[error("there is nothing to play: {why}")]
+    Nothing {
+        /// Why.
+        why: String,
+    },
+    /// A message is not readable.
+    #[error("{topic}: a message is not readable ({error}); `lager bag check` says more")]
+    Message {
+        /// The topic.
+        topic: String,
+        /// Why.
+        error: serde_json::Error,
+    },
+    /// A topic cannot be opened.
+    #[error(transparent)]
+    Open(#[from] PortError),
+    /// A sample cannot be sent.
+    #[error(transparent)]
+    Send(#[from] SendError),
+    /// The bus cannot be looked at.
+    #[error(transparent)]
+    Look(#[from] IntrospectError),
+}
+
+/// What was played.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Played {
+    /// Samples.
+    pub samples: u64,
+    /// Whether it came to the end, rather than to somebody's wish.
+    pub is_done: bool,
+}
+
+/// Plays until the end, or until `shutdown` is requested. `begun` is told once what is not played.
+///
+/// # Errors
+/// The file cannot be read, the robot is up, or somebody else writes one of the topics.
+pub fn play(
+    bus: &Bus,
+    watchdog: &Watchdog,
+    shutdown: &Shutdown,
+    config: &PlayConfig,
+    begun: &mut dyn FnMut(&[String]),
+) -> Result<Played, PlayError> {
+    let bag = Bag::open(&config.file)?;
+    let overview = bag.overview()?;
+    bag.must_have(&overview, &config.topics)?;
+    let selection = select(config, &overview)?;
+    let robot = bus.robot();
+    // Held until the last sample is out. A bridge that is just ending is waited for.
+    let _name = bus.place().lock_name(robot)?;
+    let _bridge = bus.place().lock(robot, Role::Bridge)?;
+    let wanted = selection.topics.as_deref().unwrap_or_default();
+    watchdog.over("looking at the topics", || must_be_free(bus, wanted))?;
+    let mut writers: BTreeMap<&str, Box<dyn Writer>> = BTreeMap::new();
+    for name in wanted {
+        let open = || visit(name, Open { bus });
+        let writer = watchdog.over("opening the topic", open);
+        writers.insert(name, writer.expect("a topic of the table")?);
+    }
+    let here = |topic: &&TopicOverview| !wanted.contains(&topic.name);
+    let others: Vec<_> = overview.topics.iter().filter(here).collect();
+    let asked =
+        |topic: &&&TopicOverview| config.topics.is_empty() || config.topics.contains(&topic.name);
+    let others = others.iter().filter(asked).map(|topic| topic.name.clone());
+    begun(&others.collect::<Vec<_>>());
+
+    let mut played = Played::default();
+    let pace = Pace {
+        shutdown,
+        writers: &mut writers,
+    };
+    if !pace.rest_until(Instant::now() + MEET) {
+        return Ok(played);
+    }
+    loop {
+        let begun = Instant::now();
+        let mut first = None;
+        let mut is_done = true;
+        bag.ordered(&overview, &selection, |topic, times, message| {
+            let first = *first.get_or_insert(times.log);
+            let after = Duration::from_nanos(times.log.saturating_sub(first));
+            is_done = pace.rest_until(begun + after.div_f64(config.rate));
+            if !is_done {
+                return Ok(false);
+            }
+            if let Some(writer) = pace.writers.get_mut(topic) {
+                let send = || writer.send(message, config.stamps);
+                watchdog.over("publishing a sample", send)?;
+                played.samples += 1;
+            }
+            Ok::<bool, PlayError>(true)
+        })?;
+        if first.is_none() {
+            let why = "no sample lies between --from and --to".to_owned();
+            return Err(PlayError::Nothing { why });
+        }
+        played.is_done = is_done;
+        if !is_done || !config.repeat {
+            break;
+        }
+    }
+    pace.rest_until(Instant::now() + MEET);
+    Ok(played)
+}
+
+/// The topics that are played, all of this build's table, and the times between which.
+fn select(config: &PlayConfig, overview: &Overview) -> Result<Selection, PlayError> {
+    let in_table = |name: &str| TOPICS.iter().find(|entry| entry.name == name);
+    let mut topics = Vec::new();
+    for topic in &overview.topics {
+        let is_wanted = config.topics.is_empty() || config.topics.contains(&topic.name);
+        let Some(entry) = in_table(&topic.name).filter(|_| is_wanted) else {
+            continue;
+        };
+        let make = Make::Record(entry.layout);
+        let description = Description::parse(&describe(&make)).expect("our own description");
+        if !EnvelopeSchema::of(&description).fits(&topic.schema_text) {
+            let topic = topic.name.clone();
+            return Err(PlayError::Layout { topic });
+        }
+        topics.push(topic.name.clone());
+    }
+    if topics.is_empty() {
+        let why = "it has no topic that this build can write".to_owned();
+        return Err(PlayError::Nothing { why });
+    }
+    let at = |time: Duration| overview.begin_ns.saturating_add(time.as_nanos() as u64);
+    Ok(Selection {
+        topics: Some(topics),
+        from_ns: Some(at(config.from)),
+        before_ns: config.to.map(at),
+    })
+}
+
+fn must_be_free(bus: &Bus, wanted: &[String]) -> Result<(), PlayError> {
+    bus.sweep();
+    for topic in bus.topics_of(bus.robot()) {
+        let Some(writer) = topic
+            .writers
+            .first()
+            .filter(|_| wanted.contains(&topic.name))
+        else {
+            continue;
+        };
+        let role = writer
+            .role
+            .map_or("a stranger".to_owned(), |role| role.to_string());
+        return Err(PlayError::Written {
+            topic: topic.name,
+            robot: bus.robot().to_string(),
+            writer: format!("{role}, process {}", writer.pid),
+        });
+    }
+    Ok(())
+}
+
+/// A topic that is played.
+trait Writer {
+    fn send(&mut self, message: &[u8], stamps: Stamps) -> Result<(), PlayError>;
+
+    /// Gives readers that have come the last value of a state.
+    fn tick(&self);
+}
+
+impl<T: Topic> Writer for Publisher<T> {
+    fn send(&mut self, message: &[u8], stamps: Stamps) -> Result<(), PlayError> {
+        let envelope: Envelope<T::Payload> =
+            serde_json::from_slice(message).map_err(|error| PlayError::Message {
+                topic: T::NAME.to_owned(),
+                error,
+            })?;
+        match stamps {
+            Stamps::New => Self::send(self, Cause::OWN, envelope.payload)?,
+            Stamps::Recorded => self.replay(envelope.payload, envelope.stamp)?,
+        }
+        Ok(())
+    }
+
+    fn tick(&self) {
+        Self::tick(self);
+    }
+}
+
+struct Open<'a> {
+    bus: &'a Bus,
+}
+
+impl TopicVisitor for Open<'_> {
+    type Output = Result<Box<dyn Writer>, PortError>;
+
+    fn visit<T: Topic>(self) -> Self::Output {
+        Ok(Box::new(self.bus.publisher::<T>()?))
+    }
+}
+
+/// Waits in real time.
+struct Pace<'a, 'names> {
+    shutdown: &'a Shutdown,
+    writers: &'a mut BTreeMap<&'names str, Box<dyn Writer>>,
+}
+
+impl Pace<'_, '_> {
+    /// Whether that moment came before the wish to end.
+    fn rest_until(&self, moment: Instant) -> bool {
+        loop {
+            if self.shutdown.is_requested() {
+                return false;
+            }
+            let left = moment.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return true;
+            }
+            if left > LOOK {
+                self.writers.values().for_each(|writer| writer.tick());
+            }
+            std::thread::sleep(left.min(LOOK));
+        }
+    }
+}

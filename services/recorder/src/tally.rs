@@ -1,0 +1,190 @@
+//! What listener and keeper share: the topics with their counts, and the queue between them.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use lager_journal::{Count, EnvelopeSchema, Times};
+
+/// Messages may wait with so many bytes together.
+const QUEUE_BYTES: u64 = 64 << 20;
+
+/// A topic that is recorded.
+#[derive(Debug)]
+pub(crate) struct Topic {
+    pub(crate) name: String,
+    pub(crate) schema: EnvelopeSchema,
+    received: AtomicU64,
+    lost: AtomicU64,
+    dropped: AtomicU64,
+}
+
+impl Topic {
+    pub(crate) fn new(name: &str, schema: EnvelopeSchema) -> Self {
+        Self {
+            name: name.to_owned(),
+            schema,
+            received: AtomicU64::new(0),
+            lost: AtomicU64::new(0),
+            dropped: AtomicU64::new(0),
+        }
+    }
+
+    pub(crate) fn count(&self) -> Count {
+        Count {
+            received: self.received.load(Ordering::Relaxed),
+            lost: self.lost.load(Ordering::Relaxed),
+            dropped: self.dropped.load(Ordering::Relaxed),
+        }
+    }
+
+    /// Notes a sample that was received.
+    pub(crate) fn receive(&self) {
+        self.received.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Notes how many were missed so far.
+    pub(crate) fn lose(&self, lost: u64) {
+        self.lost.store(lost, Ordering::Relaxed);
+    }
+
+    pub(crate) fn drop_one(&self) {
+        self.dropped.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// The topics in the order in which they were found; a message has its topic's place.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Topics(Arc<Mutex<Vec<Arc<Topic>>>>);
+
+impl Topics {
+    pub(crate) fn add(&self, topic: Topic) -> (usize, Arc<Topic>) {
+        let topic = Arc::new(topic);
+        let mut all = self.all();
+        all.push(Arc::clone(&topic));
+        (all.len() - 1, topic)
+    }
+
+    pub(crate) fn at(&self, place: usize) -> Arc<Topic> {
+        Arc::clone(&self.all()[place])
+    }
+
+    pub(crate) fn all(&self) -> MutexGuard<'_, Vec<Arc<Topic>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A sample on its way to the file.
+#[derive(Debug)]
+pub(crate) struct Item {
+    pub(crate) topic: usize,
+    pub(crate) times: Times,
+    pub(crate) sequence: u64,
+    pub(crate) lost: u64,
+    pub(crate) dropped: u64,
+    pub(crate) message: Vec<u8>,
+}
+
+/// The listener's end of the queue.
+#[derive(Debug)]
+pub(crate) struct QueueIn {
+    to: SyncSender<Item>,
+    waiting: Arc<AtomicU64>,
+}
+
+/// The keeper's end.
+#[derive(Debug)]
+pub(crate) struct QueueOut {
+    from: Receiver<Item>,
+    waiting: Arc<AtomicU64>,
+}
+
+/// A queue of so many samples.
+pub(crate) fn queue(samples: usize) -> (QueueIn, QueueOut) {
+    let (to, from) = sync_channel(samples);
+    let waiting = Arc::new(AtomicU64::new(0));
+    let shared = Arc::clone(&waiting);
+    (
+        QueueIn {
+            to,
+            waiting: shared,
+        },
+        QueueOut { from, waiting },
+    )
+}
+
+impl QueueIn {
+    /// Puts it in, unless the queue is full or nobody takes from it any more.
+    pub(crate) fn put(&self, item: Item) -> bool {
+        let bytes = item.message.len() as u64;
+        let before = self.waiting.fetch_add(bytes, Ordering::Relaxed);
+        let is_in = before + bytes <= QUEUE_BYTES
+            && match self.to.try_send(item) {
+                Ok(()) => true,
+                Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
+            };
+        if !is_in {
+            self.waiting.fetch_sub(bytes, Ordering::Relaxed);
+        }
+        is_in
+    }
+}
+
+impl QueueOut {
+    /// All that waits, at most so many; the flag says that nothing will come any more.
+    pub(crate) fn take(&self, most: usize) -> (Vec<Item>, bool) {
+        use std::sync::mpsc::TryRecvError;
+        let mut items = Vec::new();
+        while items.len() < most {
+            match self.from.try_recv() {
+                Ok(item) => {
+                    let bytes = item.message.len() as u64;
+                    self.waiting.fetch_sub(bytes, Ordering::Relaxed);
+                    items.push(item);
+                }
+                Err(TryRecvError::Empty) => return (items, false),
+                Err(TryRecvError::Disconnected) => return (items, true),
+            }
+        }
+        (items, false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn item(bytes: usize) -> Item {
+        Item {
+            topic: 0,
+            times: Times { log: 0, publish: 0 },
+            sequence: 0,
+            lost: 0,
+            dropped: 0,
+            message: vec![0; bytes],
+        }
+    }
+
+    #[test]
+    fn a_full_queue_takes_no_more_until_something_is_taken() {
+        let (to, from) = queue(3);
+        let put = [(); 5].map(|()| to.put(item(10)));
+        assert_eq!(put, [true, true, true, false, false]);
+        assert_eq!(from.take(2).0.len(), 2);
+        assert!(to.put(item(1)));
+        assert_eq!(from.take(10).0.len(), 2);
+        drop(to);
+        let (items, is_over) = from.take(10);
+        assert!(items.is_empty() && is_over);
+    }
+
+    #[test]
+    fn a_queue_is_full_of_bytes_too() {
+        let (to, from) = queue(1_000);
+        let large = QUEUE_BYTES as usize / 2;
+        let put = [(); 3].map(|()| to.put(item(large)));
+        assert_eq!(put, [true, true, false]);
+        from.take(1);
+        assert!(to.put(item(large)));
+    }
+}
