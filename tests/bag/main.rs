@@ -1,6 +1,7 @@
 //! Recordings as people make them: of a mission, of somebody's own topic, cut short by `kill -9` and
 //! by a full disk, and played onto another robot's name.
 
+mod outside;
 mod play;
 
 use std::collections::BTreeMap;

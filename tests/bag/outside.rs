@@ -1,0 +1,45 @@
+//! A recording as the Python packages `mcap` and `jsonschema` read it, which know nothing of this
+//! project. They are in the environment that `tests/run` makes.
+
+use std::process::Command;
+
+use lager_tests::{Domain, wait_for};
+use serde_json::Value;
+
+use crate::{end, recorder, said};
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with mcap and jsonschema; tests/run makes one"]
+fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
+    let domain = Domain::new();
+    let recorder = recorder(&domain, &["tour.mcap"]);
+    let up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "4"]);
+    wait_for("a thousand lines", || {
+        let said = recorder.output();
+        let progress: Value = serde_json::from_str(said.lines().last()?).ok()?;
+        let topics = progress["topics"].as_array()?;
+        let line = topics
+            .iter()
+            .find(|topic| topic["topic"] == "sensor/line")?;
+        (line["received"].as_u64()? > 1_000).then_some(())
+    });
+    drop(up);
+    let told = end(recorder);
+    let python = std::env::var_os("LAGER_PYTHON").expect("LAGER_PYTHON names a Python");
+    let read = Command::new(python)
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/bag/read.py"))
+        .arg(domain.folder().join("tour.mcap"))
+        .output()
+        .expect("Python starts");
+    assert!(read.status.success(), "{}", said(&read));
+    let counts: Value = serde_json::from_slice(&read.stdout).expect("JSON");
+    let topics = told["topics"].as_array().expect("topics");
+    for topic in topics {
+        assert_eq!(topic["dropped"], 0);
+        let name = topic["topic"].as_str().expect("a name");
+        let there = counts.get(name).and_then(Value::as_u64).unwrap_or_default();
+        assert_eq!(topic["received"].as_u64(), Some(there), "{name}");
+    }
+    assert!(counts["sensor/line"].as_u64() > Some(1_000), "{counts}");
+    domain.assert_clean();
+}
