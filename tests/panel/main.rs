@@ -350,7 +350,11 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
         let status = status.latest().expect("readable")?;
         (status.delivered == 2).then_some(())
     });
-    page.wait_until("document.querySelectorAll('#history li').length === 1");
+    page.wait_until("document.querySelectorAll('#history li').length === 2");
+    // The second had to go round what was put there; the station knows it for whoever comes later.
+    assert!(page.text("#history").contains("round what was blocked: (0,"));
+    page.call("Page.reload", &serde_json::json!({}));
+    page.wait_until("document.querySelectorAll('#history li').length === 2");
     drop((page, status));
     scene.wait_to_stand();
     scene.end();

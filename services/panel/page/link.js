@@ -6,6 +6,7 @@
 //   warehouse <json>
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
+//   past <robot> <ms> <an event or a thought of so long ago>
 //   answer <number> done | refused <reason> | stopped <ms>
 //
 // What the page says:
@@ -15,7 +16,8 @@
 //   take <robot> <number>             the driver's seat; free <robot> <number> leaves it
 //   warehouse <number> <json>
 //
-// Nothing here draws, and nothing here is kept when the page is closed.
+// Nothing here draws, and nothing here is kept when the page is closed. After a lost connection the
+// station tells again what has happened.
 
 /** Older than this, in ms, nothing is shown as true. */
 export const STALE_MS = 500;
@@ -42,14 +44,24 @@ class Robot {
     /** Ways that are not taken, and since when, in s of the robot's clock. */
     this.blocked = new Map();
     this.queue = [];
-    this.events = [];
-    /** The values of the thought that comes next. */
-    this.thinks = null;
-    this.history = [];
+    this.forget();
     this.past = [];
     /** States heard in all. */
     this.total = 0;
     this.stoppedSince = null;
+  }
+
+  /** Nothing has happened yet. */
+  forget() {
+    this.events = [];
+    /** The values of the thought that comes next. */
+    this.thinks = null;
+    this.history = [];
+    /** When it set out on this order, and the ways that were found blocked on it. */
+    this.began = null;
+    this.detours = [];
+    /** Goods that wait because no way leads to them. */
+    this.unreachable = new Set();
   }
 
   /** Milliseconds since the robot was last heard. */
@@ -130,6 +142,8 @@ export class Link extends EventTarget {
     const [word, ...rest] = line.split(" ");
     if (word === "from") {
       this.report(this.robot(rest[0]), rest[1], rest.slice(2));
+    } else if (word === "past") {
+      this.report(this.robot(rest[0]), rest[2], rest.slice(3), Number(rest[1]));
     } else if (word === "about") {
       this.about(this.robot(rest[0]), fields(rest.slice(1)));
     } else if (word === "answer") {
@@ -138,6 +152,8 @@ export class Link extends EventTarget {
       this.warehouse = JSON.parse(line.slice("warehouse ".length));
       this.emit("warehouse");
     } else if (word === "you") {
+      // All that has happened is told after this.
+      for (const robot of this.robots.values()) robot.forget();
       this.me = rest[0];
       this.mayDrive = rest[1] === "driver";
       this.emit("link");
@@ -171,7 +187,7 @@ export class Link extends EventTarget {
     else settle({ refused: rest.join(" ") });
   }
 
-  report(robot, word, rest) {
+  report(robot, word, rest, age = 0) {
     const now = performance.now();
     if (word === "state") {
       const state = fields(rest);
@@ -204,7 +220,7 @@ export class Link extends EventTarget {
       // A thought's values come right before it.
       const values = word === "thought" ? robot.thinks : null;
       robot.thinks = null;
-      const entry = { at: Date.now(), kind: word, words: rest, values };
+      const entry = { at: Date.now() - age, kind: word, words: rest, values };
       robot.events.push(entry);
       if (robot.events.length > 1_000) robot.events.shift();
       this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));

@@ -1,14 +1,30 @@
-// What has happened, as sentences in the reader's language, and the last ten minutes as a table.
+// What has happened, as sentences in the reader's language, and the last ten minutes as a file.
 
 import { say } from "./words.js";
+import { mcap } from "./mcap.js";
 import { fill, item } from "./missions.js";
 import { crossing, thought } from "./sentences.js";
+
+/** What a recording has of one moment, as strips and trail show it. */
+const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "null"] } };
+/** What a recording has of what happened: the words of the station, and a thought's values. */
+const EVENT = {
+  title: "lager.panel.Event",
+  type: "object",
+  required: ["kind", "words", "values"],
+  properties: {
+    kind: { enum: ["event", "thought"] },
+    words: { type: "array", items: { type: "string" } },
+    values: { type: ["object", "null"], additionalProperties: { type: "string" } },
+  },
+};
 
 export class Log {
   constructor(parts, robot) {
     this.parts = parts;
     this.robot = robot;
-    parts.save.onclick = () => this.save();
+    parts.csv.onclick = () => this.save("csv", "text/csv", table);
+    parts.mcap.onclick = () => this.save("mcap", "application/octet-stream", recording);
   }
 
   draw(robot) {
@@ -17,18 +33,38 @@ export class Log {
     fill(this.parts.entries, lines.slice(-200).reverse(), (text) => item(text));
   }
 
-  save() {
-    const past = this.robot()?.past ?? [];
-    if (!past.length) return;
-    const keys = Object.keys(past[0]).filter((key) => key !== "at" && key !== "wall");
-    const rows = past.map((point) => [new Date(point.wall).toISOString(), ...keys.map((key) => point[key] ?? "")].join(","));
-    const blob = new Blob([[`time,${keys.join(",")}`, ...rows, ""].join("\n")], { type: "text/csv" });
+  /** Hands the last ten minutes to the reader as a file. */
+  save(ending, type, content) {
+    const robot = this.robot();
+    if (!robot?.past.length) return;
     const anchor = document.createElement("a");
-    anchor.href = URL.createObjectURL(blob);
-    anchor.download = `${this.robot().name}.csv`;
+    anchor.href = URL.createObjectURL(new Blob([content(robot)], { type }));
+    anchor.download = `${robot.name}.${ending}`;
     anchor.click();
     setTimeout(() => URL.revokeObjectURL(anchor.href), 1_000);
   }
+}
+
+/** The figures of each moment as lines with commas. */
+function table({ past }) {
+  const keys = Object.keys(figures(past[0]));
+  const rows = past.map((point) => [new Date(point.wall).toISOString(), ...keys.map((key) => point[key] ?? "")].join(","));
+  return [`time,${keys.join(",")}`, ...rows, ""].join("\n");
+}
+
+/** The same figures, and what happened meanwhile. */
+function recording({ past, events }) {
+  const states = past.map((point) => ({ at: point.wall, value: figures(point) }));
+  const since = events.filter(({ at }) => at >= past[0].wall);
+  const happened = since.map(({ at, kind, words, values }) => ({ at, value: { kind, words, values } }));
+  return mcap("lager panel", [
+    { topic: "state", schema: STATE, messages: states },
+    { topic: "events", schema: EVENT, messages: happened },
+  ]);
+}
+
+function figures({ at, wall, ...figures }) {
+  return figures;
 }
 
 /** One entry as a sentence with its time. */

@@ -37,7 +37,7 @@ const setup = new Setup(link, {
   gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), calibrate: at("calibrate"), boardSaid: at("board-said"),
 }, robot);
 const strips = new Strips(at("strips"));
-const log = new Log({ filter: at("filter"), entries: at("entries"), save: at("save-csv") }, robot);
+const log = new Log({ filter: at("filter"), entries: at("entries"), csv: at("save-csv"), mcap: at("save-mcap") }, robot);
 
 /** Puts an obstacle on an edge of a simulated world, or takes it away. */
 async function meetEdge([x, y, way]) {
@@ -149,6 +149,7 @@ function picture() {
   const shown = robot();
   driving.pads();
   map.move(shown, time);
+  strips.move(shown, time);
   if (time - drawn >= REST_MS) {
     drawn = time;
     drawRest(shown, time);
@@ -160,7 +161,7 @@ function drawRest(shown, time) {
   map.draw(shown, time);
   missions.draw(shown);
   arm.draw(shown);
-  strips.draw(shown, time);
+  strips.draw(shown);
   setup.draw(shown);
   log.draw(shown);
   const mine = shown?.driver && shown.driver === link.me;

@@ -140,6 +140,7 @@ export class WarehouseMap {
     make("title", {}, box, name ? `${id} ${name}` : String(id));
     make("rect", { x: x - 60, y: y - 60, width: 120, height: 120, rx: 12 }, box);
     make("text", { x, y: y + 28 }, box, String(id));
+    make("text", { class: "why", x, y: y + 130 }, box);
   }
 
   /** Moves a robot to where it is now; called before each picture. */
@@ -235,8 +236,12 @@ export class WarehouseMap {
   markGoods(robot) {
     for (const box of this.goods.children) {
       const id = box.dataset.product;
-      const state = robot.state.product === id ? "wanted" : robot.queue.some(({ product }) => product === id) ? "queued" : "";
-      set(box, "class", `good ${state}`);
+      const [isWanted, isQueued] = [robot.state.product === id, robot.queue.some(({ product }) => product === id)];
+      const noWay = ["no_way", "unreachable"].includes(robot.state.failure);
+      const isOutOfReach = isWanted ? noWay : isQueued && robot.unreachable.has(id);
+      set(box, "class", `good ${isWanted ? "wanted" : isQueued ? "queued" : ""} ${isOutOfReach ? "out-of-reach" : ""}`);
+      const words = box.lastElementChild;
+      if (words.textContent !== (isOutOfReach ? say("no_way") : "")) words.textContent = isOutOfReach ? say("no_way") : "";
     }
   }
 

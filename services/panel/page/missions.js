@@ -1,5 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
+import { sentence } from "./sentences.js";
 import { say, span } from "./words.js";
 import { put } from "./bar.js";
 
@@ -33,21 +34,27 @@ export class Missions {
     goods.replaceChildren(...(warehouse?.product ?? []).map(({ id, name }) => new Option(name ? `${id} ${name}` : id, id)));
   }
 
-  /** Keeps when goods were fetched and delivered. */
+  /** Keeps when goods were fetched and delivered, what was in the way, and what cannot be reached. */
   remember({ robot, entry }) {
-    if (entry.kind !== "event") return;
+    if (entry.kind === "thought") return this.rememberThought(robot, entry.values ?? {});
     const [what, , , , product] = entry.words;
-    if (what === "getting_item") robot.began = entry.at;
-    if (what === "next_node") robot.nodes = (robot.nodes ?? 0) + 1;
+    if (what === "getting_item") Object.assign(robot, { began: entry.at, detours: [] });
     if (what !== "item_delivered") return;
     const took = robot.began ? span(entry.at - robot.began) : "";
-    robot.history.unshift({ product, at: entry.at, took, nodes: robot.nodes ?? 0 });
-    robot.nodes = 0;
+    robot.history.unshift({ product, at: entry.at, took, detours: robot.detours });
+    robot.detours = [];
+  }
+
+  rememberThought(robot, { kind, product, node, looks }) {
+    if (kind === "way_blocked") robot.detours.push({ node, looks });
+    if (kind === "order_put_off") robot.unreachable.add(product);
+    if (["fetching", "order_cancelled"].includes(kind)) robot.unreachable.delete(product);
+    if (kind === "queue_cleared") robot.unreachable.clear();
   }
 
   draw(robot) {
     this.drawQueue(robot);
-    const lines = (robot?.history ?? []).map(({ product, at, took }) => `${new Date(at).toLocaleTimeString()}  ${product}  ${took}`);
+    const lines = (robot?.history ?? []).map(delivered);
     fill(this.parts.history, lines, (line) => item(line));
   }
 
@@ -70,6 +77,14 @@ export class Missions {
     }
     if (!queue.children.length) queue.append(item(say("queue_empty")));
   }
+}
+
+/** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
+function delivered({ product, at, took, detours }) {
+  const words = [new Date(at).toLocaleTimeString(), product, took];
+  const ways = detours.map(({ node, looks }) => `(${node}) ${sentence(`looks_${looks}`) ?? ""}`.trim());
+  if (ways.length) words.push(say("detours", ways.join("; ")));
+  return words.join("  ");
 }
 
 /** An item of a list. */

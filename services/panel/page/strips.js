@@ -1,4 +1,7 @@
 // The last minute as strips of a few figures, and the eleven line sensors as a bar.
+//
+// A strip moves with every picture of the screen. It is not drawn anew for that: what is there is
+// shifted by the pixels that time has passed, and what is new is drawn at its end.
 
 import { SPAN_MS } from "./link.js";
 import { say } from "./words.js";
@@ -16,7 +19,7 @@ const SENSORS = 11;
 
 export class Strips {
   constructor(parent) {
-    this.strips = STRIPS.map((strip) => ({ strip, ...this.figure(parent) }));
+    this.strips = STRIPS.map((strip) => new Strip(parent, ...strip));
     const sensors = document.createElement("figure");
     sensors.id = "sensors";
     this.sensors = Array.from({ length: SENSORS }, () => {
@@ -27,64 +30,104 @@ export class Strips {
     parent.append(sensors);
   }
 
-  figure(parent) {
-    const figure = document.createElement("figure");
-    const caption = document.createElement("figcaption");
-    const canvas = document.createElement("canvas");
-    figure.append(caption, canvas);
-    parent.append(figure);
-    return { caption, canvas };
+  /** Moves the lines: for every picture of the screen. */
+  move(robot, now) {
+    for (const strip of this.strips) strip.move(robot, now);
   }
 
-  draw(robot, now) {
+  /** Figures and sensors. */
+  draw(robot) {
     const style = getComputedStyle(document.body);
     const colours = [style.getPropertyValue("--accent"), style.getPropertyValue("--quiet")];
-    for (const { strip, caption, canvas } of this.strips) this.strip(strip, caption, canvas, robot, now, colours);
+    for (const strip of this.strips) strip.draw(robot, colours);
     const { line_bits: bits, line_error: error } = robot?.state ?? {};
     // Where the bits are not told, the sensor above the middle of the tape shows.
     const middle = error === undefined ? null : Math.round((SENSORS - 1) / 2 + Number(error) / 2);
     this.sensors.forEach((bar, index) => bar.classList.toggle("on", bits ? bits[index] === "1" : index === middle));
   }
+}
 
-  strip([word, unit, low, high, keys], caption, canvas, robot, now, colours) {
-    const past = robot?.past ?? [];
-    const last = past.at(-1);
-    const values = keys.map((key) => last?.[key]);
+class Strip {
+  constructor(parent, word, unit, low, high, keys) {
+    Object.assign(this, { word, unit, low, high, keys });
+    const figure = document.createElement("figure");
+    this.caption = document.createElement("figcaption");
+    this.canvas = document.createElement("canvas");
+    figure.append(this.caption, this.canvas);
+    parent.append(figure);
+    this.pen = this.canvas.getContext("2d");
+    this.colours = ["", ""];
+    /** What the canvas shows: whose past, drawn in what way, up to which point and which column. */
+    this.shown = { robot: null, look: "", total: 0, column: 0 };
+  }
+
+  /** The last figures, and what the lines look like: it costs a layout and is seldom needed. */
+  draw(robot, colours) {
+    const last = robot?.past.at(-1);
+    const values = this.keys.map((key) => last?.[key]);
     const known = values.filter((value) => value !== null && value !== undefined);
-    const text = `${say(word)} ${known.length ? `${known.join(" / ")} ${unit}` : "–"}`;
-    if (caption.textContent !== text) caption.textContent = text;
+    const text = `${say(this.word)} ${known.length ? `${known.join(" / ")} ${this.unit}` : "–"}`;
+    if (this.caption.textContent !== text) this.caption.textContent = text;
 
     const ratio = devicePixelRatio;
-    const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
-    if (!width || !height) return;
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    const pen = canvas.getContext("2d");
-    pen.clearRect(0, 0, width, height);
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((side) => Math.round(side * ratio));
+    const since = performance.now() - SPAN_MS;
+    const seen = (robot?.past ?? []).filter(({ at }) => at > since);
+    this.top = this.high ?? Math.max(1, ...seen.flatMap((point) => this.keys.map((key) => point[key] ?? 0)));
+    this.colours = colours;
+    this.look = [width, height, ratio, this.top, ...colours].join();
+    this.size = { width, height, ratio };
+  }
+
+  move(robot, now) {
+    if (!this.size?.width || !this.size.height) return;
+    const { width } = this.size;
+    const past = robot?.past ?? [];
+    const total = robot?.total ?? 0;
+    // Columns are counted from when the page was opened, so that a shift is of whole pixels.
+    const column = this.column(now);
+    const { shown } = this;
+    const shift = column - shown.column;
+    let first = past.length - (total - shown.total) - 1;
+    if (shown.robot !== robot || shown.look !== this.look || shift >= width) {
+      Object.assign(this.canvas, { width, height: this.size.height });
+      first = past.findIndex(({ at }) => this.column(at) > column - width);
+      if (first < 0) first = past.length;
+    } else if (shift > 0) {
+      this.pen.globalCompositeOperation = "copy";
+      this.pen.drawImage(this.canvas, -shift, 0);
+      this.pen.globalCompositeOperation = "source-over";
+    }
+    this.line(past.slice(Math.max(0, first)), column);
+    this.shown = { robot, look: this.look, total, column };
+  }
+
+  /** Draws from the first of these points to the last. */
+  line(points, column) {
+    if (points.length < 2) return;
+    const { pen, low, top } = this;
+    const { width, height, ratio } = this.size;
     pen.lineWidth = 1.5 * ratio;
-    const from = now - SPAN_MS;
-    let first = past.length;
-    while (first > 0 && past[first - 1].at > from) first--;
-    const seen = past.slice(first);
-    const top = high ?? Math.max(1, ...seen.flatMap((point) => keys.map((key) => point[key] ?? 0)));
-    keys.forEach((key, index) => {
-      pen.strokeStyle = colours[index];
+    pen.lineCap = "round";
+    this.keys.forEach((key, index) => {
+      pen.strokeStyle = this.colours[index];
       pen.beginPath();
-      let column = null;
-      let level = null;
-      for (const point of seen) {
-        const value = point[key];
-        if (value === null) {
-          column = null;
-          continue;
+      let isDrawn = false;
+      for (const { at, [key]: value } of points) {
+        if (value !== null) {
+          const x = width - 1 + this.column(at) - column;
+          const y = Math.round(height - ((Math.min(top, Math.max(low, value)) - low) / (top - low)) * (height - 2) - 1);
+          if (isDrawn) pen.lineTo(x, y);
+          else pen.moveTo(x, y);
         }
-        const x = Math.round(((point.at - from) / SPAN_MS) * width);
-        const y = Math.round(height - ((Math.min(top, Math.max(low, value)) - low) / (top - low)) * (height - 2) - 1);
-        if (column === null) pen.moveTo(x, y);
-        else if (column !== x || level !== y) pen.lineTo(x, y);
-        column = x;
-        level = y;
+        isDrawn = value !== null;
       }
       pen.stroke();
     });
+  }
+
+  /** The column of pixels of a moment. */
+  column(at) {
+    return Math.floor((at * this.size.width) / SPAN_MS);
   }
 }

@@ -15,6 +15,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/log.js", SCRIPT, include_str!("../page/log.js")),
     ("/main.js", SCRIPT, include_str!("../page/main.js")),
     ("/map.js", SCRIPT, include_str!("../page/map.js")),
+    ("/mcap.js", SCRIPT, include_str!("../page/mcap.js")),
     ("/missions.js", SCRIPT, include_str!("../page/missions.js")),
     ("/screen", HTML, include_str!("../page/screen.html")),
     ("/screen.js", SCRIPT, include_str!("../page/screen.js")),

@@ -17,6 +17,7 @@
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, or `thought <text>`
+//! past <robot> <ms> <report>        an event or a thought of so long before this page came
 //! answer <number> done | stopped <ms> | refused <text>
 //! ```
 //!

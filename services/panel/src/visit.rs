@@ -35,6 +35,8 @@ pub(crate) struct Visit {
     /// What robots have not answered yet, with the page's number.
     asked: Vec<(u32, Awaited)>,
     subscription: Subscription,
+    /// When it began, by the station's clock.
+    began: Duration,
     /// Lines to be said.
     lines: String,
     robots: BTreeMap<Name, LastTold>,
@@ -58,7 +60,8 @@ impl Visit {
         let now = Instant::now();
         Self {
             lines: format!("you {name} {}\n", rank.as_str()),
-            subscription: place.shared.handle.subscribe(),
+            subscription: place.shared.handle.recall(),
+            began: place.shared.handle.now(),
             place,
             name,
             rank,
@@ -232,7 +235,10 @@ impl Visit {
                 Told::Thought(text) => format!("thought {text}"),
                 Told::Replied { .. } => continue,
             };
-            let _ = writeln!(self.lines, "from {robot} {line}");
+            let _ = match self.began.checked_sub(news.at) {
+                Some(age) => writeln!(self.lines, "past {robot} {} {line}", age.as_millis()),
+                None => writeln!(self.lines, "from {robot} {line}"),
+            };
         }
     }
 

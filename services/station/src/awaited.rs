@@ -1,6 +1,6 @@
 //! What other threads wait for: answers of robots, and what robots say unasked.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -24,7 +24,7 @@ impl Awaited {
     }
 }
 
-/// What robots say from now on: events and thoughts, in their order.
+/// What robots say: events and thoughts, in their order.
 #[derive(Debug)]
 pub struct Subscription {
     news: Receiver<News>,
@@ -34,6 +34,9 @@ pub struct Subscription {
 impl Subscription {
     /// What may wait to be taken; what comes then is lost, and counted.
     pub const MOST: usize = 1024;
+
+    /// What is kept of what was said, for [`Handle::recall`](crate::Handle::recall).
+    pub const KEPT: usize = 1024;
 
     /// The next one; `None` if there is none in this time, or the station has ended.
     pub fn next(&self, timeout: Duration) -> Option<News> {
@@ -51,6 +54,8 @@ impl Subscription {
 pub(crate) struct Outlets {
     replies: BTreeMap<(Name, u32), SyncSender<Reply>>,
     subscribers: Vec<(SyncSender<News>, Arc<AtomicU64>)>,
+    /// What was said last.
+    kept: VecDeque<News>,
 }
 
 impl Outlets {
@@ -61,8 +66,14 @@ impl Outlets {
         Awaited { reply }
     }
 
-    pub(crate) fn subscribe(&mut self) -> Subscription {
-        let (to, news) = sync_channel(Subscription::MOST);
+    /// What is said from now on, and before it what is kept, if `recalls`.
+    pub(crate) fn subscribe(&mut self, recalls: bool) -> Subscription {
+        let before = if recalls { self.kept.len() } else { 0 };
+        let (to, news) = sync_channel(Subscription::MOST + before);
+        for news in self.kept.iter().take(before) {
+            // There is room for all of it.
+            let _ = to.try_send(news.clone());
+        }
         let lost = Arc::new(AtomicU64::new(0));
         self.subscribers.push((to, Arc::clone(&lost)));
         Subscription { news, lost }
@@ -78,6 +89,10 @@ impl Outlets {
                 }
                 continue;
             }
+            if self.kept.len() == Subscription::KEPT {
+                self.kept.pop_front();
+            }
+            self.kept.push_back(news.clone());
             self.subscribers
                 .retain(|(to, lost)| match to.try_send(news.clone()) {
                     Ok(()) => true,

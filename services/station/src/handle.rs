@@ -99,7 +99,13 @@ impl Handle {
 
     /// What robots say from now on.
     pub fn subscribe(&self) -> Subscription {
-        self.lock().outlets.subscribe()
+        self.lock().outlets.subscribe(false)
+    }
+
+    /// What robots have said lately, the last [`Subscription::KEPT`] of all robots together, and then
+    /// what they say from now on.
+    pub fn recall(&self) -> Subscription {
+        self.lock().outlets.subscribe(true)
     }
 
     /// Gives a robot an action, and lets its answer be awaited. Whoever moves it is its
@@ -291,7 +297,8 @@ impl Handle {
         result
     }
 
-    fn now(&self) -> Duration {
+    /// The station's clock.
+    pub fn now(&self) -> Duration {
         self.shared.start.elapsed()
     }
 

@@ -17,6 +17,8 @@ use crate::wheel::Key;
 pub struct News {
     /// Which.
     pub robot: Name,
+    /// When, by the station's clock.
+    pub at: Duration,
     /// What.
     pub told: Told,
 }
@@ -125,9 +127,11 @@ impl Station {
     /// What robots have said since this was asked last.
     pub fn news(&mut self) -> Vec<News> {
         let mut news = Vec::new();
+        let at = self.now;
         for (name, robot) in &mut self.robots {
             news.extend(robot.news().into_iter().map(|told| News {
                 robot: name.clone(),
+                at,
                 told,
             }));
         }

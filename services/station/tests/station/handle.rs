@@ -121,9 +121,21 @@ fn states_come_with_their_age_and_events_to_whoever_has_subscribed() {
     assert!(matches!(&told[1].told, Told::Thought(text) if text.as_str() == "hej"));
     assert_eq!(news.next(Duration::ZERO), None);
 
+    // Whoever comes later can have what was said before, with its time.
+    let later = handle.recall();
+    let recalled = [(); 2].map(|()| later.next(WATCHDOG).expect("news"));
+    assert_eq!(recalled, told);
+    assert!(recalled[0].at < handle.now());
+    assert_eq!(later.next(Duration::ZERO), None);
+
     // One that takes nothing loses, is told how much, and keeps nobody waiting.
     let thoughts = b"thought tick\n".repeat(Subscription::MOST + 10);
     robot.says(&thoughts);
     assert_eq!(robot.asks("karta"), "karta 4 3 0 0");
     assert_eq!(news.lost(), 10);
+    let late = handle.recall();
+    for _ in 0..Subscription::KEPT {
+        assert!(late.next(Duration::ZERO).is_some());
+    }
+    assert_eq!(late.next(Duration::ZERO), None);
 }
