@@ -1,4 +1,4 @@
-// A recording as an MCAP file (https://mcap.dev/spec): one chunk, not packed, with index and CRCs.
+// A recording as an MCAP file (specification: mcap.dev): one chunk, not packed, with index and CRCs.
 //
 //   magic, header, chunk { schemas, channels, messages }, message indexes, end of data,
 //   schemas, channels, statistics, chunk index, footer, magic
