@@ -2,7 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -117,6 +117,52 @@ impl Browser {
     }
 }
 
+/// What it takes of the machine, all its processes together.
+impl Browser {
+    /// On all cores, since it began. What a process took that has ended meanwhile is not in it.
+    pub(crate) fn processor_time(&self) -> Duration {
+        let ticks: u64 = self
+            .processes()
+            .iter()
+            .map(|stat| stat[11].parse::<u64>().unwrap_or(0) + stat[12].parse::<u64>().unwrap_or(0))
+            .sum();
+        Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second() as f64)
+    }
+
+    /// Bytes that are in memory, those that processes share counted for each.
+    pub(crate) fn memory(&self) -> u64 {
+        let pages: u64 = self
+            .processes()
+            .iter()
+            .map(|stat| stat[21].parse::<u64>().unwrap_or(0))
+            .sum();
+        pages * rustix::param::page_size() as u64
+    }
+
+    /// What `/proc/PID/stat` says of each, behind the name.
+    fn processes(&self) -> Vec<Vec<String>> {
+        let all: Vec<_> = std::fs::read_dir("/proc")
+            .expect("/proc")
+            .filter_map(|entry| {
+                let pid = entry.ok()?.file_name().to_str()?.parse::<u32>().ok()?;
+                let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+                let (_, rest) = stat.rsplit_once(") ")?;
+                let fields: Vec<_> = rest.split(' ').map(str::to_owned).collect();
+                Some((pid, fields))
+            })
+            .collect();
+        let mut family = vec![self.child.id()];
+        let mut next = 0;
+        while let Some(parent) = family.get(next).copied() {
+            next += 1;
+            let children = all.iter().filter(|(_, stat)| stat[1] == parent.to_string());
+            family.extend(children.map(|(pid, _)| *pid));
+        }
+        let all = all.into_iter().filter(|(pid, _)| family.contains(pid));
+        all.map(|(_, stat)| stat).collect()
+    }
+}
+
 impl Drop for Browser {
     fn drop(&mut self) {
         let _ = self.child.kill();
@@ -193,6 +239,12 @@ impl Page {
             json!(selector)
         ));
         (place[0].as_f64().expect("x"), place[1].as_f64().expect("y"))
+    }
+
+    /// Lets the page save files into this folder.
+    pub(crate) fn save_into(&mut self, folder: &Path) {
+        let params = json!({ "behavior": "allow", "downloadPath": folder });
+        self.call("Browser.setDownloadBehavior", &params);
     }
 
     /// Presses or lets go of the mouse.

@@ -4,6 +4,7 @@
 mod browser;
 mod figures;
 mod pictures;
+mod watched;
 
 use browser::{Browser, Page};
 use lager_ports::{Bus, Clock, Subscriber};
@@ -108,6 +109,35 @@ impl Scene {
             page.key_up(key);
             None
         });
+    }
+
+    /// What the page has seen can be had as a table and as a recording, which others can read.
+    fn saves(&self, page: &mut Page) {
+        let folder = self.domain.folder();
+        page.wait_for("#link", " ms");
+        page.save_into(folder);
+        page.click("#tab-log");
+        page.click("#save-csv");
+        let table = wait_for("the table", || {
+            std::fs::read_to_string(folder.join("r1.csv")).ok()
+        });
+        assert!(table.starts_with("time,x,y,line_error,"), "{table}");
+        page.click("#save-mcap");
+        let file = folder.join("r1.mcap");
+        wait_for("the recording", || file.exists().then_some(()));
+        let file = file.to_str().expect("a name");
+        self.domain.done(&["bag", "check", file]);
+        let told = self.domain.run(&["bag", "info", "--json", file]);
+        let told: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
+        let topics = told["topics"].as_array().expect("topics");
+        let names: Vec<_> = topics.iter().map(|topic| &topic["topic"]).collect();
+        assert_eq!(names, ["events", "state"]);
+        assert!(
+            topics
+                .iter()
+                .all(|topic| topic["messages"].as_u64() > Some(0)),
+            "{told}"
+        );
     }
 
     /// Nothing is left of a stop.
@@ -352,9 +382,13 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     });
     page.wait_until("document.querySelectorAll('#history li').length === 2");
     // The second had to go round what was put there; the station knows it for whoever comes later.
-    assert!(page.text("#history").contains("round what was blocked: (0,"));
+    assert!(
+        page.text("#history")
+            .contains("round what was blocked: (0,")
+    );
     page.call("Page.reload", &serde_json::json!({}));
     page.wait_until("document.querySelectorAll('#history li').length === 2");
+    scene.saves(&mut page);
     drop((page, status));
     scene.wait_to_stand();
     scene.end();

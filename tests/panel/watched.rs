@@ -1,0 +1,175 @@
+//! What it costs that somebody watches: the robot's path while ten pages are open, and a page's share
+//! of a core and its memory while the robot drives.
+
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest as _;
+
+use crate::Scene;
+
+/// Pages that watch at once.
+const PAGES: usize = 10;
+/// How often the path is measured with them and without.
+const TURNS: usize = 12;
+/// How long a page is looked at before its memory is told again.
+const LOOK: Duration = Duration::from_secs(60);
+/// For how many of these, unless `LAGER_SOAK_MINUTES` says so.
+const LOOKS: usize = 60;
+
+/// p50 and p99 of the path on this machine now, in us. The bench has its own bus and boards.
+fn path(scene: &Scene) -> [f64; 2] {
+    let args = "bench path --mode block --regime plain --quick --json --runs 1";
+    let out = scene.domain.run(&args.split(' ').collect::<Vec<_>>());
+    let told: Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    let rows = told["rows"].as_array().expect("rows");
+    let is_ours = |row: &&Value| row["what"] == "path" && row["name"] == "lager";
+    let row = rows.iter().find(is_ours).expect("a row");
+    ["p50_ns", "p99_ns"].map(|key| row[key].as_f64().expect("ns") / 1e3)
+}
+
+fn median(mut of: Vec<f64>) -> f64 {
+    of.sort_by(f64::total_cmp);
+    f64::midpoint(of[(of.len() - 1) / 2], of[of.len() / 2])
+}
+
+/// A page's socket without a page: somebody who watches with a processor of his own.
+struct Watcher {
+    over: Arc<AtomicBool>,
+    bytes: Arc<AtomicU64>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watcher {
+    fn new(url: &str) -> Self {
+        let host = url.trim_start_matches("http://").trim_end_matches('/');
+        let stream = TcpStream::connect(host).expect("the panel");
+        let mut request = format!("ws://{host}/live")
+            .into_client_request()
+            .expect("an address");
+        let origin = format!("http://{host}").parse().expect("a header");
+        request.headers_mut().insert("origin", origin);
+        let (mut socket, _) = tungstenite::client(request, stream).expect("its socket");
+        let (over, bytes) = (
+            Arc::new(AtomicBool::new(false)),
+            Arc::new(AtomicU64::new(0)),
+        );
+        let (until, count) = (Arc::clone(&over), Arc::clone(&bytes));
+        let thread = std::thread::spawn(move || {
+            while !until.load(Ordering::Relaxed) {
+                let said = socket.read().expect("the panel goes on");
+                count.fetch_add(said.len() as u64, Ordering::Relaxed);
+            }
+        });
+        let thread = Some(thread);
+        Self {
+            over,
+            bytes,
+            thread,
+        }
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let ended = self.thread.take().expect("a thread").join();
+        assert!(ended.is_ok() && self.bytes.load(Ordering::Relaxed) > 0);
+    }
+}
+
+/// Measures the path in turns, alone and with what `watch` opens.
+fn compare<W>(what: &str, scene: &Scene, mut watch: impl FnMut() -> W) {
+    let turns: Vec<_> = (0..TURNS)
+        .map(|_| {
+            let alone = path(scene);
+            let watchers = watch();
+            let watched = path(scene);
+            drop(watchers);
+            (alone, watched)
+        })
+        .collect();
+    for (index, name) in ["p50", "p99"].into_iter().enumerate() {
+        let alone = median(turns.iter().map(|(alone, _)| alone[index]).collect());
+        let watched = median(turns.iter().map(|(_, watched)| watched[index]).collect());
+        let ratio = median(turns.iter().map(|(a, w)| w[index] / a[index]).collect());
+        println!(
+            "{what:<26} {name}: alone {alone:.0} us, watched {watched:.0} us, middle of {TURNS} \
+             ratios {ratio:.2}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "it prints figures: tests/soak watched"]
+fn the_path_while_ten_pages_watch() {
+    let scene = Scene::new(1.0, &["--mission", "1,2,3,1,2,3,1,2,3,1,2,3"]);
+    let page = scene.page();
+    drop(page);
+    compare("ten pages elsewhere", &scene, || {
+        let watchers: Vec<_> = (0..PAGES).map(|_| Watcher::new(&scene.url)).collect();
+        // What has happened before is told in the first moments.
+        std::thread::sleep(Duration::from_secs(1));
+        watchers
+    });
+    compare("ten tabs of a browser here", &scene, || {
+        let pages: Vec<_> = (0..PAGES).map(|_| scene.page()).collect();
+        std::thread::sleep(Duration::from_secs(2));
+        // A page goes with its browser unless it is closed.
+        Tabs(pages)
+    });
+    scene.end();
+}
+
+struct Tabs(Vec<crate::Page>);
+
+impl Drop for Tabs {
+    fn drop(&mut self) {
+        for page in &mut self.0 {
+            page.call("Page.close", &json!({}));
+        }
+    }
+}
+
+#[test]
+#[ignore = "it prints figures for an hour: tests/soak watched"]
+fn what_a_page_takes_in_an_hour() {
+    let scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    page.call("Performance.enable", &json!({}));
+    let looks = std::env::var("LAGER_SOAK_MINUTES").map_or(LOOKS, |minutes| {
+        minutes.parse().expect("LAGER_SOAK_MINUTES is a number")
+    });
+    println!("minute   share of a core   memory of the scripts   of all of the browser");
+    for minute in 1..=looks {
+        // It drives all the time.
+        let queue = page.value("document.querySelectorAll('#queue button').length");
+        if queue.as_u64() < Some(4) {
+            page.click("#fetch button");
+            page.click("#fetch button");
+        }
+        let (began, before) = (Instant::now(), scene.browser.processor_time());
+        std::thread::sleep(LOOK);
+        let spent = scene.browser.processor_time() - before;
+        let share = spent.as_secs_f64() / began.elapsed().as_secs_f64() * 100.0;
+        page.call("HeapProfiler.collectGarbage", &json!({}));
+        let metrics = page.call("Performance.getMetrics", &json!({}));
+        let metrics = metrics["metrics"].as_array().expect("metrics");
+        let heap = metrics
+            .iter()
+            .find(|metric| metric["name"] == "JSHeapUsedSize");
+        let heap = heap.and_then(|heap| heap["value"].as_f64()).expect("bytes");
+        let all = scene.browser.memory();
+        println!(
+            "{minute:>6}   {share:>13.1} %   {:>17.2} MiB   {:>17.1} MiB",
+            heap / f64::from(1 << 20),
+            all as f64 / f64::from(1 << 20),
+        );
+    }
+    drop(page);
+    scene.end();
+}
