@@ -356,6 +356,9 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     let mut scene = Scene::new(4.0, &[]);
     let mut page = scene.page();
     let mut status = scene.bus.subscriber::<NavStatus>().expect("a topic");
+    // A person is to pick, and changes his mind when the robot stands at the goods.
+    page.click("#picks");
+    page.wait_until("!document.querySelector('#picks').checked");
     // On the short way to product 2, while the robot fetches product 1.
     page.click_at_mm(0.0, 750.0);
     page.wait_for("#map-said", "obstacle put");
@@ -370,6 +373,9 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     wait_for("the picture to move", || {
         (page.value(place) != before).then_some(())
     });
+    page.wait_for("#doing", "stands at the goods");
+    page.click("#picks");
+    page.wait_until("document.querySelector('#picks').checked");
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
 
     // A page that is loaded anew in the middle of a mission knows as much.
@@ -382,9 +388,10 @@ fn goods_are_queued_shown_and_delivered_round_an_obstacle() {
     });
     page.wait_until("document.querySelectorAll('#history li').length === 2");
     // The second had to go round what was put there; the station knows it for whoever comes later.
+    let history = page.text("#history");
     assert!(
-        page.text("#history")
-            .contains("round what was blocked: (0,")
+        history.contains("round what was blocked: (0, "),
+        "{history}"
     );
     page.call("Page.reload", &serde_json::json!({}));
     page.wait_until("document.querySelectorAll('#history li').length === 2");

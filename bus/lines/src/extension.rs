@@ -31,6 +31,7 @@
 //!            | mode <mode>             who drives
 //!            | resume                  end a stop
 //!            | reset                   the robot stands on the delivery corner, looking inwards
+//!            | pick manual|auto        who picks the goods up from now on: a person, or the robot
 //!            | picked [force]          the goods are in the gripper; force: felt or not
 //!            | drive <styrcomm> <ms>   the wheels, for 1 to 1000 ms from receipt
 //!            | arm <armcomm>           one step of the arm
@@ -78,7 +79,7 @@
 //! thought <text>                       as in the document
 //!
 //! <event> ::= in_position | getting_item | item_delivered | next_node | refused
-//!           | pickup_refused | failed
+//!           | pickup_refused | failed | way_blocked
 //! ```
 //!
 //! Here a list may be empty, and `route`, `blocked` and `queue` are sent when they have changed. A
@@ -119,7 +120,7 @@ mod thinks;
 pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
 pub use listed::{Block, Edge, Listed, Queued};
-pub use order::{Action, ActionError, LeaseMs, Mode, Order, Put};
+pub use order::{Action, ActionError, LeaseMs, Mode, Order, Pick, Put};
 pub use report::{Event, EventKind, Latency, Report, Truth};
 pub use state::State;
 pub use thinks::Thinks;

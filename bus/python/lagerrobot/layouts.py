@@ -205,6 +205,11 @@ class Hold(enum.IntEnum):
     Link = 5
 
 
+class Pick(enum.IntEnum):
+    Manual = 0
+    Auto = 1
+
+
 class Side(enum.IntEnum):
     Left = 0
     Up = 1
@@ -241,6 +246,8 @@ class InputKind(enum.IntEnum):
     LinkBack = 9
     SwitchedToManual = 10
     SwitchedToAutonomous = 11
+    PickByHand = 12
+    PickByItself = 13
 
 
 class ThoughtKind(enum.IntEnum):
@@ -300,6 +307,8 @@ class ThoughtKind(enum.IntEnum):
     LinkBack = 53
     ParkedWithoutLink = 54
     CornerMissed = 55
+    PicksByHand = 56
+    PicksByItself = 57
 
 
 class Joint(enum.IntEnum):
@@ -526,7 +535,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x2B427698950AA43A
+    _hash_ = 0xEC3DAA975B12C40B
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -563,13 +572,14 @@ class NavigatorStatus(Layout):
         ("arm_attempt", ctypes.c_uint8),
         ("arm_moves", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 3),
+        ("pick", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 2),
     ]
-    _enums_ = {"phase": Phase, "step": Step, "heading": Heading, "target": Heading, "goal": Goal, "mode": Mode, "hold": Hold, "remedy": Remedy}
+    _enums_ = {"phase": Phase, "step": Step, "heading": Heading, "target": Heading, "goal": Goal, "mode": Mode, "hold": Hold, "remedy": Remedy, "pick": Pick}
     _dtype_ = {
-        "names": ["frames_lost", "frames", "driven_by_hand", "order_id", "product", "command_id", "delivered", "travelled_mm", "exit_mm", "failure", "x", "y", "turned_deg", "distance_age_ms", "phase", "step", "heading", "target", "goal", "mark", "code", "tries", "misses", "waiting", "distance_cm", "mode", "stopped", "hold", "forced", "doubt", "doubt_x", "doubt_y", "arm_attempt", "arm_moves", "remedy", "reserved"],
-        "formats": ["<u8", "<u8", "<u8", "<u4", "<i4", "<u4", "<u4", "<i4", "<i4", Failure._dtype_, "<i2", "<i2", "<i2", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,)), ("<u1", (3,)), "<u1", "<u1", "<u1", ("<u1", (3,))],
-        "offsets": [0, 8, 16, 24, 28, 32, 36, 40, 44, 48, 60, 62, 64, 66, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 87, 90, 91, 92, 93],
+        "names": ["frames_lost", "frames", "driven_by_hand", "order_id", "product", "command_id", "delivered", "travelled_mm", "exit_mm", "failure", "x", "y", "turned_deg", "distance_age_ms", "phase", "step", "heading", "target", "goal", "mark", "code", "tries", "misses", "waiting", "distance_cm", "mode", "stopped", "hold", "forced", "doubt", "doubt_x", "doubt_y", "arm_attempt", "arm_moves", "remedy", "pick", "reserved"],
+        "formats": ["<u8", "<u8", "<u8", "<u4", "<i4", "<u4", "<u4", "<i4", "<i4", Failure._dtype_, "<i2", "<i2", "<i2", "<u2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (3,)), ("<u1", (3,)), "<u1", "<u1", "<u1", "<u1", ("<u1", (2,))],
+        "offsets": [0, 8, 16, 24, 28, 32, 36, 40, 44, 48, 60, 62, 64, 66, 68, 69, 70, 71, 72, 73, 74, 75, 76, 77, 78, 79, 80, 81, 82, 83, 84, 87, 90, 91, 92, 93, 94],
         "itemsize": 96,
     }
 
@@ -764,7 +774,7 @@ class Event(Layout):
 
 class Input(Layout):
     _type_name_ = "lager::Input"
-    _hash_ = 0x5674D36BA114814C
+    _hash_ = 0x7C9D9D864C8F2C8D
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -784,7 +794,7 @@ class Input(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0x77D514524D1C2FC9
+    _hash_ = 0xAEFEEB2EAEC89D59
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

@@ -188,6 +188,10 @@ class Hold(enum.IntEnum):
     Battery = 4
     Link = 5
 
+class Pick(enum.IntEnum):
+    Manual = 0
+    Auto = 1
+
 class Side(enum.IntEnum):
     Left = 0
     Up = 1
@@ -221,6 +225,8 @@ class InputKind(enum.IntEnum):
     LinkBack = 9
     SwitchedToManual = 10
     SwitchedToAutonomous = 11
+    PickByHand = 12
+    PickByItself = 13
 
 class ThoughtKind(enum.IntEnum):
     None_ = 0
@@ -279,6 +285,8 @@ class ThoughtKind(enum.IntEnum):
     LinkBack = 53
     ParkedWithoutLink = 54
     CornerMissed = 55
+    PicksByHand = 56
+    PicksByItself = 57
 
 class Joint(enum.IntEnum):
     Base = 0
@@ -440,6 +448,7 @@ class NavigatorStatus(Layout):
     arm_attempt: int
     arm_moves: int
     remedy: int
+    pick: int
     reserved: Sequence[int]
 
 class MapProduct(Layout):

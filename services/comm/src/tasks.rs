@@ -13,7 +13,7 @@
 
 use lager_topics::{
     Answer, Ask, AskKind, Event, EventKind, Health, Input, InputKind, NavigatorStatus, Order,
-    OrderQueue, Outcome, Phase, Tag, WorldAnswer, WorldAsk, WorldRefusal,
+    OrderQueue, Outcome, Phase, Pick, Tag, WorldAnswer, WorldAsk, WorldRefusal,
 };
 
 use crate::action::Action;
@@ -58,6 +58,8 @@ enum Task {
     Clear,
     /// Logic has left the goods.
     Picked,
+    /// Logic has it that this one picks the goods up.
+    Pick(Pick),
     /// Logic takes it that it stands on the delivery node.
     Reset,
     /// The bridge has answered.
@@ -124,6 +126,15 @@ impl Tasks {
             false => InputKind::PickupDone,
         };
         self.press(now, asker, Task::Picked, press(kind, id, order));
+    }
+
+    /// Who picks the goods up from now on.
+    pub(crate) fn pick(&mut self, now: Moment, asker: Asker, id: u32, pick: Pick) {
+        let kind = match pick {
+            Pick::Manual => InputKind::PickByHand,
+            Pick::Auto => InputKind::PickByItself,
+        };
+        self.press(now, asker, Task::Pick(pick), press(kind, id, 0));
     }
 
     pub(crate) fn reset(&mut self, now: Moment, asker: Asker, id: u32) {
@@ -234,7 +245,9 @@ impl Tasks {
                 match one.task {
                     Task::Order(order) => actions.push(Action::Order(order)),
                     // The same press twice is one.
-                    Task::Picked | Task::Reset => actions.push(Action::Press(one.input)),
+                    Task::Picked | Task::Pick(_) | Task::Reset => {
+                        actions.push(Action::Press(one.input))
+                    }
                     // Two of these would be two.
                     _ => {}
                 }
@@ -280,6 +293,7 @@ impl Tasks {
             let is_done = match one.task {
                 Task::Order(order) => status.order_id == order.id,
                 Task::Picked => status.phase != Phase::Picking,
+                Task::Pick(pick) => status.pick == pick,
                 Task::Reset => {
                     let phase = status.phase.get();
                     let waits = [Phase::WaitingForOrder, Phase::WaitingForMap];

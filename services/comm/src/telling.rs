@@ -5,13 +5,13 @@
 //! behind a slow one.
 
 use lager_lines::extension::{
-    Block, Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Queued, Report, Servos,
-    State, Thinks, Truth,
+    Block, Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Pick, Queued, Report,
+    Servos, State, Thinks, Truth,
 };
 use lager_lines::{Coord, Name, ProductId, Text};
 use lager_topics::{
     BlockedWays, BoardHealth, Coded, Failure, LineFrame, Mode as BusMode, OrderQueue, PathLatency,
-    Remedy, Route, Tag, Thought, Truth as BusTruth,
+    Pick as BusPick, Remedy, Route, Tag, Thought, Truth as BusTruth,
 };
 use lager_wire::{Binary, LineBits};
 
@@ -108,8 +108,7 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
         Bus::Refused => EventKind::Refused,
         Bus::PickupRefused => EventKind::PickupRefused,
         Bus::Failed => EventKind::Failed,
-        // The list of ways that are not taken tells it.
-        Bus::WayBlocked => return None,
+        Bus::WayBlocked => EventKind::WayBlocked,
     };
     let passed = Coord {
         x: event.x,
@@ -120,16 +119,17 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
         _ => passed,
     };
     let has_order = event.order_id != 0;
-    let text = match event.failure.is_none() {
-        true => Text::default(),
-        false => Text::new(event.failure.to_string()).unwrap_or_default(),
+    let text = match kind {
+        EventKind::WayBlocked => direction(event.heading.get()?).as_str().to_owned(),
+        _ if event.failure.is_none() => String::new(),
+        _ => event.failure.to_string(),
     };
     Some(Report::Event(Event {
         kind,
         node,
         order: has_order.then_some(event.order_id),
         product: ProductId::new(event.product).filter(|_| has_order),
-        text,
+        text: Text::new(text).unwrap_or_default(),
     }))
 }
 
@@ -199,6 +199,7 @@ fn put_place(state: &mut State, known: &Known) {
     let Some(status) = &known.status else { return };
     state.phase = word(status.phase);
     state.hold = word(status.hold);
+    state.pick = status.pick.get().map(pick);
     let remedy = Some(status.remedy).filter(|remedy| *remedy != Remedy::None);
     state.remedy = remedy.and_then(word);
     if !status.failure.is_none() {
@@ -260,6 +261,13 @@ fn put_boards(state: &mut State, known: &Known) {
 
 fn is_up(board: &BoardHealth) -> bool {
     board.up != 0
+}
+
+const fn pick(pick: BusPick) -> Pick {
+    match pick {
+        BusPick::Manual => Pick::Manual,
+        BusPick::Auto => Pick::Auto,
+    }
 }
 
 const fn mode(mode: BusMode) -> Mode {

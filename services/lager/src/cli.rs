@@ -17,7 +17,7 @@ pub use realtime::{ServiceArgs, UpRealtimeArgs};
 
 pub use values::Fetch;
 
-use crate::config::Body;
+use crate::config::{Body, PickBy};
 use crate::steer::Place;
 
 /// The software of a small warehouse robot around a zero-copy shared-memory bus.
@@ -177,6 +177,11 @@ The order that is under way is not in the queue any more.")]
         /// Believe it even if the claw does not feel the product and the arm is not where it is carried
         #[arg(long)]
         force: bool,
+    },
+    /// Choose who picks the goods up, from the next ones on: a person (`lager picked`), or the robot
+    Pick {
+        /// Who
+        by: PickBy,
     },
     /// Tell the robot that it has been put on the delivery node, looking into the warehouse
     Reset,

@@ -191,8 +191,8 @@ pub struct LogicSection {
     pub pick: PickBy,
 }
 
-/// Who picks the goods up: `lager_logic::Pick` as a word of the configuration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Who picks the goods up: `lager_topics::Pick` as a word of the configuration and of a command.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PickBy {
     /// A person moves the arm and says when it is done.
@@ -202,7 +202,7 @@ pub enum PickBy {
     Auto,
 }
 
-impl From<PickBy> for lager_logic::Pick {
+impl From<PickBy> for lager_topics::Pick {
     fn from(pick: PickBy) -> Self {
         match pick {
             PickBy::Manual => Self::Manual,

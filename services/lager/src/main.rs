@@ -264,6 +264,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                 Some(QueueChange::Clear) => operator.clear_queue()?,
             }
         }
+        Command::Pick { by } => operator()?.pick(by.into())?,
         Command::Picked { force } => operator()?.picked(force)?,
         Command::Reset => operator()?.reset()?,
         Command::Press {

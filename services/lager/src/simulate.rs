@@ -12,11 +12,13 @@ use anyhow::Result;
 use lager_bridge::listener::{Heard, Listener};
 use lager_bridge::machine::{Action, BridgeCore, CoreOptions};
 use lager_bridge::{Counts, Moment, PortEvent};
-use lager_logic::{Input, LogicConfig, Navigator, Pick};
+use lager_logic::{Input, LogicConfig, Navigator};
 use lager_plant::{GoodState, Warehouse};
 use lager_ports::Stop;
 use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire};
-use lager_topics::{Ask, EventKind, FailureKind, Health, Role, SteeringOrder, SteeringReport, Tag};
+use lager_topics::{
+    Ask, EventKind, FailureKind, Health, Pick, Role, SteeringOrder, SteeringReport, Tag,
+};
 use serde::Serialize;
 
 use crate::cli::SimulateArgs;

@@ -12,7 +12,7 @@ use lager_bridge::arbiter::LEASE;
 use lager_ports::{Bus, BusConfig, Clock, Subscriber};
 use lager_topics::{
     Answer, Ask, AskKind, EventKind, Finish, Health, Input, InputKind, LinkHealth, MissionEvent,
-    Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Refusal, Role, SteeringOrder,
+    Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Pick, Refusal, Role, SteeringOrder,
     SteeringState, StopCause, Topic,
 };
 use lager_wire::OperatorCommand;
@@ -153,6 +153,23 @@ impl Operator {
             Ok(!waits(status.phase.get()))
         })?;
         Ok("the robot takes the product to delivery".into())
+    }
+
+    /// `lager pick`: repeated until logic shows it.
+    pub fn pick(&self, pick: Pick) -> Result<String> {
+        let mut status = self.bus.subscriber::<NavStatus>()?;
+        let input = Input {
+            kind: match pick {
+                Pick::Manual => InputKind::PickByHand.into(),
+                Pick::Auto => InputKind::PickByItself.into(),
+            },
+            ..Input::default()
+        };
+        self.press_until(input, &mut status, |status| Ok(status.pick == pick))?;
+        Ok(match pick {
+            Pick::Manual => "a person picks the goods up".into(),
+            Pick::Auto => "the robot picks the goods up by itself".into(),
+        })
     }
 
     /// `lager reset`: repeated until logic has taken it.

@@ -3,17 +3,8 @@
 use core::time::Duration;
 
 use lager_ports::Policy;
+use lager_topics::Pick;
 use lager_wire::ArmProfile;
-
-/// Who picks the goods up at a station.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pick {
-    /// A person moves the arm and says when it is done.
-    #[default]
-    Manual,
-    /// The robot, by itself.
-    Auto,
-}
 
 /// What logic has to know of the robot and how much it forgives. Times are robot time.
 #[derive(Clone, Copy, Debug, PartialEq)]

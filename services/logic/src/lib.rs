@@ -32,7 +32,7 @@ pub mod route;
 mod shell;
 pub mod turn;
 
-pub use config::{LogicConfig, Pick};
+pub use config::LogicConfig;
 pub use navigator::{Input, Navigator};
 pub use output::Output;
 pub use shell::run;

@@ -28,13 +28,13 @@ mod ways;
 use core::time::Duration;
 
 use lager_topics::{
-    EventKind, Failure, FailureKind, Goal, Heading, Order, Phase, Route, Thought, ThoughtKind,
-    WarehouseMap,
+    EventKind, Failure, FailureKind, Goal, Heading, Order, Phase, Pick, Route, Thought,
+    ThoughtKind, WarehouseMap,
 };
 
 use crate::battery::Battery;
 use crate::blocks::Blocks;
-use crate::config::{LogicConfig, Pick};
+use crate::config::LogicConfig;
 use crate::heading::{Compass, Spin};
 use crate::judge::Edge;
 use crate::manoeuvre::{
@@ -83,6 +83,8 @@ pub(crate) struct Mission {
     tries: u8,
     /// The operator was believed although the claw does not feel the goods.
     pub(crate) forced: bool,
+    /// Who picks the goods up.
+    pub(crate) pick: Pick,
     pub(crate) battery: Battery,
     /// It is to do nothing without the external computer, which is out of reach.
     pub(crate) link_lost: bool,
@@ -98,6 +100,7 @@ impl Mission {
     pub(crate) fn new(config: LogicConfig) -> Self {
         let place = Place::default();
         Self {
+            pick: config.pick,
             config,
             now: Duration::ZERO,
             map: None,
@@ -143,7 +146,7 @@ impl Mission {
         let config = &self.config;
         match self.phase {
             _ if self.parked => Manoeuvre::Stand,
-            Phase::Picking if self.config.pick == Pick::Auto && self.failure.is_none() => {
+            Phase::Picking if self.pick == Pick::Auto && self.failure.is_none() => {
                 Manoeuvre::Arm(ArmSequence::new(Task::Pick))
             }
             Phase::WaitingForMap

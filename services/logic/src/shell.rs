@@ -23,7 +23,7 @@ use lager_ports::{
 };
 use lager_topics::{
     BlockedWays, InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, Mode,
-    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, OrderQueue,
+    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, OrderQueue, Pick,
     SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringState, Topic,
 };
 use lager_wire::Command;
@@ -250,6 +250,8 @@ impl Shell {
                         let lost = kind == InputKind::LinkLost;
                         self.decide(Input::Link { lost }, cause);
                     }
+                    Some(InputKind::PickByHand) => self.decide(Input::Pick(Pick::Manual), cause),
+                    Some(InputKind::PickByItself) => self.decide(Input::Pick(Pick::Auto), cause),
                     Some(InputKind::ResetPressed) => self.decide(Input::Reset, cause),
                     // The switch is the bridge's (E14): the mode comes back with its health.
                     Some(

@@ -5,6 +5,8 @@ import { mcap } from "./mcap.js";
 import { fill, item } from "./missions.js";
 import { crossing, thought } from "./sentences.js";
 
+/** How long ago what is saved may be, in ms. */
+const KEPT_MS = 600_000;
 /** What a recording has of one moment, as strips and trail show it. */
 const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "null"] } };
 /** What a recording has of what happened: the words of the station, and a thought's values. */
@@ -55,8 +57,8 @@ function table({ past }) {
 /** The same figures, and what happened meanwhile. */
 function recording({ past, events }) {
   const states = past.map((point) => ({ at: point.wall, value: figures(point) }));
-  const since = events.filter(({ at }) => at >= past[0].wall);
-  const happened = since.map(({ at, kind, words, values }) => ({ at, value: { kind, words, values } }));
+  const recent = events.filter(({ at }) => at > Date.now() - KEPT_MS);
+  const happened = recent.map(({ at, kind, words, values }) => ({ at, value: { kind, words, values } }));
   return mcap("lager panel", [
     { topic: "state", schema: STATE, messages: states },
     { topic: "events", schema: EVENT, messages: happened },

@@ -26,7 +26,7 @@ const bar = new Bar(link, {
 }, robot);
 const map = new WarehouseMap(at("map"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
 const missions = new Missions(link, {
-  fetch: at("fetch"), goods: at("goods"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"),
+  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"),
   said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
 const arm = new Arm(at("arm-drawing"));
@@ -159,7 +159,7 @@ function picture() {
 function drawRest(shown, time) {
   bar.draw(shown, time);
   map.draw(shown, time);
-  missions.draw(shown);
+  missions.draw(shown, time);
   arm.draw(shown);
   strips.draw(shown);
   setup.draw(shown);

@@ -1,6 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
-import { sentence } from "./sentences.js";
+import { crossing, sentence } from "./sentences.js";
 import { say, span } from "./words.js";
 import { put } from "./bar.js";
 
@@ -15,6 +15,12 @@ export class Missions {
       event.preventDefault();
       this.act(`order ${++this.order} ${parts.goods.value}`);
     });
+    // It shows what the robot says, not what was wished.
+    parts.picks.onclick = (event) => {
+      event.preventDefault();
+      const wish = this.robot()?.state.pick === "auto" ? "manual" : "auto";
+      this.act(`pick ${wish}`);
+    };
     parts.picked.onclick = () => this.act("picked");
     parts.pickedForce.onclick = () => this.act("picked force");
     parts.clear.onclick = () => this.act("clear");
@@ -37,7 +43,8 @@ export class Missions {
   /** Keeps when goods were fetched and delivered, what was in the way, and what cannot be reached. */
   remember({ robot, entry }) {
     if (entry.kind === "thought") return this.rememberThought(robot, entry.values ?? {});
-    const [what, , , , product] = entry.words;
+    const [what, x, y, , product, looks] = entry.words;
+    if (what === "way_blocked") robot.detours.push({ node: `${x},${y}`, looks });
     if (what === "getting_item") Object.assign(robot, { began: entry.at, detours: [] });
     if (what !== "item_delivered") return;
     const took = robot.began ? span(entry.at - robot.began) : "";
@@ -45,15 +52,18 @@ export class Missions {
     robot.detours = [];
   }
 
-  rememberThought(robot, { kind, product, node, looks }) {
-    if (kind === "way_blocked") robot.detours.push({ node, looks });
+  rememberThought(robot, { kind, product }) {
     if (kind === "order_put_off") robot.unreachable.add(product);
     if (["fetching", "order_cancelled"].includes(kind)) robot.unreachable.delete(product);
     if (kind === "queue_cleared") robot.unreachable.clear();
   }
 
-  draw(robot) {
+  draw(robot, now) {
     this.drawQueue(robot);
+    const { picks } = this.parts;
+    const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
+    picks.checked = robot?.state.pick === "auto";
+    picks.disabled = pick === undefined || !this.link.mayDrive;
     const lines = (robot?.history ?? []).map(delivered);
     fill(this.parts.history, lines, (line) => item(line));
   }
@@ -82,7 +92,7 @@ export class Missions {
 /** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
 function delivered({ product, at, took, detours }) {
   const words = [new Date(at).toLocaleTimeString(), product, took];
-  const ways = detours.map(({ node, looks }) => `(${node}) ${sentence(`looks_${looks}`) ?? ""}`.trim());
+  const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
   if (ways.length) words.push(say("detours", ways.join("; ")));
   return words.join("  ");
 }

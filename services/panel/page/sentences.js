@@ -7,6 +7,8 @@ import { current } from "./words.js";
 const TABLE = {
   en: {
     thought_none: "Nothing.",
+    thought_picks_by_hand: "From now on a person picks the goods up.",
+    thought_picks_by_itself: "From now on I pick the goods up by myself.",
     thought_map_taken: "I have a map. Which product shall I fetch?",
     thought_map_refused: "I cannot use this map: {failure}.",
     thought_map_kept: "I keep my map until I am back; send the new one then.",
@@ -152,6 +154,8 @@ const TABLE = {
   },
   sv: {
     thought_none: "Ingenting.",
+    thought_picks_by_hand: "Från och med nu plockar en människa upp varorna.",
+    thought_picks_by_itself: "Från och med nu plockar jag upp varorna själv.",
     thought_map_taken: "Jag har en karta. Vilken vara ska jag hämta?",
     thought_map_refused: "Jag kan inte använda den här kartan: {failure}.",
     thought_map_kept: "Jag behåller min karta tills jag är tillbaka; skicka den nya då.",

@@ -152,7 +152,7 @@ impl Visit {
             // Its lease is the station's.
             (Action::Drive { wheels, .. }, Some(driver)) => driver.drive(wheels),
             (Action::Arm(step), Some(driver)) => driver.arm(step),
-            (Action::Resume | Action::Mode(_) | Action::Reset, None)
+            (Action::Resume | Action::Mode(_) | Action::Pick(_) | Action::Reset, None)
                 if self.driver_of(robot).is_some() =>
             {
                 let by = self.driver_of(robot).unwrap_or_default();

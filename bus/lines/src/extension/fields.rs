@@ -6,7 +6,7 @@ use core::fmt;
 
 use lager_wire::{Binary, LineBits};
 
-use super::order::Mode;
+use super::order::{Mode, Pick};
 use crate::text::Name;
 use crate::warehouse::{Coord, Direction, ProductId};
 
@@ -212,6 +212,16 @@ impl Value for Name {
 }
 
 impl Value for Mode {
+    fn of(text: &str) -> Option<Self> {
+        Self::from_word(text)
+    }
+
+    fn put(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.as_str())
+    }
+}
+
+impl Value for Pick {
     fn of(text: &str) -> Option<Self> {
         Self::from_word(text)
     }

@@ -61,6 +61,8 @@ pub enum Action {
         /// Whether or not the gripper feels them.
         force: bool,
     },
+    /// `pick`: who picks the goods up from now on.
+    Pick(Pick),
     /// `drive`: the wheels (G8).
     Drive {
         /// What they do.
@@ -112,6 +114,33 @@ impl Mode {
     pub fn from_word(word: &str) -> Option<Self> {
         let both = [Self::Manual, Self::Autonomous];
         both.into_iter().find(|mode| mode.as_str() == word)
+    }
+}
+
+/// Who picks the goods up at a station.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Pick {
+    /// A person.
+    Manual,
+    /// The robot, by itself.
+    Auto,
+}
+
+impl Pick {
+    pub(super) const WANTED: &str = "manual or auto";
+
+    /// The word.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Manual => "manual",
+            Self::Auto => "auto",
+        }
+    }
+
+    /// Whose word it is.
+    pub fn from_word(word: &str) -> Option<Self> {
+        let both = [Self::Manual, Self::Auto];
+        both.into_iter().find(|pick| pick.as_str() == word)
     }
 }
 
@@ -269,6 +298,7 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
                     _ => None,
                 })?,
         },
+        "pick" => Action::Pick(reader.word().read(Pick::WANTED, Pick::from_word)?),
         "drive" => Action::Drive {
             wheels: read_command(reader.word(), read_wheels)?,
             lease: LeaseMs(reader.word().number("a time from 1 to 1000 ms", 1, 1000)?),
@@ -288,8 +318,8 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             edge: Edge::read(&mut reader)?,
         },
         _ => {
-            let wanted = "one of order, cancel, first, clear, mode, resume, reset, picked, drive, \
-                          arm, gains, calibrate and obstacle";
+            let wanted = "one of order, cancel, first, clear, mode, resume, reset, picked, pick, \
+                          drive, arm, gains, calibrate and obstacle";
             return Err(word.misread(wanted).into());
         }
     };
@@ -328,6 +358,7 @@ impl fmt::Display for Action {
             Self::Reset => formatter.write_str("reset"),
             Self::Picked { force: false } => formatter.write_str("picked"),
             Self::Picked { force: true } => formatter.write_str("picked force"),
+            Self::Pick(pick) => write!(formatter, "pick {}", pick.as_str()),
             Self::Drive { wheels, lease } => write!(formatter, "drive {wheels} {}", lease.get()),
             Self::Arm(step) => write!(formatter, "arm {}", Code(OperatorCommand::Arm(*step))),
             Self::Gains { p, d } => write!(formatter, "gains {p} {d}"),

@@ -63,7 +63,7 @@ pub struct Event {
     pub order: Option<u32>,
     /// The product of that order.
     pub product: Option<ProductId>,
-    /// The reason, where there is one.
+    /// The reason, where there is one; with `way_blocked` the direction of the way.
     pub text: Text,
 }
 
@@ -84,11 +84,13 @@ pub enum EventKind {
     PickupRefused,
     /// The robot cannot go on.
     Failed,
+    /// The robot has found the way from the node in a direction blocked (L6).
+    WayBlocked,
 }
 
 impl EventKind {
     /// Every kind.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::InPosition,
         Self::GettingItem,
         Self::ItemDelivered,
@@ -96,6 +98,7 @@ impl EventKind {
         Self::Refused,
         Self::PickupRefused,
         Self::Failed,
+        Self::WayBlocked,
     ];
 
     /// The word.
@@ -108,6 +111,7 @@ impl EventKind {
             Self::Refused => "refused",
             Self::PickupRefused => "pickup_refused",
             Self::Failed => "failed",
+            Self::WayBlocked => "way_blocked",
         }
     }
 
@@ -204,7 +208,7 @@ fn read_or_dash<T>(
 impl Event {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
         let wanted = "one of in_position, getting_item, item_delivered, next_node, refused, \
-                      pickup_refused and failed";
+                      pickup_refused, failed and way_blocked";
         Ok(Self {
             kind: reader.word().read(wanted, EventKind::from_word)?,
             node: Coord::read(reader)?,

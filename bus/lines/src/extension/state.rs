@@ -7,7 +7,7 @@
 use lager_wire::{Binary, LineBits};
 
 use super::fields::{Degrees, Loads, Servos, fields};
-use super::order::Mode;
+use super::order::{Mode, Pick};
 use crate::text::Name;
 use crate::warehouse::{Coord, Direction, ProductId};
 
@@ -44,6 +44,8 @@ fields! {
         remedy: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
         /// Who drives.
         mode: Mode = "manual or autonomous",
+        /// Who picks the goods up.
+        pick: Pick = "manual or auto",
         /// Whether a stop is in force.
         stopped: bool = "0 or 1",
         /// Why it was set, by the names of the causes of `link/health`, such as `ordered`.

@@ -2,7 +2,7 @@
 
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
-    Action, Block, Degrees, Edge, Hello, LeaseMs, Listed, Loads, Mode, Order, Queued, Report,
+    Action, Block, Degrees, Edge, Hello, LeaseMs, Listed, Loads, Mode, Order, Pick, Queued, Report,
     Servos, State,
 };
 use lager_lines::{Coord, Direction, Name, ProductId, to_line};
@@ -24,6 +24,8 @@ fn every_line_of_the_station_is_read_and_written() {
         "do 7 reset",
         "do 8 picked",
         "do 9 picked force",
+        "do 10 pick auto",
+        "do 11 pick manual",
         "do 10 drive 00000010 1",
         "do 11 drive 00001001 1000",
         "do 12 arm 11111010",
@@ -62,6 +64,7 @@ fn every_line_of_the_robot_is_read_and_written() {
         "event getting_item 1 0 4 7",
         "event item_delivered 0 0 4 7",
         "event refused 1 0 4 7 product 7 is not on my map",
+        "event way_blocked 1 0 4 7 up",
         "event pickup_refused 1 0 4 7 the claw is closed on nothing, at 300 of 310",
         "event failed 1 0 - - I have lost the line",
         "latency 500 110 180 240 900 4294967295",
@@ -115,6 +118,7 @@ fn the_fullest_state_fits_in_a_line() {
         phase: name(),
         hold: name(),
         mode: Some(Mode::Autonomous),
+        pick: Some(Pick::Auto),
         stopped: Some(true),
         stop_cause: name(),
         stop_by: name(),

@@ -91,10 +91,10 @@ const REQUEST: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, a
                        thought, set_robot and set_heading";
 const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, styrcomm \
                       and pickup_done";
-const ACTION: &str = "one of order, cancel, first, clear, mode, resume, reset, picked, drive, arm, \
-                      gains, calibrate and obstacle";
+const ACTION: &str = "one of order, cancel, first, clear, mode, resume, reset, picked, pick, \
+                      drive, arm, gains, calibrate and obstacle";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
-                     pickup_refused and failed";
+                     pickup_refused, failed and way_blocked";
 
 #[test]
 fn requests_that_are_none() {

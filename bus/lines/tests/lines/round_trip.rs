@@ -4,7 +4,7 @@ use lager_lines::command::Wheels;
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
     Action, Block, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Loads, Mode,
-    Order, Put, Queued, Report, Servos, State, Thinks, Truth,
+    Order, Pick, Put, Queued, Report, Servos, State, Thinks, Truth,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
@@ -103,6 +103,10 @@ fn mode() -> impl Strategy<Value = Mode> {
     select(&[Mode::Manual, Mode::Autonomous])
 }
 
+fn pick() -> impl Strategy<Value = Pick> {
+    select(&[Pick::Manual, Pick::Auto])
+}
+
 fn action() -> impl Strategy<Value = Action> {
     let lease = (1..=LeaseMs::MAX).prop_map(|ms| LeaseMs::new(ms).expect("in range"));
     prop_oneof![
@@ -114,6 +118,7 @@ fn action() -> impl Strategy<Value = Action> {
         Just(Action::Resume),
         Just(Action::Reset),
         any::<bool>().prop_map(|force| Action::Picked { force }),
+        pick().prop_map(Action::Pick),
         (wheels(), lease).prop_map(|(wheels, lease)| Action::Drive { wheels, lease }),
         arm().prop_map(Action::Arm),
         any::<(u8, u8)>().prop_map(|(p, d)| Action::Gains { p, d }),
@@ -138,10 +143,10 @@ prop_compose! {
     fn place()(
         time_ms in of(any::<u64>()), x_mm in of(any::<i32>()), y_mm in of(any::<i32>()),
         heading_deg in of(degrees()), unsure_mm in of(any::<u32>()), node in of(coord()), looks in of(direction()),
-        next in of(coord()), phase in of(name()), hold in of(name()), mode in of(mode()),
+        next in of(coord()), phase in of(name()), hold in of(name()), mode in of(mode()), pick in of(pick()),
     ) -> State {
         State {
-            time_ms, x_mm, y_mm, heading_deg, unsure_mm, node, looks, next, phase, hold, mode,
+            time_ms, x_mm, y_mm, heading_deg, unsure_mm, node, looks, next, phase, hold, mode, pick,
             ..State::default()
         }
     }

@@ -127,6 +127,10 @@ coded! {
         ParkedWithoutLink = 54,
         /// The delivery corner's mark has not come on the way back.
         CornerMissed = 55,
+        /// A person picks the goods up from now on.
+        PicksByHand = 56,
+        /// It picks the goods up by itself from now on.
+        PicksByItself = 57,
     }
 }
 
@@ -290,6 +294,12 @@ impl fmt::Display for Thought {
                 to,
                 "The external computer is out of reach. I stand at the next crossing."
             ),
+            ThoughtKind::PicksByHand => {
+                write!(to, "From now on a person picks the goods up.")
+            }
+            ThoughtKind::PicksByItself => {
+                write!(to, "From now on I pick the goods up by myself.")
+            }
             ThoughtKind::LinkBack => write!(to, "The external computer is there again."),
             ThoughtKind::ParkedWithoutLink => write!(
                 to,

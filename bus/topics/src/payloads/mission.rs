@@ -171,6 +171,10 @@ coded! {
         SwitchedToManual = 10,
         /// The switch of the robot has been moved to autonomous mode.
         SwitchedToAutonomous = 11,
+        /// A person picks the goods up from now on ([`Pick::Manual`](super::Pick)).
+        PickByHand = 12,
+        /// The robot picks the goods up by itself from now on ([`Pick::Auto`](super::Pick)).
+        PickByItself = 13,
     }
 }
 

@@ -19,7 +19,7 @@ pub use log::{Joint, Thought, ThoughtKind};
 pub use mission::{Event, EventKind, Input, InputKind, Order, OrderQueue, WaitingOrder};
 pub use nav::{
     BlockSource, BlockedWay, BlockedWays, Goal, Heading, Hold, MapProduct, NavigatorStatus, Phase,
-    Route, RouteNode, Side, Step, WarehouseMap,
+    Pick, Route, RouteNode, Side, Step, WarehouseMap,
 };
 pub use request::{
     Answer, Ask, AskKind, Outcome, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,

@@ -115,6 +115,16 @@ impl Hold {
 }
 
 coded! {
+    /// Who picks the goods up at a station.
+    pub enum Pick {
+        /// A person moves the arm and says when it is done.
+        Manual = 0,
+        /// The robot, by itself.
+        Auto = 1,
+    }
+}
+
+coded! {
     /// What the navigator looks for on the line it drives along.
     pub enum Step {
         /// The next mark it expects.
@@ -225,9 +235,11 @@ payload! {
         pub arm_moves: u8,
         /// What would end that it stands: its failure, what holds it, a stop, or the manual mode.
         pub remedy: Tag<Remedy>,
+        /// Who picks the goods up.
+        pub pick: Tag<Pick>,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 3],
+        pub reserved: [u8; 2],
     }
 }
 

@@ -3,8 +3,8 @@
 //! An action is judged here and carried out as a person at the robot would: by the same orders,
 //! presses and requests as the commands of `lager`. In doubt the robot stands and says why.
 
-use lager_lines::extension::{Action as Wanted, Edge, Mode as WantedMode, Put};
-use lager_topics::{Ask, AskKind, Mode, Order, Phase, Refusal, WorldAsk, WorldAskKind};
+use lager_lines::extension::{Action as Wanted, Edge, Mode as WantedMode, Pick as WantedPick, Put};
+use lager_topics::{Ask, AskKind, Mode, Order, Phase, Pick, Refusal, WorldAsk, WorldAskKind};
 use lager_wire::OperatorCommand;
 
 use super::{Conversation, MOST_STOPS, STOPPED};
@@ -144,6 +144,14 @@ impl Conversation {
                 }
                 let id = self.ids.fresh(now);
                 self.tasks.picked(now, asker, id, status.order_id, force);
+            }
+            Wanted::Pick(pick) => {
+                let id = self.ids.fresh(now);
+                let pick = match pick {
+                    WantedPick::Manual => Pick::Manual,
+                    WantedPick::Auto => Pick::Auto,
+                };
+                self.tasks.pick(now, asker, id, pick);
             }
             Wanted::Reset => {
                 let id = self.ids.fresh(now);

@@ -4,8 +4,9 @@ use lager_comm::Senses;
 use lager_topics::{
     Answer, AskKind, BlockedWay, BlockedWays, DistanceFrame, Event, EventKind, Failure,
     FailureKind, Finish, Heading, InputKind, LineFrame, MapProduct, Mode, NavigatorStatus, Order,
-    OrderQueue, Origin, Outcome, Phase, Refusal, Remedy, Role, SteeringReport, StopCause, Thought,
-    ThoughtKind, Truth, WaitingOrder, WarehouseMap, WorldAnswer, WorldAskKind, WorldRefusal,
+    OrderQueue, Origin, Outcome, Phase, Pick, Refusal, Remedy, Role, SteeringReport, StopCause,
+    Thought, ThoughtKind, Truth, WaitingOrder, WarehouseMap, WorldAnswer, WorldAskKind,
+    WorldRefusal,
 };
 
 use crate::robot::Robot;
@@ -126,7 +127,7 @@ fn a_station_is_told_the_state_twenty_times_a_second() {
     assert_eq!(states.len(), 20, "{:?}", robot.shown);
     for field in [
         " x_mm=550 y_mm=800 heading_deg=90 unsure_mm=38 node=1,2 looks=right ",
-        " phase=waiting_for_order hold=none mode=autonomous stopped=0 ",
+        " phase=waiting_for_order hold=none mode=autonomous pick=manual stopped=0 ",
         " line_bits=00001110000 ",
         " distance_cm=52 ",
         " sensor_up=1 steering_up=0 ",
@@ -432,6 +433,33 @@ fn the_goods_are_in_the_gripper_when_logic_leaves() {
     let said = robot.hears(&["do 3 picked force"]);
     assert_eq!(said[0], "[presses PickupForced]");
     assert_eq!(robot.does(Phase::Leaving, order), ["done 3"]);
+}
+
+#[test]
+fn who_picks_is_chosen_when_logic_says_so() {
+    let mut robot = extended(Mode::Autonomous);
+    // Logic shows who picks, and some time passes.
+    let shows = |robot: &mut Robot, pick: Pick| {
+        robot.status(&NavigatorStatus {
+            pick: pick.into(),
+            ..NavigatorStatus::default()
+        });
+        robot.shown.clear();
+        let mut said = pass(robot, 300);
+        said.retain(|line| !line.starts_with("set_"));
+        said
+    };
+    let press = "[presses PickByItself]";
+    assert_eq!(robot.hears(&["do 1 pick auto"]), [press]);
+    assert_eq!(shows(&mut robot, Pick::Manual), [press]);
+    assert_eq!(shows(&mut robot, Pick::Auto), ["done 1"]);
+    assert!(robot.shown[0].contains(" pick=auto "), "{:?}", robot.shown);
+    let said = robot.hears(&["do 2 pick manual"]);
+    assert_eq!(said, ["[presses PickByHand]"]);
+    assert_eq!(shows(&mut robot, Pick::Manual), ["done 2"]);
+    let said = robot.hears(&["do 3 pick nobody"]);
+    assert!(said[0].starts_with("refused 3 "), "{said:?}");
+    assert!(said[0].contains("manual or auto"), "{said:?}");
 }
 
 #[test]

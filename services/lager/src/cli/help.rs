@@ -20,6 +20,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "mode",
             "fetch",
             "queue",
+            "pick",
             "picked",
             "reset",
             "press",

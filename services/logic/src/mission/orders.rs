@@ -2,11 +2,10 @@
 //! there.
 
 use lager_topics::{
-    EventKind, Failure, FailureKind, Goal, Order, OrderQueue, Phase, Thought, ThoughtKind,
+    EventKind, Failure, FailureKind, Goal, Order, OrderQueue, Phase, Pick, Thought, ThoughtKind,
 };
 
 use super::{Mission, Tables};
-use crate::config::Pick;
 use crate::output::Output;
 use crate::queue::Queue;
 
@@ -200,7 +199,7 @@ impl Mission {
     pub(super) fn be_in_position(&mut self, out: &mut Output) {
         self.phase = Phase::Picking;
         out.announce(EventKind::InPosition, self.place, self.order);
-        let kind = match self.config.pick {
+        let kind = match self.pick {
             Pick::Auto => ThoughtKind::Picking,
             Pick::Manual => ThoughtKind::AwaitsPickup,
         };

@@ -1,6 +1,6 @@
 //! What the navigator is told.
 
-use lager_topics::{BlockSource, Heading, Mode, Order, SteeringReport, WarehouseMap};
+use lager_topics::{BlockSource, Heading, Mode, Order, Pick, SteeringReport, WarehouseMap};
 use lager_wire::LineState;
 
 use crate::node::Node;
@@ -31,6 +31,8 @@ pub enum Input<'a> {
         /// Whether the operator is believed although the claw does not feel the goods.
         forced: bool,
     },
+    /// Who picks the goods up from now on.
+    Pick(Pick),
     /// What the wheels have turned in manual mode, as the bridge sums it: duty × µs of both motors.
     DrivenByHand(u64),
     /// The robot has been put on the delivery node, looking into the warehouse (AMB-50).

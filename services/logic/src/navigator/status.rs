@@ -50,6 +50,7 @@ impl Navigator {
             hold: self.steady.hold.into(),
             forced: mission.forced.into(),
             remedy: self.remedy().into(),
+            pick: mission.pick.into(),
             ..NavigatorStatus::default()
         };
         if let Some((heard, distance_cm)) = senses.distance {
@@ -109,6 +110,7 @@ impl Navigator {
         mission.misses = status.misses;
         mission.forced = status.forced != 0;
         mission.failure = status.failure;
+        mission.pick = status.pick.get()?;
         if status.hold == Hold::Battery {
             mission.parked = true;
             mission.battery = Battery::LOW;

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Heading, Mode, ThoughtKind, WarehouseMap};
+use lager_topics::{FailureKind, Heading, Mode, Phase, Pick, ThoughtKind, WarehouseMap};
 
 use super::{Input, Navigator};
 use crate::blocks::Block;
@@ -22,6 +22,7 @@ impl Navigator {
             Input::DrivenByHand(_) => false,
             Input::Mode { mode, stopped } => (self.mode, self.stopped) != (Some(mode), stopped),
             Input::Link { lost } => self.mission.link_lost != lost,
+            Input::Pick(pick) => self.mission.pick != pick,
             _ => true,
         };
         match input {
@@ -31,6 +32,7 @@ impl Navigator {
             Input::MoveUp(id) => self.mission.move_up(id, out),
             Input::ClearQueue => self.mission.clear_queue(out),
             Input::PickupDone { order_id, forced } => self.picked(now, order_id, forced, out),
+            Input::Pick(pick) => self.choose_pick(now, pick, out),
             Input::DrivenByHand(sum) => self.watch_manual_driving(now, sum, out),
             Input::Reset => self.put_down(None, out),
             Input::Placed { node, heading } => self.put_down(Some((node, heading)), out),
@@ -75,6 +77,31 @@ impl Navigator {
             false => ThoughtKind::LinkBack,
         });
         self.leave_park(now, out);
+    }
+
+    /// Who picks the goods up from now on. An arm that is picking ends what it does.
+    fn choose_pick(&mut self, now: Duration, pick: Pick, out: &mut Output) {
+        if core::mem::replace(&mut self.mission.pick, pick) == pick {
+            return;
+        }
+        out.think(match pick {
+            Pick::Manual => ThoughtKind::PicksByHand,
+            Pick::Auto => ThoughtKind::PicksByItself,
+        });
+        // Goods that a person holds in the claw already are his to hand over.
+        let waits = self.mission.phase == Phase::Picking
+            && matches!(self.manoeuvre, Manoeuvre::Stand)
+            && self.claw_is_empty().is_some();
+        if waits && pick == Pick::Auto {
+            self.begin(now, out);
+        }
+    }
+
+    /// Why the claw is believed to hold nothing, if it is.
+    fn claw_is_empty(&self) -> Option<(FailureKind, i32, i32)> {
+        let config = &self.config;
+        let arm = &self.senses.arm;
+        arm.claw_is_empty(&config.arm, config.held_margin)
     }
 
     fn learn_whether_active(&mut self) {
@@ -132,10 +159,7 @@ impl Navigator {
     }
 
     fn picked(&mut self, now: Duration, order_id: u32, forced: bool, out: &mut Output) {
-        let empty = self
-            .senses
-            .arm
-            .claw_is_empty(&self.config.arm, self.config.held_margin);
+        let empty = self.claw_is_empty();
         let picks = matches!(self.manoeuvre, Manoeuvre::Arm(_));
         if picks && !forced && empty.is_none() {
             // The routine brings the arm to its end, and finds out by itself.

@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use lager_logic::{Input, LogicConfig, Pick};
-use lager_topics::{EventKind, FailureKind, Phase, Remedy, Side};
+use lager_logic::{Input, LogicConfig};
+use lager_topics::{EventKind, FailureKind, Phase, Pick, Remedy, Side};
 
 use crate::double::Trouble;
 use crate::floor::Exit;
@@ -36,6 +36,58 @@ fn goods_ahead_or_to_either_side_are_picked_and_delivered() {
         trial.deliver(1);
         assert_eq!(trial.count(EventKind::ItemDelivered), 1);
     }
+}
+
+/// Brings a robot to its goods that leaves picking to a person.
+fn waiting_at_the_goods() -> Trial {
+    let map = warehouse((1, 1), (0, 0), 45, &[(0, 0, Side::Up)]);
+    let config = LogicConfig::default();
+    let mut trial = Trial::with(config, map, Exit::Straight(450.0), Trouble::NONE, 3);
+    trial.body.goods_at = Some(512);
+    trial.order(1, 1);
+    let came = trial.run_until(SECOND * 90, |trial| trial.phase() == Phase::Picking);
+    assert!(came, "{}", trial.story());
+    // Nothing is in the claw.
+    trial.body.claw_load = 0;
+    trial.run_for(SECOND / 5);
+    trial
+}
+
+fn grants_the_arm(trial: &Trial) -> bool {
+    trial.navigator.current_order().unwrap().arm_granted != 0
+}
+
+#[test]
+fn who_picks_may_change_while_it_waits_at_the_goods_and_outlives_the_navigator() {
+    let mut trial = waiting_at_the_goods();
+    assert!(grants_the_arm(&trial));
+    trial.kill(SECOND / 5);
+    trial.run_for(SECOND / 5);
+    assert!(
+        grants_the_arm(&trial),
+        "nobody has told the successor to pick"
+    );
+    trial.tell(Input::Pick(Pick::Auto));
+    trial.run_for(SECOND / 5);
+    assert!(!grants_the_arm(&trial), "the arm is the robot's own");
+    trial.kill(SECOND / 5);
+    assert_eq!(trial.navigator.status().pick, Pick::Auto);
+    // Whoever changes his mind does not stop an arm half-way.
+    trial.run_for(SECOND / 2);
+    trial.tell(Input::Pick(Pick::Manual));
+    let left = trial.run_until(SECOND * 60, |trial| trial.phase() != Phase::Picking);
+    assert!(left, "{}", trial.story());
+    assert_eq!(trial.navigator.status().pick, Pick::Manual);
+}
+
+#[test]
+fn goods_that_a_person_holds_in_the_claw_are_not_put_down_to_be_picked_again() {
+    let mut trial = waiting_at_the_goods();
+    trial.body.claw_load = -311;
+    trial.run_for(SECOND / 5);
+    trial.tell(Input::Pick(Pick::Auto));
+    trial.run_for(SECOND / 10);
+    assert!(grants_the_arm(&trial), "they are the person's to hand over");
 }
 
 #[test]

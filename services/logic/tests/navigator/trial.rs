@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use lager_logic::map::Map;
 use lager_logic::node::Node;
-use lager_logic::{Input, LogicConfig, Navigator, Output, Pick};
+use lager_logic::{Input, LogicConfig, Navigator, Output};
 use lager_topics::{
-    BlockedWays, EventKind, MapProduct, Mode, NavigatorStatus, Order, OrderQueue, Phase, Remedy,
-    Side, WarehouseMap,
+    BlockedWays, EventKind, MapProduct, Mode, NavigatorStatus, Order, OrderQueue, Phase, Pick,
+    Remedy, Side, WarehouseMap,
 };
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 
