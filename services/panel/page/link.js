@@ -103,7 +103,7 @@ export class Link extends EventTarget {
       for (const line of message.data.split("\n")) {
         if (line) this.hear(line);
       }
-      this.emit("news");
+      if (message.data.includes(" state ")) this.emit("pose");
     };
     socket.onclose = () => {
       this.open = false;

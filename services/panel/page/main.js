@@ -129,9 +129,16 @@ link.addEventListener("warehouse", () => {
 link.addEventListener("link", words);
 words();
 
-/** What moves is drawn for what is new and some thirty times a second, all else ten times. */
-const PICTURE_MS = 25;
-const REST_MS = 100;
+/** All that is not moved is drawn five times a second. */
+const REST_MS = 200;
+/**
+ * What part of a core pictures may take. Each new pose is drawn at once, twenty times a second. As many
+ * more as this allows, up to all of the screen's, let robot and strips move smoothly: on a machine that
+ * paints in a fraction of a millisecond all of them.
+ */
+const SHARE = 0.04;
+/** So long a picture has taken lately, in ms, all the browser's work for it included. */
+let cost = 5;
 let drawn = -Infinity;
 let due = null;
 let timer = null;
@@ -142,15 +149,23 @@ function soon() {
   due ??= requestAnimationFrame(picture);
 }
 
+// A message to itself comes once the picture is laid out and painted.
+const painted = new MessageChannel();
+painted.port1.onmessage = ({ data: began }) => (cost += (Math.min(now() - began, 50) - cost) / 16);
+
 function picture() {
   due = null;
-  timer = setTimeout(soon, PICTURE_MS);
   const time = now();
+  painted.port2.postMessage(time);
+  const pause = cost / SHARE;
+  timer = setTimeout(soon, Math.min(pause, REST_MS));
+  const isSmooth = pause < 34;
   const shown = robot();
   driving.pads();
   map.move(shown, time);
-  strips.move(shown, time);
-  if (time - drawn >= REST_MS) {
+  const isRest = time - drawn >= REST_MS;
+  if (isSmooth || isRest) strips.move(shown, time);
+  if (isRest) {
     drawn = time;
     drawRest(shown, time);
   }
@@ -170,5 +185,5 @@ function drawRest(shown, time) {
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
-link.addEventListener("news", soon);
+link.addEventListener("pose", soon);
 soon();

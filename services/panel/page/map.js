@@ -25,6 +25,8 @@ export function make(name, attributes = {}, parent = null, text = null) {
   return element;
 }
 
+const REDUCED = matchMedia("(prefers-reduced-motion: reduce)");
+
 export class WarehouseMap {
   /** `act` is told of an edge that was clicked; while `placesGoods()`, `place` of a square's side. */
   constructor(svg, tools, act, placesGoods, place) {
@@ -112,6 +114,7 @@ export class WarehouseMap {
     }
     if (arcs.length) go(length_cm * 10 - first - bent);
     this.wayOut = make("path", { class: "tape", d: path, fill: "none" }, this.floor);
+    this.wayOutLength = this.wayOut.getTotalLength();
     const [dx, dy] = [Math.sin(at.heading) * BAR / 2, Math.cos(at.heading) * BAR / 2];
     make("line", { class: "bar", x1: at.x + dx, y1: -at.y + dy, x2: at.x - dx, y2: -at.y - dy }, this.floor);
     this.end = at;
@@ -124,7 +127,7 @@ export class WarehouseMap {
     const outwards = x === 0 ? -1 : 1;
     const far = (pose.x - x) * outwards;
     if (far <= 0 || Math.abs(pose.y - y) >= 1) return pose;
-    const end = this.wayOut.getTotalLength() - 1;
+    const end = this.wayOutLength - 1;
     const [at, ahead] = [0, 1].map((mm) => this.wayOut.getPointAtLength(Math.min(far, end) + mm));
     const along = (Math.atan2(ahead.x - at.x, at.y - ahead.y) * 180) / Math.PI;
     return { x: at.x, y: -at.y, heading: pose.heading + along - outwards * 90 };
@@ -173,7 +176,7 @@ export class WarehouseMap {
 
   /** Where to draw between two poses. */
   glide(aim, now, stale) {
-    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const still = REDUCED.matches;
     const shown = this.shown;
     const jump = !shown || still || Math.hypot(aim.x - shown.x, aim.y - shown.y) > 500;
     const part = jump ? 1 : Math.min(1, (now - shown.at) / GLIDE_MS);

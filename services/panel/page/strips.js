@@ -16,6 +16,7 @@ const STRIPS = [
   ["losses", "", 0, null, ["lost"]],
 ];
 const SENSORS = 11;
+const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 export class Strips {
   constructor(parent) {
@@ -37,8 +38,13 @@ export class Strips {
 
   /** Figures and sensors. */
   draw(robot) {
-    const style = getComputedStyle(document.body);
-    const colours = [style.getPropertyValue("--accent"), style.getPropertyValue("--quiet")];
+    const dark = DARK.matches;
+    if (this.dark !== dark) {
+      this.dark = dark;
+      const style = getComputedStyle(document.body);
+      this.colours = [style.getPropertyValue("--accent"), style.getPropertyValue("--quiet")];
+    }
+    const { colours } = this;
     for (const strip of this.strips) strip.draw(robot, colours);
     const { line_bits: bits, line_error: error } = robot?.state ?? {};
     // Where the bits are not told, the sensor above the middle of the tape shows.
@@ -56,12 +62,14 @@ class Strip {
     figure.append(this.caption, this.canvas);
     parent.append(figure);
     this.pen = this.canvas.getContext("2d");
+    // To ask for the size would lay the page out each time.
+    new ResizeObserver(([{ contentRect }]) => (this.box = contentRect)).observe(this.canvas);
     this.colours = ["", ""];
     /** What the canvas shows: whose past, drawn in what way, up to which point and which column. */
     this.shown = { robot: null, look: "", total: 0, column: 0 };
   }
 
-  /** The last figures, and what the lines look like: it costs a layout and is seldom needed. */
+  /** The last figures, and what the lines look like. */
   draw(robot, colours) {
     const last = robot?.past.at(-1);
     const values = this.keys.map((key) => last?.[key]);
@@ -70,7 +78,7 @@ class Strip {
     if (this.caption.textContent !== text) this.caption.textContent = text;
 
     const ratio = devicePixelRatio;
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((side) => Math.round(side * ratio));
+    const [width, height] = [this.box?.width ?? 0, this.box?.height ?? 0].map((side) => Math.round(side * ratio));
     const since = performance.now() - SPAN_MS;
     const seen = (robot?.past ?? []).filter(({ at }) => at > since);
     this.top = this.high ?? Math.max(1, ...seen.flatMap((point) => this.keys.map((key) => point[key] ?? 0)));
@@ -88,6 +96,7 @@ class Strip {
     const column = this.column(now);
     const { shown } = this;
     const shift = column - shown.column;
+    if (shown.robot === robot && shown.look === this.look && shift === 0 && total === shown.total) return;
     let first = past.length - (total - shown.total) - 1;
     if (shown.robot !== robot || shown.look !== this.look || shift >= width) {
       Object.assign(this.canvas, { width, height: this.size.height });

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use crate::Place;
 use crate::access::Rank;
@@ -17,6 +17,9 @@ use crate::visit::Visit;
 
 /// How often it is looked what there is to tell when the station tells nothing new.
 const LOOK: Duration = Duration::from_millis(100);
+/// A robot says several things at a time; what comes within this time is told in one message, since
+/// each costs the browser a turn of its own.
+const GATHER: Duration = Duration::from_millis(3);
 /// How often a page is asked whether it is there.
 const PING: Duration = Duration::from_secs(1);
 /// How long a page may take to take a message in.
@@ -85,7 +88,9 @@ async fn tell(
     let mut changes = lock(visit).changes();
     let mut pinged = Instant::now();
     loop {
-        let _ = timeout(LOOK, changes.changed()).await;
+        if timeout(LOOK, changes.changed()).await.is_ok() {
+            sleep(GATHER).await;
+        }
         let news = lock(visit).news();
         if !news.is_empty() {
             send(sink, Message::text(news)).await?;
