@@ -53,6 +53,12 @@ export class Strips {
   }
 }
 
+/** Figures with their unit, short enough for a caption. */
+function told(figures, unit) {
+  if (unit === "µs" && Math.max(...figures) >= 1000) return `${figures.map((us) => (us / 1000).toFixed(1)).join(" / ")} ms`;
+  return `${figures.join(" / ")} ${unit}`;
+}
+
 class Strip {
   constructor(parent, word, unit, low, high, keys) {
     Object.assign(this, { word, unit, low, high, keys });
@@ -74,7 +80,7 @@ class Strip {
     const last = robot?.past.at(-1);
     const values = this.keys.map((key) => last?.[key]);
     const known = values.filter((value) => value !== null && value !== undefined);
-    const text = `${say(this.word)} ${known.length ? `${known.join(" / ")} ${this.unit}` : "–"}`;
+    const text = `${say(this.word)} ${known.length ? told(known, this.unit) : "–"}`;
     if (this.caption.textContent !== text) this.caption.textContent = text;
 
     const ratio = devicePixelRatio;
