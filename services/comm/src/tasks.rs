@@ -246,7 +246,7 @@ impl Tasks {
                     Task::Order(order) => actions.push(Action::Order(order)),
                     // The same press twice is one.
                     Task::Picked | Task::Pick(_) | Task::Reset => {
-                        actions.push(Action::Press(one.input))
+                        actions.push(Action::Press(one.input));
                     }
                     // Two of these would be two.
                     _ => {}
