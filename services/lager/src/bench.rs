@@ -3,6 +3,7 @@
 //! Nothing is measured here; the same code runs under criterion and in the guard.
 
 mod command;
+mod link;
 mod robot;
 mod stop;
 mod times;
@@ -26,7 +27,7 @@ pub fn run(args: &BenchArgs) -> Result<String> {
         Scenario::Path => ("path", path::measure(&options)),
         Scenario::Fanout => ("fanout", fanout::measure(&options)),
         Scenario::Chip => return run_chip(args),
-        Scenario::Stop | Scenario::Command => return run_robot(args),
+        Scenario::Stop | Scenario::Command | Scenario::Link => return run_robot(args),
     };
     let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
     Ok(if args.json {
@@ -67,14 +68,17 @@ fn run_chip(args: &BenchArgs) -> Result<String> {
     })
 }
 
-/// How often a robot is stopped or given a command: for a first look, and in full.
+/// How often a robot is stopped, given a command or cut off: for a first look, and in full.
 const TIMES: [usize; 2] = [20, 200];
 
 /// The processes that people run, on a robot of the measurement's own.
 fn run_robot(args: &BenchArgs) -> Result<String> {
     let times = args.runs.unwrap_or(TIMES[usize::from(!args.quick)]);
-    let is_stop = args.scenario == Scenario::Stop;
-    let name = if is_stop { "stop" } else { "command" };
+    let name = match args.scenario {
+        Scenario::Stop => "stop",
+        Scenario::Command => "command",
+        _ => "link",
+    };
     ensure!(
         args.mode.is_empty() && args.regime.is_empty(),
         Usage(format!(
@@ -82,9 +86,10 @@ fn run_robot(args: &BenchArgs) -> Result<String> {
         ))
     );
     let failed = || format!("`lager bench {name}` has no result");
-    match is_stop {
-        true => told(args, &stop::measure(times).with_context(failed)?),
-        false => told(args, &command::measure(times).with_context(failed)?),
+    match args.scenario {
+        Scenario::Stop => told(args, &stop::measure(times).with_context(failed)?),
+        Scenario::Command => told(args, &command::measure(times).with_context(failed)?),
+        _ => told(args, &link::measure(times).with_context(failed)?),
     }
 }
 
@@ -168,7 +173,7 @@ mod tests {
     #[test]
     fn wrong_choices_say_what_there_is() {
         for (flags, words) in [
-            (&["leap"][..], "hop, path, fanout, chip, stop, command"),
+            (&["leap"][..], "hop, path, fanout, chip, stop, command, link"),
             (&["hop", "--mode", "busy"], "spin, adaptive or block"),
             (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
             (&["hop", "--runs", "0"], "the least"),

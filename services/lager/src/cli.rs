@@ -577,6 +577,8 @@ pub enum Scenario {
     Stop,
     /// From a command that a GaG sends to the station until the motors of its robot obey
     Command,
+    /// From a cut of the link to the station until a robot that is driven by hand stands
+    Link,
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! 500 000 Bd, behind two ptys, with the services that `lager up` starts.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -34,11 +34,18 @@ pub(super) struct Processes {
 }
 
 impl Processes {
-    fn start(&mut self, arguments: &[&str]) -> Result<()> {
+    /// Starts `lager` with these arguments.
+    pub(super) fn start(&mut self, arguments: &[&str]) -> Result<Pid> {
         let child = self.command(arguments)?.spawn();
-        self.children
-            .push(child.context("cannot start the robot to be measured")?);
-        Ok(())
+        let child = child.context("cannot start the robot to be measured")?;
+        let pid = Pid::from_child(&child);
+        self.children.push(child);
+        Ok(pid)
+    }
+
+    /// Where the bus lives.
+    pub(super) fn folder(&self) -> &Path {
+        self.domain.folder()
     }
 
     pub(super) fn command(&self, arguments: &[&str]) -> Result<Command> {
@@ -70,6 +77,11 @@ impl Drop for Processes {
 
 impl Robot {
     pub(super) fn start() -> Result<Self> {
+        Self::start_with(&[])
+    }
+
+    /// With more flags for `up`.
+    pub(super) fn start_with(flags: &[&str]) -> Result<Self> {
         heed_interrupts();
         let domain = Domain::new()?;
         let config = domain.config();
@@ -84,7 +96,7 @@ impl Robot {
         };
         fs::write(place.folder().join("robot.toml"), text)?;
         processes.start(&["simulator"])?;
-        processes.start(&["up"])?;
+        processes.start(&[&["up"], flags].concat())?;
         let bus = Bus::open(&config, Role::Operator)?;
         let hands = Hands::new(&bus)?;
         let robot = Self {
