@@ -2,6 +2,7 @@
 //! with them: it follows the grammar alone.
 
 mod bad;
+mod by_arm;
 mod extended;
 mod gag;
 mod lost;

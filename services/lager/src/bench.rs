@@ -173,7 +173,10 @@ mod tests {
     #[test]
     fn wrong_choices_say_what_there_is() {
         for (flags, words) in [
-            (&["leap"][..], "hop, path, fanout, chip, stop, command, link"),
+            (
+                &["leap"][..],
+                "hop, path, fanout, chip, stop, command, link",
+            ),
             (&["hop", "--mode", "busy"], "spin, adaptive or block"),
             (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
             (&["hop", "--runs", "0"], "the least"),

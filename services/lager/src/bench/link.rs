@@ -113,7 +113,10 @@ impl Wheels {
                 return Ok(truth.stamp().publish_time_ns - cut_ns);
             }
             ensure!(!interrupted(), BenchError::Interrupted);
-            ensure!(start.elapsed() < PATIENCE, "the robot drives on without a link");
+            ensure!(
+                start.elapsed() < PATIENCE,
+                "the robot drives on without a link"
+            );
             std::thread::sleep(Duration::from_millis(1));
         }
     }
