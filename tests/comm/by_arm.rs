@@ -167,6 +167,6 @@ fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
     wait_for("`up` to tell of it", || {
         up.output().contains("DELIVERED product 2").then_some(())
     });
-    drop(up);
+    drop((asking, truth, bus, up));
     domain.assert_clean();
 }
