@@ -2,6 +2,7 @@
 //! on it, and a look at what it leaves behind.
 
 mod cable;
+mod compare;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 pub use cable::Cable;
+pub use compare::compare;
 
 /// How long a test waits for anything before it calls it stuck. It bounds a hang; it measures
 /// nothing.

@@ -7,35 +7,18 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
+use lager_tests::compare;
+use serde_json::json;
 use tungstenite::client::IntoClientRequest as _;
 
 use crate::Scene;
 
 /// Pages that watch at once.
 const PAGES: usize = 10;
-/// How often the path is measured with them and without.
-const TURNS: usize = 12;
 /// How long a page is looked at before its memory is told again.
 const LOOK: Duration = Duration::from_secs(60);
 /// For how many of these, unless `LAGER_SOAK_MINUTES` says so.
 const LOOKS: usize = 60;
-
-/// p50 and p99 of the path on this machine now, in us. The bench has its own bus and boards.
-fn path(scene: &Scene) -> [f64; 2] {
-    let args = "bench path --mode block --regime plain --quick --json --runs 1";
-    let out = scene.domain.run(&args.split(' ').collect::<Vec<_>>());
-    let told: Value = serde_json::from_slice(&out.stdout).expect("JSON");
-    let rows = told["rows"].as_array().expect("rows");
-    let is_ours = |row: &&Value| row["what"] == "path" && row["name"] == "lager";
-    let row = rows.iter().find(is_ours).expect("a row");
-    ["p50_ns", "p99_ns"].map(|key| row[key].as_f64().expect("ns") / 1e3)
-}
-
-fn median(mut of: Vec<f64>) -> f64 {
-    of.sort_by(f64::total_cmp);
-    f64::midpoint(of[(of.len() - 1) / 2], of[of.len() / 2])
-}
 
 /// A page's socket without a page: somebody who watches with a processor of his own.
 struct Watcher {
@@ -82,41 +65,19 @@ impl Drop for Watcher {
     }
 }
 
-/// Measures the path in turns, alone and with what `watch` opens.
-fn compare<W>(what: &str, scene: &Scene, mut watch: impl FnMut() -> W) {
-    let turns: Vec<_> = (0..TURNS)
-        .map(|_| {
-            let alone = path(scene);
-            let watchers = watch();
-            let watched = path(scene);
-            drop(watchers);
-            (alone, watched)
-        })
-        .collect();
-    for (index, name) in ["p50", "p99"].into_iter().enumerate() {
-        let alone = median(turns.iter().map(|(alone, _)| alone[index]).collect());
-        let watched = median(turns.iter().map(|(_, watched)| watched[index]).collect());
-        let ratio = median(turns.iter().map(|(a, w)| w[index] / a[index]).collect());
-        println!(
-            "{what:<26} {name}: alone {alone:.0} us, watched {watched:.0} us, middle of {TURNS} \
-             ratios {ratio:.2}"
-        );
-    }
-}
-
 #[test]
 #[ignore = "it prints figures: tests/soak watched"]
 fn the_path_while_ten_pages_watch() {
     let scene = Scene::new(1.0, &["--mission", "1,2,3,1,2,3,1,2,3,1,2,3"]);
     let page = scene.page();
     drop(page);
-    compare("ten pages elsewhere", &scene, || {
+    compare(&scene.domain, "ten pages elsewhere", || {
         let watchers: Vec<_> = (0..PAGES).map(|_| Watcher::new(&scene.url)).collect();
         // What has happened before is told in the first moments.
         std::thread::sleep(Duration::from_secs(1));
         watchers
     });
-    compare("ten tabs of a browser here", &scene, || {
+    compare(&scene.domain, "ten tabs of a browser here", || {
         let pages: Vec<_> = (0..PAGES).map(|_| scene.page()).collect();
         std::thread::sleep(Duration::from_secs(2));
         // A page goes with its browser unless it is closed.
