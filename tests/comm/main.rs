@@ -4,6 +4,7 @@
 mod bad;
 mod by_arm;
 mod extended;
+mod full;
 mod gag;
 mod lost;
 mod peers;

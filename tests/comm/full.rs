@@ -1,0 +1,94 @@
+//! A station whose disk is full: it goes on answering, says that nothing is saved, keeps the file as
+//! it was, and saves when there is room again.
+
+use std::fs;
+use std::io::BufReader;
+use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use lager_tests::{Domain, lager, wait_for};
+
+use crate::WAREHOUSE;
+use crate::scene::{Peer, WATCHDOG};
+
+/// A process that ends with the test.
+struct Ends(Child);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
+    let domain = Domain::new();
+    let here = domain.folder();
+    fs::write(here.join("warehouse.toml"), WAREHOUSE).expect("a file");
+    fs::create_dir(here.join("disk")).expect("a folder");
+    // A disk of its own, which what is in the way fills but for the file that is there.
+    let script = "mount -t tmpfs -o size=64k none disk && cp warehouse.toml disk/ || exit 99; \
+                  cat /dev/zero >disk/in-the-way 2>/dev/null; exec \"$@\"";
+    let out = |name: &str| fs::File::create(here.join(name)).expect("a file");
+    let station = Command::new("unshare")
+        .args(["--map-root-user", "--mount", "sh", "-c", script, "sh"])
+        .arg(lager())
+        .args(["station", "--listen", "127.0.0.1:0", "--gag", "gag"])
+        .args(["--warehouse", "disk/warehouse.toml", "--no-panel"])
+        .current_dir(here)
+        .stdin(Stdio::null())
+        .stdout(out("out"))
+        .stderr(out("err"))
+        .spawn()
+        .expect("`unshare` is there");
+    let mut station = Ends(station);
+    let said = |name: &str| fs::read_to_string(here.join(name)).expect("a file");
+    let address = wait_for("the station", || {
+        let ended = station.0.try_wait().expect("a child");
+        assert!(ended.is_none(), "{ended:?}: {}", said("err"));
+        let said = said("out");
+        let address = said.strip_prefix("robots connect to ")?.split(',').next()?;
+        said.contains('\n').then(|| address.to_owned())
+    });
+    let robot = TcpStream::connect(address).expect("it listens");
+    let gag = UnixStream::connect(here.join("gag")).expect("it listens");
+    robot.set_read_timeout(Some(WATCHDOG)).expect("a socket");
+    gag.set_read_timeout(Some(WATCHDOG)).expect("a socket");
+    let (mut robot, mut gag) = (Peer(BufReader::new(robot)), Peer(BufReader::new(gag)));
+    let mut describes = |answer: &str| {
+        let question = answer.split(' ').next().expect("a word");
+        robot.says(question);
+        assert_eq!(gag.waits_for(&[question]), question);
+        gag.says(answer);
+        assert_eq!(robot.waits_for(&[question]), answer);
+    };
+    // A warehouse is taken up when all of it has been said.
+    for answer in ["karta 2 2 0 0", "prodlis 1 7 0 0 left", "sidelength 35"] {
+        describes(answer);
+    }
+    let told = wait_for("it to say that nothing is saved", || {
+        let told = said("err");
+        told.contains("No space left").then_some(told)
+    });
+    assert!(told.contains("disk/warehouse.toml"), "{told}");
+    // As that process sees it; nobody else sees this disk.
+    let disk = format!(
+        "/proc/{}/root{}",
+        station.0.id(),
+        here.join("disk").display()
+    );
+    let disk = Path::new(&disk);
+    let saved = || fs::read_to_string(disk.join("warehouse.toml")).expect("a file");
+    assert_eq!(saved(), WAREHOUSE);
+
+    fs::remove_file(disk.join("in-the-way")).expect("a file");
+    describes("sidelength 36");
+    wait_for("the warehouse to be saved", || {
+        saved().contains("side_length_cm = 36").then_some(())
+    });
+    let left: Vec<_> = fs::read_dir(disk).expect("a folder").flatten().collect();
+    assert!(left.len() <= 2, "{left:?}");
+}
