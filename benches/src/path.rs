@@ -15,7 +15,7 @@
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
-//! | `path-stages` | each stage of `lager/block`, as the robot itself publishes it | |
+//! | `path-stages` | each stage of `lager`, as the robot itself publishes it | |
 //!
 //! An observer is a process of its own on a node of its own, subscribed to `sensor/line` and
 //! `steering/command`, that reads all that has come ten times a second.
@@ -32,8 +32,6 @@ mod processes;
 mod robot;
 mod stages;
 
-use lager_topics::PathLatency;
-
 use crate::error::BenchError;
 use crate::machine::{self, Awake, Bound, cores_for};
 use crate::report::{Mode, Options, Regime, Report, Row};
@@ -49,6 +47,9 @@ pub(crate) use players::PARTS;
 /// Turns of each chain in one run.
 const TURNS: usize = 8;
 const QUICK_TURNS: usize = 2;
+
+/// Frames of somewhat more than a second.
+const A_SECOND: usize = 1_100;
 
 /// SCHED_FIFO priorities: the boards are hardware, so nothing of the robot comes before them.
 const SERVICES: i32 = 40;
@@ -186,18 +187,15 @@ fn path(regime: Regime, entries: &[Entry], options: &Options) -> Result<Vec<Row>
         if entry.name == "floor" {
             continue;
         }
-        if let Some(latency) = latency_of(&mut **chain)? {
-            rows.extend(stages::rows(&latency, regime, entry.mode));
+        // Counts are published once a second.
+        turn(&mut **chain, A_SECOND)?;
+        let before = chain.counted()?;
+        turn(&mut **chain, A_SECOND)?;
+        if let Some((before, after)) = before.zip(chain.counted()?) {
+            rows.extend(stages::rows(&before, &after, regime, entry.mode));
         }
     }
     Ok(rows)
-}
-
-/// What the robot itself says of the path, over a second of frames.
-fn latency_of(chain: &mut dyn Chain) -> Result<Option<PathLatency>, BenchError> {
-    // Two of the robot's windows of a second, so that one of them is full.
-    turn(chain, 2_100)?;
-    chain.latency()
 }
 
 /// With nobody watching, and with observers; services and boards in real time.

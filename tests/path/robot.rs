@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use lager_ports::{Bus, Cause, Clock, Publisher, Subscriber};
 use lager_tests::{Domain, WATCHDOG};
 use lager_topics::{
-    Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MapProduct, MissionOrder, Mode, NavMap,
-    NavStatus, Order, PathLatency, Phase, Role, SensorDistance, SensorLine, Side, Stamp,
-    SteeringCommand, SteeringState, WarehouseMap,
+    Ask, AskKind, BridgeRequest, CommandLatency, LatencyCommand, LatencyPath, LinkHealth,
+    MapProduct, MissionOrder, Mode, NavMap, NavStatus, Order, PathLatency, Phase, Role,
+    SensorDistance, SensorLine, Side, Stamp, SteeringCommand, SteeringState, WarehouseMap,
 };
 use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCommand};
 
@@ -42,7 +42,8 @@ pub(crate) struct Seen {
     line: Subscriber<SensorLine>,
     distance: Subscriber<SensorDistance>,
     state: Subscriber<SteeringState>,
-    latency: Subscriber<LatencyPath>,
+    path: Subscriber<LatencyPath>,
+    command: Subscriber<LatencyCommand>,
     health: Subscriber<LinkHealth>,
     /// Orders that ended because nobody renewed them in time: the machine was too busy.
     lapsed: u32,
@@ -51,9 +52,9 @@ pub(crate) struct Seen {
     last_id: u32,
     /// Samples on `steering/command`, renewals included.
     pub(crate) sent: u64,
-    /// What `latency/path` said last, and what it said of its fullest window.
-    pub(crate) last: PathLatency,
-    pub(crate) fullest: PathLatency,
+    /// What `latency/path` and `latency/command` said last.
+    pub(crate) last_path: PathLatency,
+    pub(crate) last_command: CommandLatency,
 }
 
 /// Samples published.
@@ -76,14 +77,15 @@ impl Seen {
             line: bus.subscriber().expect("a topic"),
             distance: bus.subscriber().expect("a topic"),
             state: bus.subscriber().expect("a topic"),
-            latency: bus.subscriber().expect("a topic"),
+            path: bus.subscriber().expect("a topic"),
+            command: bus.subscriber().expect("a topic"),
             health: bus.subscriber().expect("a topic"),
             lapsed: 0,
             orders: Vec::new(),
             last_id: 0,
             sent: 0,
-            last: PathLatency::default(),
-            fullest: PathLatency::default(),
+            last_path: PathLatency::default(),
+            last_command: CommandLatency::default(),
         }
     }
 
@@ -101,12 +103,17 @@ impl Seen {
         if let Some(health) = self.health.latest().expect("readable") {
             self.lapsed = health.leases_expired;
         }
-        if let Some(path) = self.latency.latest().expect("readable") {
-            self.last = *path;
-            if path.total.count >= self.fullest.total.count {
-                self.fullest = *path;
-            }
+        if let Some(path) = self.path.latest().expect("readable") {
+            self.last_path = *path;
         }
+        if let Some(command) = self.command.latest().expect("readable") {
+            self.last_command = *command;
+        }
+    }
+
+    /// How often both latencies were told.
+    pub(crate) fn told(&self) -> u64 {
+        self.path.received().min(self.command.received())
     }
 
     /// Orders that came and went between two looks.
@@ -198,8 +205,14 @@ impl Robot {
             robot.seen.state.received() > 1
         });
         // The first sample of a topic is the one that connects its writer with the observer.
-        self.step_until("the path is told", |robot| {
-            robot.seen.latency.received() > 1
+        self.settle();
+    }
+
+    /// Waits until all that was counted so far is told.
+    pub(crate) fn settle(&mut self) {
+        let told = self.seen.told();
+        self.step_until("both latencies are told twice", |robot| {
+            robot.seen.told() >= told + 2
         });
     }
 

@@ -5,10 +5,10 @@
 //! slower than one that did not.
 
 use lager_ports::Clock;
-use lager_topics::PathLatency;
 use rustix::thread::{ClockId, clock_nanosleep_absolute};
 
 use super::cable::timespec;
+use super::stages::Counted;
 use crate::error::BenchError;
 use crate::parts::interrupted;
 
@@ -40,8 +40,8 @@ pub(super) trait Chain {
     fn end(&mut self) -> Result<(), BenchError>;
     /// Processor time of the chain's processes while frames were counted, in percent of one core.
     fn cpu_percent(&self) -> Option<f64>;
-    /// What the chain itself says of its last second, if it says anything.
-    fn latency(&mut self) -> Result<Option<PathLatency>, BenchError> {
+    /// What the chain itself has counted, as of the last second, if it counts anything.
+    fn counted(&mut self) -> Result<Option<Counted>, BenchError> {
         Ok(None)
     }
 }

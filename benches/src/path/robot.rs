@@ -23,8 +23,8 @@ use std::time::Instant;
 
 use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
 use lager_topics::{
-    Ask, AskKind, BridgeRequest, LatencyPath, LinkHealth, MissionOrder, Mode as Driver, NavMap,
-    NavStatus, Order, Phase, Role,
+    Ask, AskKind, BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, MissionOrder,
+    Mode as Driver, NavMap, NavStatus, Order, Phase, Role,
 };
 use lager_wire::link::BoardEvent;
 use lager_wire::{
@@ -86,7 +86,8 @@ pub(super) struct Robot {
     overtaken: u64,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
-    latency: Subscriber<LatencyPath>,
+    path_latency: Subscriber<LatencyPath>,
+    command_latency: Subscriber<LatencyCommand>,
     map: Publisher<NavMap>,
     orders: Publisher<MissionOrder>,
     requests: Client<BridgeRequest>,
@@ -137,7 +138,8 @@ impl Robot {
             overtaken: 0,
             health: bus.subscriber().map_err(bus_error(OPERATOR))?,
             status: bus.subscriber().map_err(bus_error(OPERATOR))?,
-            latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
+            path_latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
+            command_latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
             map: bus.publisher().map_err(bus_error(OPERATOR))?,
             orders: bus.publisher().map_err(bus_error(OPERATOR))?,
             requests: bus.client().map_err(bus_error(OPERATOR))?,

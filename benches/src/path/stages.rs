@@ -1,35 +1,64 @@
 //! The robot's own words on where the time goes, as rows.
 
-use lager_topics::{PathLatency, StageLatency};
+use lager_topics::{CommandLatency, Durations, PathLatency};
 
 use crate::report::{Mode, Regime, Row};
 
-/// One row for each stage, in the order of the way, and one for all of it.
-pub(super) fn rows(latency: &PathLatency, regime: Regime, mode: Mode) -> Vec<Row> {
+/// What the robot has counted so far.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counted {
+    pub(super) path: PathLatency,
+    pub(super) command: CommandLatency,
+}
+
+/// One row for each stage, in the order of the way, and one for each whole, of what was counted
+/// between the two.
+pub(super) fn rows(before: &Counted, after: &Counted, regime: Regime, mode: Mode) -> Vec<Row> {
+    let ([path, earlier_path], [command, earlier_command]) = (
+        [&after.path, &before.path],
+        [&after.command, &before.command],
+    );
     [
-        ("read to publish", &latency.read_publish),
-        ("publish to logic", &latency.publish_receive),
-        ("decision", &latency.decide),
-        ("order to bridge", &latency.order_receive),
-        ("receive to written", &latency.receive_write),
-        ("read to written", &latency.total),
+        (
+            "read to publish",
+            &path.read_publish,
+            &earlier_path.read_publish,
+        ),
+        (
+            "publish to logic",
+            &path.publish_receive,
+            &earlier_path.publish_receive,
+        ),
+        ("logic to decided", &path.decide, &earlier_path.decide),
+        ("read to decided", &path.total, &earlier_path.total),
+        (
+            "order to bridge",
+            &command.order_receive,
+            &earlier_command.order_receive,
+        ),
+        (
+            "receive to written",
+            &command.receive_write,
+            &earlier_command.receive_write,
+        ),
+        ("read to written", &command.total, &earlier_command.total),
     ]
     .into_iter()
-    .map(|(stage, seen)| row(stage, seen, regime, mode))
+    .map(|(stage, after, before)| row(stage, &after.since(before), regime, mode))
     .collect()
 }
 
-fn row(stage: &str, seen: &StageLatency, regime: Regime, mode: Mode) -> Row {
+fn row(stage: &str, counted: &Durations, regime: Regime, mode: Mode) -> Row {
     Row {
         name: "lager".to_owned(),
         variant: stage.to_owned(),
         what: "path-stages".to_owned(),
         mode,
         regime,
-        n: seen.count,
-        p50_ns: seen.p50_ns,
-        p99_ns: seen.p99_ns,
-        p999_ns: seen.p999_ns,
+        n: counted.count,
+        p50_ns: counted.quantile_ns(0.5),
+        p99_ns: counted.quantile_ns(0.99),
+        p999_ns: counted.quantile_ns(0.999),
         ratio_to: String::new(),
         ratio_p50: 1.0,
         ratio_p99: 1.0,

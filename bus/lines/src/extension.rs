@@ -71,8 +71,8 @@
 //! event <event> <coord> <order> <prodid> [<text>]
 //!                                      at that node; `-` where there is no order or product
 //! latency <int> <int> <int> <int> <int> <int>
-//!                                      commands measured; half, 90 %, 99 %, 99.9 %, all of them
-//!                                      took at most so many microseconds
+//!                                      sensor frames measured; half, 90 %, 99 %, 99.9 %, all of
+//!                                      them took at most so many microseconds to logic's decision
 //! truth <int> <int> <int> <prodid>     of a simulated robot: x and y in mm, heading in degrees,
 //!                                      what it holds or `-`
 //! thinks {<key>=<value>}               the `thought` that follows, in values; see `Thinks`

@@ -2,8 +2,8 @@
 //!
 //! Whatever a service publishes because of a sample gets that sample's [`Cause`]. So the stamp of a
 //! steering command tells when the frame's bytes were read, when the frame was published, when
-//! logic received it and when logic published the command. The bridge adds its own receipt and its
-//! write, and publishes the distribution of each stage once a second on `latency/path`.
+//! logic received it and when logic published the command. Logic and bridge count how long each
+//! stage took, and publish it once a second on `latency/path` and `latency/command`.
 //!
 //! It is apart from publisher and subscriber because it is the only way from one to the other: a
 //! chain's times are carried by this type alone, so no writer can leave out a stage or make one up.

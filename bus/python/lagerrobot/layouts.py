@@ -818,48 +818,56 @@ class Thought(Layout):
     }
 
 
-class StageLatency(Layout):
-    _type_name_ = "lager::StageLatency"
-    _hash_ = 0x841A71E0807D9D26
+class Durations(Layout):
+    _type_name_ = "lager::Durations"
+    _hash_ = 0xA31F1883656FD413
     _fields_ = [
         ("count", ctypes.c_uint64),
-        ("min_ns", ctypes.c_uint64),
-        ("p50_ns", ctypes.c_uint64),
-        ("p90_ns", ctypes.c_uint64),
-        ("p99_ns", ctypes.c_uint64),
-        ("p999_ns", ctypes.c_uint64),
+        ("sum_ns", ctypes.c_uint64),
         ("max_ns", ctypes.c_uint64),
-        ("mean_ns", ctypes.c_uint64),
+        ("buckets", ctypes.c_uint64 * 90),
     ]
     _enums_ = {}
     _dtype_ = {
-        "names": ["count", "min_ns", "p50_ns", "p90_ns", "p99_ns", "p999_ns", "max_ns", "mean_ns"],
-        "formats": ["<u8", "<u8", "<u8", "<u8", "<u8", "<u8", "<u8", "<u8"],
-        "offsets": [0, 8, 16, 24, 32, 40, 48, 56],
-        "itemsize": 64,
+        "names": ["count", "sum_ns", "max_ns", "buckets"],
+        "formats": ["<u8", "<u8", "<u8", ("<u8", (90,))],
+        "offsets": [0, 8, 16, 24],
+        "itemsize": 744,
     }
 
 
 class PathLatency(Layout):
     _type_name_ = "lager::PathLatency"
-    _hash_ = 0x2BB3668404DE4A81
+    _hash_ = 0xDC7A274E65A52B7C
     _fields_ = [
-        ("since_start", ctypes.c_uint64),
-        ("window_start_ns", ctypes.c_uint64),
-        ("window_ns", ctypes.c_uint64),
-        ("read_publish", StageLatency),
-        ("publish_receive", StageLatency),
-        ("decide", StageLatency),
-        ("order_receive", StageLatency),
-        ("receive_write", StageLatency),
-        ("total", StageLatency),
+        ("read_publish", Durations),
+        ("publish_receive", Durations),
+        ("decide", Durations),
+        ("total", Durations),
     ]
     _enums_ = {}
     _dtype_ = {
-        "names": ["since_start", "window_start_ns", "window_ns", "read_publish", "publish_receive", "decide", "order_receive", "receive_write", "total"],
-        "formats": ["<u8", "<u8", "<u8", StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_, StageLatency._dtype_],
-        "offsets": [0, 8, 16, 24, 88, 152, 216, 280, 344],
-        "itemsize": 408,
+        "names": ["read_publish", "publish_receive", "decide", "total"],
+        "formats": [Durations._dtype_, Durations._dtype_, Durations._dtype_, Durations._dtype_],
+        "offsets": [0, 744, 1488, 2232],
+        "itemsize": 2976,
+    }
+
+
+class CommandLatency(Layout):
+    _type_name_ = "lager::CommandLatency"
+    _hash_ = 0x302F899C11A340FF
+    _fields_ = [
+        ("order_receive", Durations),
+        ("receive_write", Durations),
+        ("total", Durations),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["order_receive", "receive_write", "total"],
+        "formats": [Durations._dtype_, Durations._dtype_, Durations._dtype_],
+        "offsets": [0, 744, 1488],
+        "itemsize": 2232,
     }
 
 
@@ -1021,7 +1029,13 @@ TOPICS = {
         "latency/path",
         PathLatency,
         Qos(1, 1, 4, 72, 92),
-        "How long sensor frames take to become commands, stage by stage, once a second.",
+        "How long sensor frames take until logic has decided, stage by stage, once a second.",
+    ),
+    "latency/command": TopicEntry(
+        "latency/command",
+        CommandLatency,
+        Qos(1, 1, 4, 72, 92),
+        "How long logic's orders take from the frame they rest on to the wire, once a second.",
     ),
     "truth/pose": TopicEntry(
         "truth/pose",

@@ -541,26 +541,22 @@ class Thought(Layout):
     seen: int
     failure: Failure
 
-class StageLatency(Layout):
+class Durations(Layout):
     count: int
-    min_ns: int
-    p50_ns: int
-    p90_ns: int
-    p99_ns: int
-    p999_ns: int
+    sum_ns: int
     max_ns: int
-    mean_ns: int
+    buckets: Sequence[int]
 
 class PathLatency(Layout):
-    since_start: int
-    window_start_ns: int
-    window_ns: int
-    read_publish: StageLatency
-    publish_receive: StageLatency
-    decide: StageLatency
-    order_receive: StageLatency
-    receive_write: StageLatency
-    total: StageLatency
+    read_publish: Durations
+    publish_receive: Durations
+    decide: Durations
+    total: Durations
+
+class CommandLatency(Layout):
+    order_receive: Durations
+    receive_write: Durations
+    total: Durations
 
 class TruthGood(Layout):
     id: int
@@ -628,6 +624,8 @@ class ByName:
     def topic(self, name: Literal["log/thought"]) -> Reader[Thought]: ...
     @overload
     def topic(self, name: Literal["latency/path"]) -> Reader[PathLatency]: ...
+    @overload
+    def topic(self, name: Literal["latency/command"]) -> Reader[CommandLatency]: ...
     @overload
     def topic(self, name: Literal["truth/pose"]) -> Reader[Truth]: ...
     @overload

@@ -40,9 +40,9 @@ pub use role::{Role, UnknownRole};
 pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo};
 pub use stamp::Stamp;
 pub use table::{
-    BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
-    NavBlocks, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request, SERVICE_SLOTS,
-    SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS, Topic, TopicEntry,
-    TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, visit,
+    BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder,
+    MissionQueue, NavBlocks, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request,
+    SERVICE_SLOTS, SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS, Topic,
+    TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, visit,
 };
 pub use tag::{Coded, Tag};

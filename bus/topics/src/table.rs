@@ -11,9 +11,9 @@ use core::fmt;
 
 use crate::hash;
 use crate::payloads::{
-    Answer, Ask, BlockedWays, DistanceFrame, Event, Health, Input, LineFrame, NavigatorStatus,
-    Order, OrderQueue, PathLatency, Route, SteeringOrder, SteeringReport, Thought, Truth,
-    WarehouseMap, WorldAnswer, WorldAsk,
+    Answer, Ask, BlockedWays, CommandLatency, DistanceFrame, Event, Health, Input, LineFrame,
+    NavigatorStatus, Order, OrderQueue, PathLatency, Route, SteeringOrder, SteeringReport, Thought,
+    Truth, WarehouseMap, WorldAnswer, WorldAsk,
 };
 use crate::role::Role;
 use crate::schema::{Payload, StructInfo};
@@ -275,7 +275,11 @@ topics! {
     { buffer: 64, history: 0, publishers: 8, actors: &[], republish: false };
 
     LatencyPath = "latency/path", PathLatency,
-    "How long sensor frames take to become commands, stage by stage, once a second.",
+    "How long sensor frames take until logic has decided, stage by stage, once a second.",
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+
+    LatencyCommand = "latency/command", CommandLatency,
+    "How long logic's orders take from the frame they rest on to the wire, once a second.",
     { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
 
     TruthPose = "truth/pose", Truth,

@@ -18,7 +18,7 @@
 //! * [`serial`]: a port, and what to do when it cannot be opened.
 //! * [`frames`], [`settings`], [`profile`]: pure helpers between packets and samples.
 //! * [`buttons`]: the reset button and the mode switch of the robot.
-//! * `path`: how long sensor frames take to become commands, for `latency/path`.
+//! * `latency`: how long logic's orders take to the wire, for `latency/command`.
 //! * [`run`]: the shell with its three threads, and one more where there are buttons.
 //!
 //! **Invariants:** no other process opens the ports. A reader thread never writes, and the main
@@ -36,9 +36,9 @@ mod config;
 mod counts;
 mod events;
 pub mod frames;
+mod latency;
 pub mod listener;
 pub mod machine;
-mod path;
 mod presses;
 pub mod profile;
 mod reader;

@@ -1,7 +1,7 @@
 //! What the robot's other services have said last.
 
 use lager_topics::{
-    BlockedWays, DistanceFrame, Health, LineFrame, Mode, NavigatorStatus, OrderQueue, PathLatency,
+    BlockedWays, DistanceFrame, Durations, Health, LineFrame, Mode, NavigatorStatus, OrderQueue,
     Refusal, Route, SteeringReport, Truth, WarehouseMap,
 };
 
@@ -27,8 +27,8 @@ pub struct Senses {
     pub distance: Option<DistanceFrame>,
     /// The ways on which something stands.
     pub blocks: Option<Box<BlockedWays>>,
-    /// How long it takes to react.
-    pub latency: Option<PathLatency>,
+    /// How long sensor frames took until logic had decided, since logic was started.
+    pub latency: Option<Box<Durations>>,
     /// Where a simulated robot really is.
     pub truth: Option<Box<Truth>>,
 }

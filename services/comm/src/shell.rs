@@ -197,7 +197,8 @@ impl Shell {
                 .next(|shell| shell.distance.latest())
                 .map(|distance| *distance),
             blocks: (self.next(|shell| shell.blocks.latest())).map(|blocks| Box::new(*blocks)),
-            latency: (self.next(|shell| shell.latency.latest())).map(|latency| *latency),
+            latency: (self.next(|shell| shell.latency.latest()))
+                .map(|latency| Box::new(latency.total)),
             truth: (self.next(|shell| shell.truth.latest())).map(|truth| Box::new(*truth)),
         };
         self.conversation.senses(senses);

@@ -10,7 +10,7 @@ use lager_lines::extension::{
 };
 use lager_lines::{Coord, Name, ProductId, Text};
 use lager_topics::{
-    BlockedWays, BoardHealth, Coded, Failure, LineFrame, Mode as BusMode, OrderQueue, PathLatency,
+    BlockedWays, BoardHealth, Coded, Durations, Failure, LineFrame, Mode as BusMode, OrderQueue,
     Pick as BusPick, Remedy, Route, Tag, Thought, Truth as BusTruth,
 };
 use lager_wire::{Binary, LineBits};
@@ -33,6 +33,8 @@ pub(crate) struct Telling {
     route: Option<Report>,
     blocked: Option<Report>,
     queue: Option<Report>,
+    /// What was counted when the latency was told last.
+    latency: Durations,
 }
 
 impl Telling {
@@ -61,7 +63,10 @@ impl Telling {
             ..
         } = &mut known.senses;
         reports.extend(truth.take().map(|truth| self::truth(&truth)));
-        reports.extend(latency.take().map(|latency| self::latency(&latency)));
+        if let Some(latency) = latency.take() {
+            reports.push(self::latency(&latency.since(&self.latency)));
+            self.latency = *latency;
+        }
         let lists = [
             (&mut self.route, known.route.as_deref().map(route)),
             (&mut self.blocked, blocks.as_deref().map(blocked)),
@@ -337,16 +342,15 @@ fn queue(queue: &OrderQueue) -> Report {
     Report::Queue(Listed::<Queued>::new(&orders))
 }
 
-fn latency(latency: &PathLatency) -> Report {
+fn latency(counted: &Durations) -> Report {
     let us = |ns: u64| u32::try_from(ns.div_ceil(1_000)).unwrap_or(u32::MAX);
-    let total = &latency.total;
     Report::Latency(Latency {
-        count: u32::try_from(total.count).unwrap_or(u32::MAX),
-        p50_us: us(total.p50_ns),
-        p90_us: us(total.p90_ns),
-        p99_us: us(total.p99_ns),
-        p999_us: us(total.p999_ns),
-        max_us: us(total.max_ns),
+        count: u32::try_from(counted.count).unwrap_or(u32::MAX),
+        p50_us: us(counted.quantile_ns(0.5)),
+        p90_us: us(counted.quantile_ns(0.9)),
+        p99_us: us(counted.quantile_ns(0.99)),
+        p999_us: us(counted.quantile_ns(0.999)),
+        max_us: us(counted.max_ns),
     })
 }
 

@@ -18,6 +18,7 @@ mod config;
 pub mod heading;
 mod holding;
 pub mod judge;
+mod latency;
 mod manoeuvre;
 pub mod map;
 pub mod marks;

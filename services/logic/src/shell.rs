@@ -10,7 +10,9 @@
 //! time.
 //!
 //! A turn takes one decision for each sample and, only if there was none, one for the time that
-//! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`).
+//! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`), and
+//! a renewal those of the newest frame since its order was given. How long frames took is counted
+//! when the turn's orders are out ([`FrameMeter`]).
 //!
 //! **Safe state**: silence. When this process ends, for whatever reason, the order in force is no
 //! longer renewed, and the bridge stops the robot when the lease is over, 120 ms later.
@@ -22,13 +24,15 @@ use lager_ports::{
     Waiter,
 };
 use lager_topics::{
-    BlockedWays, InputKind, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, Mode,
-    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, OrderQueue, Pick,
-    SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringState, Topic,
+    BlockedWays, InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder,
+    MissionQueue, Mode, NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
+    OrderQueue, Pick, SensorDistance, SensorLine, Stamp, SteeringCommand, SteeringOrder,
+    SteeringState, Topic,
 };
 use lager_wire::Command;
 
 use crate::config::LogicConfig;
+use crate::latency::FrameMeter;
 use crate::navigator::{Input, Navigator};
 use crate::node::Node;
 
@@ -99,7 +103,9 @@ struct Shell {
     route: Publisher<NavRoute>,
     events: Publisher<MissionEvent>,
     thoughts: Publisher<LogThought>,
+    latency: Publisher<LatencyPath>,
 
+    meter: FrameMeter,
     /// Inputs the navigator was given.
     decisions: u64,
     /// Who may drive and whether a stop is latched, as the navigator was told last.
@@ -109,6 +115,9 @@ struct Shell {
     sent_status: NavigatorStatus,
     status_due: Duration,
     sent_order: Option<SteeringOrder>,
+    /// What the order in force rests on: the newest frame since it was given, or what it was given
+    /// for.
+    rests_on: Cause,
     renewal_due: Duration,
     lost_before: u64,
     complaints: u32,
@@ -157,6 +166,8 @@ impl Shell {
             route: bus.publisher()?,
             events: bus.publisher()?,
             thoughts: bus.publisher()?,
+            latency: bus.publisher()?,
+            meter: FrameMeter::default(),
             decisions: 0,
             told_mode: None,
             told_by_hand: None,
@@ -164,6 +175,7 @@ impl Shell {
             navigator,
             status_due: Duration::ZERO,
             sent_order: None,
+            rests_on: Cause::OWN,
             renewal_due: Duration::ZERO,
             lost_before: kept.map_or(0, |status| status.frames_lost),
             complaints: 0,
@@ -182,7 +194,9 @@ impl Shell {
         if self.decisions == decisions {
             self.tell(Input::Tick, Cause::OWN, self.clock.now());
         }
-        self.keep_time();
+        let now_ns = Clock::monotonic_ns();
+        self.keep_time(self.clock.at(now_ns));
+        self.tell_latency(now_ns);
     }
 
     fn wait(&self) {
@@ -274,12 +288,14 @@ impl Shell {
         if self.waiter.has::<SensorDistance>() {
             while let Some((frame, cause)) = self.next(|shell| shell.distance.receive()) {
                 self.decide(Input::Distance(frame.distance_cm), cause);
+                self.note(frame.stamp(), cause);
             }
         }
         if self.waiter.has::<SensorLine>() {
             while let Some((frame, cause)) = self.next(|shell| shell.line.receive()) {
                 if let Some(state) = frame.state.get() {
                     self.decide(Input::Line(state), cause);
+                    self.note(frame.stamp(), cause);
                 }
             }
         }
@@ -302,6 +318,12 @@ impl Shell {
         }
     }
 
+    /// A frame was decided upon, and what follows from it is sent.
+    fn note(&mut self, stamp: &Stamp, cause: Cause) {
+        self.rests_on = cause;
+        self.meter.took(stamp, cause.receive_time_ns());
+    }
+
     /// Lets the navigator decide on a sample.
     fn decide(&mut self, input: Input<'_>, cause: Cause) {
         let now = self.clock.at(cause.receive_time_ns());
@@ -320,6 +342,9 @@ impl Shell {
         let is_new = order != self.sent_order;
         let goes_first = is_setpoint(order) && is_setpoint(self.sent_order);
         self.sent_order = order;
+        if is_new {
+            self.rests_on = cause;
+        }
         if is_new && goes_first {
             self.give_order(now, cause);
         }
@@ -347,13 +372,21 @@ impl Shell {
     }
 
     /// Does what is due by the clock.
-    fn keep_time(&mut self) {
-        let now = self.clock.now();
+    fn keep_time(&mut self, now: Duration) {
         if now >= self.status_due {
             self.publish_status(now);
         }
         if now >= self.renewal_due {
-            self.give_order(now, Cause::OWN);
+            self.give_order(now, self.rests_on);
+        }
+    }
+
+    /// Counts the frames of this turn, whose orders are out, and tells it once a second.
+    fn tell_latency(&mut self, now_ns: u64) {
+        self.meter.turn_over(now_ns);
+        if let Some(latency) = self.meter.due(now_ns) {
+            let sent = self.latency.send(Cause::OWN, *latency);
+            self.check(sent);
         }
     }
 

@@ -8,8 +8,8 @@ use lager_ports::{Bus, BusConfig, Cause, Publisher, Shutdown, Subscriber};
 use lager_topics::{
     DistanceFrame, EventKind, Health, Input, InputKind, LineFrame, LinkHealth, LogThought,
     MapProduct, MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus,
-    OperatorInput, Order, Phase, Role, SensorDistance, SensorLine, Side, SteeringCommand,
-    SteeringOrder, SteeringReport, SteeringState, WarehouseMap,
+    OperatorInput, Order, Phase, Role, SensorDistance, SensorLine, Side, Stamp, SteeringCommand,
+    SteeringOrder, SteeringReport, SteeringState, Topic, WarehouseMap,
 };
 use lager_wire::LineState;
 
@@ -60,6 +60,8 @@ struct World {
     route: Subscriber<NavRoute>,
     seen: Option<NavigatorStatus>,
     given: Vec<SteeringOrder>,
+    /// The stamps of what was given.
+    stamps: Vec<Stamp>,
 }
 
 impl World {
@@ -77,6 +79,7 @@ impl World {
             route: bus.subscriber().unwrap(),
             seen: None,
             given: Vec::new(),
+            stamps: Vec::new(),
         }
     }
 
@@ -114,6 +117,7 @@ impl World {
     fn look(&mut self) {
         while let Some(order) = self.commands.receive().unwrap() {
             self.given.push(*order);
+            self.stamps.push(*order.stamp());
         }
         if let Some(status) = self.status.latest().unwrap() {
             self.seen = Some(*status);
@@ -223,6 +227,39 @@ fn an_order_leads_to_a_renewed_steering_order_and_is_announced() {
         // The near end of the edge is where the robot stands, so no node is left to pass.
         let route = world.route.latest().unwrap();
         assert!(route.is_none_or(|route| route.length == 0));
+    });
+}
+
+#[test]
+fn a_renewal_carries_the_newest_frame() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Supervisor);
+    let mut world = World::new(&bus);
+    with_logic(&domain, false, || {
+        world.until("logic stands ready", false, |world| {
+            world.phase() == Some(Phase::WaitingForOrder)
+        });
+        let of_a_frame = |stamp: &&Stamp| stamp.cause_topic == SensorLine::ID;
+        world.until("the order is renewed for frames", false, |world| {
+            world.stamps.iter().filter(of_a_frame).count() >= 4
+        });
+        let renewals: Vec<_> = world.stamps.iter().filter(of_a_frame).collect();
+        // A frame comes every 5 ms, a renewal every 40 ms.
+        let read = renewals.iter().map(|stamp| stamp.source_time_ns);
+        assert!(read.is_sorted(), "{renewals:?}");
+        let [first, .., last] = renewals[..] else {
+            panic!("at least four renewals");
+        };
+        assert!(first.source_time_ns < last.source_time_ns, "{renewals:?}");
+        for stamp in renewals {
+            let way = [
+                stamp.source_time_ns,
+                stamp.cause_publish_time_ns,
+                stamp.cause_receive_time_ns,
+                stamp.publish_time_ns,
+            ];
+            assert!(way.is_sorted(), "{stamp:?}");
+        }
     });
 }
 

@@ -14,7 +14,7 @@
 //! Nothing here knows a topic; [`crate::sentence`] says what a sample means. The table gives order,
 //! names and kinds of the fields, and the end of a field's name is its unit. A value that equals
 //! the payload's blank value is unknown and shown as `-`. Enums are words, and fields of the same
-//! structure stand beside each other. Numbers are exact, except for floating-point ones, which have
+//! structure stand beside each other. A histogram is shown by its quantiles. Numbers are exact, except for floating-point ones, which have
 //! three decimals; programs take the JSON.
 
 use std::fmt::Write;
@@ -23,7 +23,7 @@ use lager_ports::Found;
 use lager_topics::{Schema, Stamp, Topic};
 use serde_json::Value;
 
-use crate::{ToolError, sentence};
+use crate::{ToolError, durations, sentence};
 
 /// A payload with at most so many fields is a row.
 const WIDEST_ROW: usize = 6;
@@ -84,6 +84,7 @@ impl Blocks {
     ) -> String {
         let at = scaled(stamp.publish_time_ns / 1_000, 6);
         let age = scaled(received_ns.saturating_sub(stamp.source_time_ns) / 1_000, 3);
+        let payload = &durations::readable(payload);
         let mut text = String::new();
         // Writing to a String cannot fail.
         let _ = match self.row.take() {
@@ -402,7 +403,8 @@ fn names(value: &Value) -> impl Iterator<Item = &str> {
 #[cfg(test)]
 mod tests {
     use lager_topics::{
-        LinkHealth, LogThought, MissionEvent, NavRoute, SensorLine, SteeringState, TruthPose,
+        Durations, LatencyCommand, LinkHealth, LogThought, MissionEvent, NavRoute, SensorLine,
+        SteeringState, TruthPose,
     };
     use serde_json::json;
 
@@ -524,6 +526,31 @@ mod tests {
             "\"There is no way from (1, 2) to where I must go. I go on when a way is open.\"";
         assert!(told.contains(sentence), "{told}");
         assert!(!shown::<MissionEvent>(&[json!({})]).contains('"'));
+    }
+
+    #[test]
+    fn histograms_are_shown_by_their_quantiles() {
+        let (mut short, mut long) = (Durations::default(), Durations::default());
+        for micros in 1..=100 {
+            short.record(micros * 1_000);
+            long.record(micros * 10_000);
+        }
+        let told = shown::<LatencyCommand>(&[json!({"order_receive": short, "total": long})]);
+        let columns = ["order_receive", "receive_write", "total"];
+        assert_eq!(lines(&told, "order_receive"), [columns]);
+        assert_eq!(lines(&told, "count"), [["count", "100", "0", "100"]]);
+        assert_eq!(
+            lines(&told, "mean"),
+            [["mean", "(us)", "50.500", "0.000", "505.000"]]
+        );
+        assert_eq!(
+            lines(&told, "max"),
+            [["max", "(us)", "100.000", "0.000", "1000.000"]]
+        );
+        for quantile in ["p50", "p90", "p99", "p999"] {
+            assert_eq!(lines(&told, quantile).len(), 1, "{told}");
+        }
+        assert!(!told.contains("buckets"), "{told}");
     }
 
     #[test]

@@ -10,6 +10,7 @@
 
 mod block;
 mod describe;
+mod durations;
 mod echo;
 mod python;
 mod rate;

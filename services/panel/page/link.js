@@ -212,7 +212,7 @@ export class Link extends EventTarget {
       robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
     } else if (word === "latency") {
       const [count, p50, p90, p99] = rest.map(Number);
-      // Without a command measured there is no new figure.
+      // Without a frame measured there is no new figure.
       if (count > 0) robot.latency = { p50, p90, p99 };
     } else if (word === "thinks") {
       robot.thinks = fields(rest);

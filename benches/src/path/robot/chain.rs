@@ -3,13 +3,12 @@
 
 use std::time::Instant;
 
-use lager_topics::PathLatency;
-
 use super::{Answer, FOLLOW, IN_A_ROW, Robot, TOO_FEW_TO_JUDGE, UP_WITHIN};
 use crate::error::BenchError;
 use crate::parts::interrupted;
 use crate::path::pace::{ANSWER_WITHIN, Chain};
 use crate::path::players::{RealTime, bus_error};
+use crate::path::stages::Counted;
 
 impl Chain for Robot {
     fn begin(&mut self) -> Result<(), BenchError> {
@@ -70,13 +69,13 @@ impl Chain for Robot {
         self.processes.cpu_percent()
     }
 
-    fn latency(&mut self) -> Result<Option<PathLatency>, BenchError> {
-        let latest = self
-            .latency
-            .latest()
-            .map_err(bus_error("reading the path's latency"))?;
-        Ok(latest
-            .map(|sample| *sample)
-            .filter(|seen| seen.total.count > 0))
+    fn counted(&mut self) -> Result<Option<Counted>, BenchError> {
+        let reading = "reading the robot's latencies";
+        let path = self.path_latency.latest().map_err(bus_error(reading))?;
+        let command = self.command_latency.latest().map_err(bus_error(reading))?;
+        Ok(path.zip(command).map(|(path, command)| Counted {
+            path: *path,
+            command: *command,
+        }))
     }
 }

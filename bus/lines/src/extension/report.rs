@@ -120,10 +120,10 @@ impl EventKind {
     }
 }
 
-/// How long it takes from a sensor's frame to the command that it causes.
+/// How long it takes from the reading of a sensor's frame until logic has decided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
-    /// Commands measured since the last such line.
+    /// Frames measured since the last such line.
     pub count: u32,
     /// Half of them took at most this long, in us.
     pub p50_us: u32,
@@ -224,7 +224,7 @@ impl Latency {
         let mut next = |wanted| reader.word().number(wanted, 0, i64::from(u32::MAX));
         let time = "a time from 0 to 4294967295 us";
         Ok(Self {
-            count: next("the number of commands measured, 0 to 4294967295")?,
+            count: next("the number of frames measured, 0 to 4294967295")?,
             p50_us: next(time)?,
             p90_us: next(time)?,
             p99_us: next(time)?,

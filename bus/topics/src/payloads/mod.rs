@@ -13,7 +13,7 @@ mod stop;
 mod truth;
 
 pub use failure::{Failure, FailureKind, Remedy};
-pub use latency::{PathLatency, StageLatency};
+pub use latency::{CommandLatency, Durations, PathLatency};
 pub use link::{ArmProfileState, BoardHealth, Calibration, Health, Mode};
 pub use log::{Joint, Thought, ThoughtKind};
 pub use mission::{Event, EventKind, Input, InputKind, Order, OrderQueue, WaitingOrder};

@@ -37,16 +37,12 @@ impl Service<'_> {
         page.turn(now_ns);
     }
 
-    /// Publishes how long frames took to become commands since the last time.
-    pub(super) fn publish_latency(&mut self, now_ns: u64) {
-        let sent = self.latency.loan().and_then(|mut loan| {
-            self.path.fill(now_ns, &mut loan);
-            loan.send()
-        });
+    /// Publishes how long orders took to the wire.
+    pub(super) fn publish_latency(&mut self) {
+        let sent = self.latency.send(Cause::OWN, *self.meter.counted());
         if let Err(error) = sent {
             self.complain(&error);
         }
-        self.path.restart(now_ns);
     }
 
     fn carry_out(&mut self, action: Action, now: Moment) {
@@ -109,9 +105,9 @@ impl Service<'_> {
         self.core.wrote(write, is_taken, now);
         if is_taken
             && let Some(key) = write.order
-            && self.path.is_waiting_for(key)
+            && self.meter.is_waiting_for(key)
         {
-            self.path.written(now.ns);
+            self.meter.written(now.ns);
         }
     }
 

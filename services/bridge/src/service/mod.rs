@@ -29,7 +29,7 @@ use lager_ports::{
     Subscriber, Waiter,
 };
 use lager_topics::{
-    Answer, Ask, BridgeRequest, Health, Input, InputKind, LatencyPath, LinkHealth, Mode,
+    Answer, Ask, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth, Mode,
     OperatorInput, SteeringCommand, SteeringState, StopCause, Topic,
 };
 
@@ -37,8 +37,8 @@ use crate::buttons::{self, Touch};
 use crate::config::BridgeConfig;
 use crate::counts::Counts;
 use crate::events::{Moment, PortEvent};
+use crate::latency::CommandMeter;
 use crate::machine::{BridgeCore, CoreOptions};
-use crate::path::PathMeter;
 use crate::reader::{FromReader, QUEUE, Reader};
 use crate::serial::{PacketWriter, SerialPort};
 
@@ -155,11 +155,11 @@ struct Service<'a> {
     touched: Option<Publisher<OperatorInput>>,
     state: Publisher<SteeringState>,
     health: Publisher<LinkHealth>,
-    latency: Publisher<LatencyPath>,
+    latency: Publisher<LatencyCommand>,
     ports: [Port<'a>; 2],
     page: StopPage,
     core: BridgeCore,
-    path: PathMeter,
+    meter: CommandMeter,
     lost_before: u64,
     bus_complaints: u32,
 }
@@ -213,7 +213,7 @@ impl<'a> Service<'a> {
             ports: events.map(port),
             page,
             core: BridgeCore::new(options, kept),
-            path: PathMeter::new(Clock::monotonic_ns()),
+            meter: CommandMeter::default(),
             lost_before: kept.map_or(0, |kept| kept.bus_lost),
             bus_complaints: 0,
         })
@@ -343,9 +343,8 @@ impl<'a> Service<'a> {
         let given_ns = Some(order.given_ns).filter(|given_ns| *given_ns <= received_ns);
         let sent = self.clock.at(sent_ns);
         let given = self.clock.at(given_ns.unwrap_or(0));
-        if let Some(key) = self.core.order(sent, given, order) {
-            self.path.begin(key, order.stamp(), received_ns);
-        }
+        let in_force = self.core.order(sent, given, order);
+        self.meter.heard(in_force, order.stamp(), received_ns);
     }
 
     /// Lets the core decide, and carries out what it wants.
@@ -353,9 +352,9 @@ impl<'a> Service<'a> {
         let now = self.moment();
         self.core.decide(now.robot);
         self.act(now);
-        self.path.give_up();
-        if self.path.is_due(now.ns) {
-            self.publish_latency(now.ns);
+        self.meter.turn_over();
+        if self.meter.is_due(now.ns) {
+            self.publish_latency();
         }
         self.answer_stoppers(now.ns);
     }

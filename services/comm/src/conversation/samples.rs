@@ -104,7 +104,7 @@ impl Conversation {
         known.line = new.line.or(known.line);
         known.distance = new.distance.or(known.distance);
         known.blocks = new.blocks.or_else(|| known.blocks.take());
-        known.latency = new.latency.or(known.latency);
+        known.latency = new.latency.or_else(|| known.latency.take());
         known.truth = new.truth.or_else(|| known.truth.take());
     }
 

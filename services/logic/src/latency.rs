@@ -1,0 +1,130 @@
+//! How long sensor frames take until logic has decided: what `latency/path` shows.
+//!
+//! It is apart from the shell because it must cost the path nothing: while frames are handled it
+//! keeps only the times that came with them, and counts them when the turn is over and its orders
+//! are out. It takes moments as arguments, reads no clock and does not allocate.
+
+use heapless::Vec;
+use lager_topics::{PathLatency, SensorDistance, SensorLine, Stamp, Topic};
+
+/// How often the counts are published, in real ns.
+const PERIOD_NS: u64 = 1_000_000_000;
+
+/// Frames that can wait for one turn: the queues of both topics.
+const TURN: usize = SensorLine::QOS.buffer + SensorDistance::QOS.buffer;
+
+/// Times of one frame, in ns of `CLOCK_MONOTONIC`: read, published, received.
+type Way = [u64; 3];
+
+/// Counts the ways of frames.
+#[derive(Debug, Default)]
+pub(crate) struct FrameMeter {
+    /// The frames of the present turn.
+    taken: Vec<Way, TURN>,
+    counted: PathLatency,
+    told_ns: u64,
+}
+
+impl FrameMeter {
+    /// The navigator was given a frame with this stamp, received at `received_ns`.
+    pub(crate) fn took(&mut self, stamp: &Stamp, received_ns: u64) {
+        let way = [stamp.source_time_ns, stamp.publish_time_ns, received_ns];
+        // Only if frames come in while more than a queue of them is handled: those before this one
+        // were decided upon by the time it was received.
+        if self.taken.is_full() {
+            self.turn_over(received_ns);
+        }
+        let _ = self.taken.push(way);
+    }
+
+    /// The turn is over and everything that follows from its frames is sent.
+    pub(crate) fn turn_over(&mut self, now_ns: u64) {
+        let counted = &mut self.counted;
+        for [read, published, received] in &self.taken {
+            let way = [*read, *published, *received, now_ns];
+            // A writer that is not ours may stamp what it likes.
+            if !way.is_sorted() {
+                continue;
+            }
+            counted.read_publish.record(published - read);
+            counted.publish_receive.record(received - published);
+            counted.decide.record(now_ns - received);
+            counted.total.record(now_ns - read);
+        }
+        self.taken.clear();
+    }
+
+    /// What is to be published now, once a second.
+    pub(crate) fn due(&mut self, now_ns: u64) -> Option<&PathLatency> {
+        if now_ns.saturating_sub(self.told_ns) < PERIOD_NS {
+            return None;
+        }
+        self.told_ns = now_ns;
+        Some(&self.counted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(read_ns: u64) -> Stamp {
+        Stamp {
+            source_time_ns: read_ns,
+            publish_time_ns: read_ns + 1_000,
+            ..Stamp::default()
+        }
+    }
+
+    #[test]
+    fn every_frame_of_a_turn_counts_in_every_stage() {
+        let mut meter = FrameMeter::default();
+        meter.took(&frame(500), 3_500);
+        meter.took(&frame(1_500), 4_500);
+        meter.turn_over(10_500);
+        meter.turn_over(20_500);
+        let counted = meter.due(PERIOD_NS).expect("it is due");
+        let sums = [
+            &counted.read_publish,
+            &counted.publish_receive,
+            &counted.decide,
+            &counted.total,
+        ]
+        .map(|stage| (stage.count, stage.sum_ns));
+        assert_eq!(sums, [(2, 2_000), (2, 4_000), (2, 13_000), (2, 19_000)]);
+    }
+
+    #[test]
+    fn times_that_cannot_be_true_do_not_count() {
+        let mut meter = FrameMeter::default();
+        meter.took(&frame(5_000), 5_500);
+        meter.turn_over(9_000);
+        assert_eq!(meter.due(PERIOD_NS).map(|told| told.total.count), Some(0));
+    }
+
+    #[test]
+    fn more_frames_than_a_turn_should_bring_all_count() {
+        let mut meter = FrameMeter::default();
+        for at in 0..2 * TURN as u64 + 1 {
+            meter.took(&frame(at), at + 2_000);
+        }
+        meter.turn_over(10_000);
+        let told = meter.due(PERIOD_NS).map(|told| told.total.count);
+        assert_eq!(told, Some(2 * TURN as u64 + 1));
+    }
+
+    #[test]
+    fn it_tells_once_a_second_and_counts_on() {
+        let mut meter = FrameMeter::default();
+        meter.took(&frame(500), 3_500);
+        meter.turn_over(4_000);
+        assert!(meter.due(PERIOD_NS).is_some());
+        assert!(meter.due(2 * PERIOD_NS - 1).is_none());
+        meter.took(&frame(5_500), 8_500);
+        meter.turn_over(9_000);
+        assert_eq!(
+            meter.due(2 * PERIOD_NS).map(|told| told.total.count),
+            Some(2)
+        );
+    }
+}
