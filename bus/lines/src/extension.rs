@@ -31,6 +31,8 @@
 //!            | mode <mode>             who drives
 //!            | resume                  end a stop
 //!            | reset                   the robot stands on the delivery corner, looking inwards
+//!            | place <edge>            it stands on that node and looks that way; a simulated one
+//!                                      is put there
 //!            | pick manual|auto        who picks the goods up from now on: a person, or the robot
 //!            | picked [force]          the goods are in the gripper; force: felt or not
 //!            | drive <styrcomm> <ms>   the wheels, for 1 to 1000 ms from receipt

@@ -14,6 +14,8 @@ pub(crate) struct Known {
     pub(crate) report: Option<SteeringReport>,
     pub(crate) route: Option<Box<Route>>,
     pub(crate) senses: Senses,
+    /// Somebody has told where it really is, so there is a world that can be asked.
+    pub(crate) is_simulated: bool,
     /// The warehouse as this process or one before it has published it.
     pub(crate) map: Option<Box<WarehouseMap>>,
 }

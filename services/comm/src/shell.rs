@@ -210,7 +210,7 @@ impl Shell {
             self.conversation.answered_by_bridge(id, answer);
         }
         while let Some((id, answer)) = self.world.answer() {
-            self.conversation.answered_by_world(id, &answer);
+            self.conversation.answered_by_world(self.now(), id, &answer);
         }
     }
 
@@ -258,7 +258,7 @@ impl Shell {
                 }
                 Action::AskWorld { id, ask } => {
                     if !self.world.ask(id, ask) {
-                        self.conversation.answered_by_world(id, &Err(BUSY.into()));
+                        self.conversation.answered_by_world(self.now(), id, &Err(BUSY.into()));
                     }
                 }
                 Action::HangUp(why) => {

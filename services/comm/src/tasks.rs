@@ -11,6 +11,7 @@
 //! Nothing is assumed to be done: an order is done when `mission/queue` has it, a press when
 //! `nav/status` or the queue has its effect, a request when it is answered.
 
+use lager_lines::extension::Edge;
 use lager_topics::{
     Answer, Ask, AskKind, Event, EventKind, Health, Input, InputKind, NavigatorStatus, Order,
     OrderQueue, Outcome, Phase, Pick, Tag, WorldAnswer, WorldAsk, WorldRefusal,
@@ -18,6 +19,7 @@ use lager_topics::{
 
 use crate::action::Action;
 use crate::ids::Ids;
+use crate::map::heading;
 use crate::moment::Moment;
 
 /// In ns of real time: when an order or a press is repeated that logic does not show.
@@ -62,6 +64,10 @@ enum Task {
     Pick(Pick),
     /// Logic takes it that it stands on the delivery node.
     Reset,
+    /// The simulated world has put the robot on the crossing of its press.
+    PutDown,
+    /// Logic takes it that it stands there.
+    Placed,
     /// The bridge has answered.
     Ask(Tag<AskKind>),
     /// A calibration has ended besides those that had ended before.
@@ -140,6 +146,28 @@ impl Tasks {
     pub(crate) fn reset(&mut self, now: Moment, asker: Asker, id: u32) {
         let input = press(InputKind::ResetPressed, id, 0);
         self.press(now, asker, Task::Reset, input);
+    }
+
+    /// It stands on this node and looks this way; `world` is asked to put it there first.
+    pub(crate) fn place(
+        &mut self,
+        now: Moment,
+        asker: Asker,
+        id: u32,
+        on: Edge,
+        world: Option<WorldAsk>,
+    ) {
+        let input = Input {
+            x: on.node.x,
+            y: on.node.y,
+            heading: heading(on.way).into(),
+            ..press(InputKind::Placed, id, 0)
+        };
+        let Some(ask) = world else {
+            return self.press(now, asker, Task::Placed, input);
+        };
+        self.actions.push(Action::AskWorld { id, ask });
+        self.wait(now, asker, Task::PutDown, input);
     }
 
     pub(crate) fn ask(&mut self, now: Moment, asker: Asker, id: u32, ask: Ask) {
@@ -229,7 +257,7 @@ impl Tasks {
                     return is_over.then(|| Err(why.into()));
                 }
                 // They have a time of their own.
-                Task::Ask(_) | Task::World => return None,
+                Task::Ask(_) | Task::World | Task::PutDown => return None,
                 Task::Order(_) => {}
                 _ if is_over => {
                     let what = match (one.asker, one.task) {
@@ -245,7 +273,7 @@ impl Tasks {
                 match one.task {
                     Task::Order(order) => actions.push(Action::Order(order)),
                     // The same press twice is one.
-                    Task::Picked | Task::Pick(_) | Task::Reset => {
+                    Task::Picked | Task::Pick(_) | Task::Reset | Task::Placed => {
                         actions.push(Action::Press(one.input));
                     }
                     // Two of these would be two.
@@ -298,6 +326,13 @@ impl Tasks {
                     let phase = status.phase.get();
                     let waits = [Phase::WaitingForOrder, Phase::WaitingForMap];
                     published_ns > one.since.ns && phase.is_some_and(|phase| waits.contains(&phase))
+                }
+                Task::Placed => {
+                    let Input { x, y, heading, .. } = one.input;
+                    published_ns > one.since.ns
+                        && status.phase == Phase::WaitingForOrder
+                        && (status.x, status.y) == (x.into(), y.into())
+                        && status.heading == heading
                 }
                 _ => false,
             };
@@ -364,9 +399,15 @@ impl Tasks {
     }
 
     /// The simulated world has answered, or has not in time.
-    pub(crate) fn world_answered(&mut self, id: u32, answer: &Result<WorldAnswer, String>) {
+    pub(crate) fn world_answered(
+        &mut self,
+        now: Moment,
+        id: u32,
+        answer: &Result<WorldAnswer, String>,
+    ) {
+        let mut actions = Vec::new();
         self.end(|one| {
-            if !matches!(one.task, Task::World) || one.input.id != id {
+            if !matches!(one.task, Task::World | Task::PutDown) || one.input.id != id {
                 return None;
             }
             let answer = match answer {
@@ -374,11 +415,19 @@ impl Tasks {
                 Err(why) => return Some(Err(why.clone())),
             };
             Some(match (answer.outcome.get(), answer.refusal.get()) {
+                // Logic is still to be told.
+                (Some(Outcome::Done), _) if matches!(one.task, Task::PutDown) => {
+                    one.task = Task::Placed;
+                    (one.since, one.given_ns) = (now, now.ns);
+                    actions.push(Action::Press(one.input));
+                    return None;
+                }
                 (Some(Outcome::Done), _) => Ok(()),
                 (_, Some(why)) if why != WorldRefusal::None => Err(why.to_string()),
                 _ => Err("the simulated world does not answer in time; is it very slow?".into()),
             })
         });
+        self.actions.append(&mut actions);
     }
 
     /// Ends what `how` tells the end of.

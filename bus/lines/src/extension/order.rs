@@ -56,6 +56,8 @@ pub enum Action {
     Resume,
     /// `reset`: the robot stands on the delivery corner and looks into the warehouse (B1).
     Reset,
+    /// `place`: the robot stands on a crossing and looks along the grid; a simulated one is put there.
+    Place(Edge),
     /// `picked`: the goods are in the gripper (L7).
     Picked {
         /// Whether or not the gripper feels them.
@@ -289,6 +291,7 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
         "mode" => Action::Mode(reader.word().read(Mode::WANTED, Mode::from_word)?),
         "resume" => Action::Resume,
         "reset" => Action::Reset,
+        "place" => Action::Place(Edge::read(&mut reader)?),
         "picked" => Action::Picked {
             force: reader
                 .word()
@@ -318,8 +321,8 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             edge: Edge::read(&mut reader)?,
         },
         _ => {
-            let wanted = "one of order, cancel, first, clear, mode, resume, reset, picked, pick, \
-                          drive, arm, gains, calibrate and obstacle";
+            let wanted = "one of order, cancel, first, clear, mode, resume, reset, place, picked, \
+                          pick, drive, arm, gains, calibrate and obstacle";
             return Err(word.misread(wanted).into());
         }
     };
@@ -356,6 +359,7 @@ impl fmt::Display for Action {
             Self::Mode(mode) => write!(formatter, "mode {}", mode.as_str()),
             Self::Resume => formatter.write_str("resume"),
             Self::Reset => formatter.write_str("reset"),
+            Self::Place(on) => write!(formatter, "place {on}"),
             Self::Picked { force: false } => formatter.write_str("picked"),
             Self::Picked { force: true } => formatter.write_str("picked force"),
             Self::Pick(pick) => write!(formatter, "pick {}", pick.as_str()),

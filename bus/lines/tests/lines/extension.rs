@@ -33,6 +33,7 @@ fn every_line_of_the_station_is_read_and_written() {
         "do 14 calibrate",
         "do 15 obstacle put 1 2 up",
         "do 16 obstacle take 0 0 right",
+        "do 17 place 2 1 up",
     ] {
         let read = StationLine::read(line).expect(line);
         assert!(!matches!(read, StationLine::Answer(_)), "{line}");

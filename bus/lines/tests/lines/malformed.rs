@@ -91,8 +91,8 @@ const REQUEST: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, a
                        thought, set_robot and set_heading";
 const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, styrcomm \
                       and pickup_done";
-const ACTION: &str = "one of order, cancel, first, clear, mode, resume, reset, picked, pick, \
-                      drive, arm, gains, calibrate and obstacle";
+const ACTION: &str = "one of order, cancel, first, clear, mode, resume, reset, place, picked, \
+                      pick, drive, arm, gains, calibrate and obstacle";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
                      pickup_refused, failed and way_blocked";
 
@@ -276,6 +276,7 @@ fn lines_of_the_station_that_are_none() {
             ("do 1 gains 256 0", word(12, "256", "a gain from 0 to 255")),
             ("do 1 obstacle 1 2 up", word(15, "1", "put or take")),
             ("do 1 obstacle put 1 2", ends(22, WAY)),
+            ("do 1 place 1 2", ends(15, WAY)),
         ],
     );
 }

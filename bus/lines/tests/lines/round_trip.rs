@@ -117,6 +117,7 @@ fn action() -> impl Strategy<Value = Action> {
         mode().prop_map(Action::Mode),
         Just(Action::Resume),
         Just(Action::Reset),
+        edge().prop_map(Action::Place),
         any::<bool>().prop_map(|force| Action::Picked { force }),
         pick().prop_map(Action::Pick),
         (wheels(), lease).prop_map(|(wheels, lease)| Action::Drive { wheels, lease }),

@@ -5,7 +5,7 @@
 
 use lager_lines::extension::{Action as Wanted, Edge, Mode as WantedMode, Pick as WantedPick, Put};
 use lager_topics::{Ask, AskKind, Mode, Order, Phase, Pick, Refusal, WorldAsk, WorldAskKind};
-use lager_wire::OperatorCommand;
+use lager_wire::{Command, OperatorCommand, WheelCommand};
 
 use super::{Conversation, MOST_STOPS, STOPPED};
 use crate::action::Action;
@@ -157,6 +157,13 @@ impl Conversation {
                 let id = self.ids.fresh(now);
                 self.tasks.reset(now, asker, id);
             }
+            Wanted::Place(on) => {
+                self.may_be_put_down()?;
+                let id = self.ids.fresh(now);
+                // Nobody carries a robot that is simulated, so its world does.
+                let world = self.known.is_simulated.then(|| edge_ask(WorldAskKind::Place, on));
+                self.tasks.place(now, asker, id, on, world);
+            }
             Wanted::Mode(mode) => self.ask_bridge(
                 now,
                 asker,
@@ -187,6 +194,21 @@ impl Conversation {
             }
         }
         Ok(Begun::Waits)
+    }
+
+    /// Whoever says where the robot stands must not say it of one that drives.
+    fn may_be_put_down(&self) -> Result<(), String> {
+        let drives = |code| {
+            let standby = Command::Wheel(WheelCommand::Standby);
+            Command::from_code(code).is_some_and(|command| command != standby)
+        };
+        let health = self.known.health.unwrap_or_default();
+        let logic_drives = health.mode.get() == Some(Mode::Autonomous) && health.stopped == 0;
+        let logic_code = self.known.status.map_or(0, |status| status.code);
+        if drives(health.current_code) || (logic_drives && drives(logic_code)) {
+            return Err("the robot is moving; drive it by hand or stop it first".into());
+        }
+        Ok(())
     }
 
     /// How many orders wait before this one.
@@ -225,12 +247,16 @@ fn kind(kind: AskKind) -> Ask {
 }
 
 fn obstacle(put: Put, edge: Edge) -> WorldAsk {
+    let kind = match put {
+        Put::Put => WorldAskKind::Put,
+        Put::Take => WorldAskKind::Take,
+    };
+    edge_ask(kind, edge)
+}
+
+fn edge_ask(kind: WorldAskKind, edge: Edge) -> WorldAsk {
     WorldAsk {
-        kind: match put {
-            Put::Put => WorldAskKind::Put,
-            Put::Take => WorldAskKind::Take,
-        }
-        .into(),
+        kind: kind.into(),
         x: edge.node.x,
         y: edge.node.y,
         heading: heading(edge.way).into(),

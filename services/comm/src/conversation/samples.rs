@@ -100,6 +100,7 @@ impl Conversation {
 
     /// What is new of that which only the extension tells.
     pub fn senses(&mut self, new: Senses) {
+        self.known.is_simulated |= new.truth.is_some();
         let known = &mut self.known.senses;
         known.line = new.line.or(known.line);
         known.distance = new.distance.or(known.distance);
@@ -131,8 +132,13 @@ impl Conversation {
     }
 
     /// What became of an [`Action::AskWorld`]; `Err` is why nobody knows.
-    pub fn answered_by_world(&mut self, id: u32, answer: &Result<WorldAnswer, String>) {
-        self.tasks.world_answered(id, answer);
+    pub fn answered_by_world(
+        &mut self,
+        now: Moment,
+        id: u32,
+        answer: &Result<WorldAnswer, String>,
+    ) {
+        self.tasks.world_answered(now, id, answer);
         self.settle();
     }
 }
