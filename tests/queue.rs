@@ -119,8 +119,14 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
 
     domain.done(&["queue", "clear"]);
     assert_eq!(products(&domain), [""; 0]);
+    // The robot has not got the goods of product 1 yet.
+    let under_way = listed(&domain);
+    let number = under_way.split([' ', ':']).nth(1).expect("a number");
+    domain.done(&["queue", "cancel", number]);
+    assert_eq!(listed(&domain), "no order is under way or waits");
     let again = said(&domain.run(&["queue", "add", "2"]));
     assert_eq!(again, "logic fetches product 2 next");
+    domain.done(&["queue", "add", "1"]);
     domain.done(&["resume"]);
     wait_for("both to be delivered", || {
         (listed(&domain) == "no order is under way or waits").then_some(())

@@ -25,7 +25,7 @@
 //!
 //! <number> ::= <int>                   0 to 4294967295, one not used before on this connection
 //! <action> ::= order <order> <prodid>  fetch a product after those that wait
-//!            | cancel <order>          fetch it no more; refused once it is under way
+//!            | cancel <order>          fetch it no more; refused once its goods are held
 //!            | first <order>           fetch it before those that wait
 //!            | clear                   fetch none of those that wait
 //!            | mode <mode>             who drives

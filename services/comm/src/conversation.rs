@@ -359,13 +359,14 @@ impl Conversation {
         if unknown.is_some() {
             return unknown;
         }
-        let phase = self.known.status?.phase.get()?;
+        let status = self.known.status?;
+        let phase = status.phase.get()?;
         if phase == Phase::Picking {
             let waits = self.driving.is_running() || self.tasks.has_picked();
             return (!waits).then_some(Query::Arm);
         }
         // Logic would refuse the order, and the station would have told it in vain.
-        if phase == Phase::WaitingForMap || phase.needs_reset() {
+        if phase == Phase::WaitingForMap || status.needs_reset() {
             return None;
         }
         let queue = self.known.queue?;

@@ -25,10 +25,8 @@ pub(crate) struct Pose {
 
 /// Whether logic knows its place. `by_hand` is what the bridge says of the wheels in manual mode.
 pub(crate) fn is_known(status: &NavigatorStatus, by_hand: u64) -> bool {
-    let has_place = status.phase.get().is_some_and(|phase| {
-        let is_nowhere = phase == Phase::WaitingForMap || phase.needs_reset();
-        !is_nowhere
-    });
+    let is_nowhere = |phase| phase == Phase::WaitingForMap || status.needs_reset();
+    let has_place = status.phase.get().is_some_and(|phase| !is_nowhere(phase));
     // Nothing was ever heard: then nothing was driven that logic does not know of.
     let since = by_hand.saturating_sub(status.driven_by_hand);
     has_place && since < KNOWN_BY_HAND

@@ -262,6 +262,7 @@ impl Tasks {
                 _ if is_over => {
                     let what = match (one.asker, one.task) {
                         (Asker::Question, Task::Picked) => " to pickup_done",
+                        (_, Task::Cancel) => ": the goods may be in the claw by now",
                         _ => "",
                     };
                     return Some(Err(format!("logic does not react{what}")));
@@ -291,10 +292,8 @@ impl Tasks {
         self.end(|one| {
             let order = one.input.order_id;
             let is_done = match &mut one.task {
-                Task::Order(order) => {
-                    queue.is_under_way(order.id) || queue.before(order.id).is_ok()
-                }
-                Task::Cancel => queue.before(order).is_err(),
+                Task::Order(order) => queue.has(order.id),
+                Task::Cancel => !queue.has(order),
                 Task::Clear => queue.orders().is_empty(),
                 Task::First { before } => match queue.before(order) {
                     // It is under way by now.

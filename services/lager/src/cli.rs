@@ -76,7 +76,7 @@ pub enum QueueChange {
         #[arg(allow_negative_numbers = true, value_parser = values::product)]
         product: i32,
     },
-    /// Take a waiting order back
+    /// Take an order back; the one under way as long as its goods are not held
     Cancel {
         /// The order's number
         #[arg(value_name = "ORDER")]
@@ -166,7 +166,8 @@ pub enum Command {
   lager queue up 4711         carry order 4711 out before the one that stands before it
   lager queue cancel 4711     take it back
 
-The order that is under way is not in the queue any more.")]
+The order that is under way can be taken back until the robot holds its goods; the others stay in
+the queue. It then goes home, or for the next order.")]
     Queue {
         /// What to change [default: nothing, show it]
         #[command(subcommand)]

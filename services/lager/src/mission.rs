@@ -127,7 +127,7 @@ impl Mission {
     /// Forgets the orders that logic shows.
     fn see(&mut self, status: &NavigatorStatus, queue: &OrderQueue) {
         while let Some((id, _)) = self.unseen.front()
-            && (status.order_id == *id || queue.is_under_way(*id) || queue.before(*id).is_ok())
+            && (status.order_id == *id || queue.has(*id))
         {
             self.unseen.pop_front();
         }

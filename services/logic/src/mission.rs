@@ -134,7 +134,12 @@ impl Mission {
 
     /// Whether the robot is anywhere in particular.
     pub(crate) fn has_a_place(&self) -> bool {
-        self.phase != Phase::WaitingForMap && !self.phase.needs_reset()
+        self.phase != Phase::WaitingForMap && !self.needs_reset()
+    }
+
+    /// Whether only a person who puts the robot down leads on.
+    pub(crate) fn needs_reset(&self) -> bool {
+        self.phase.needs_reset() && !self.waits_for_way()
     }
 
     /// The manoeuvre of the phase, not begun yet. `exit_mm` is the length of the way out.
@@ -241,14 +246,16 @@ impl Mission {
     pub(crate) fn next(&mut self, outcome: Outcome, out: &mut Output) {
         match (self.phase, outcome) {
             // The robot stands where it should; a person's hand helps it.
-            (Phase::Picking, Outcome::Failed(kind, expected, seen)) => {
+            (Phase::Picking, Outcome::Failed(kind, expected, seen))
+                if kind != FailureKind::DrivenByHand =>
+            {
                 self.wait_for_hand(kind, expected.round() as i32, seen.round() as i32, out);
-            }
-            (Phase::Picking, _) => {
-                self.leave(false, out);
             }
             (_, Outcome::Failed(kind, expected, seen)) => {
                 self.get_stuck(kind, expected.round() as i32, seen.round() as i32, out);
+            }
+            (Phase::Picking, _) => {
+                self.leave(false, out);
             }
             (Phase::Turning, outcome) => {
                 self.doubt_turn(outcome, false, out);
@@ -427,6 +434,9 @@ impl Mission {
         let (home, exit) = (node == map.delivery(), map.exit());
         if let Some(heading) = self.along_station() {
             return self.go_between(heading, seen_open, out);
+        }
+        if !home && self.begin_on_the_way_home(out) {
+            return;
         }
         match self.goal {
             Goal::Delivery if home => self.go(exit, Phase::Exiting, out),

@@ -111,7 +111,7 @@ coded! {
         TriesAgain = 46,
         /// The order cannot be carried out now and waits (`product`).
         OrderPutOff = 47,
-        /// A waiting order is taken back (`product`).
+        /// An order is taken back (`product`).
         OrderCancelled = 48,
         /// A waiting order is carried out earlier (`product`).
         OrderMovedUp = 49,
@@ -131,6 +131,8 @@ coded! {
         PicksByHand = 56,
         /// It picks the goods up by itself from now on.
         PicksByItself = 57,
+        /// The order is taken back too late: its goods are held, or being gripped (`product`).
+        OrderKept = 58,
     }
 }
 
@@ -246,6 +248,10 @@ impl fmt::Display for Thought {
                 "There is no way to product {product} now; I fetch it later."
             ),
             ThoughtKind::OrderCancelled => write!(to, "I shall not fetch product {product}."),
+            ThoughtKind::OrderKept => write!(
+                to,
+                "I bring product {product} all the same: it is in my claw, or about to be."
+            ),
             ThoughtKind::OrderMovedUp => write!(to, "I shall fetch product {product} earlier."),
             ThoughtKind::QueueCleared => write!(to, "I shall fetch none of what was waiting."),
             ThoughtKind::OrderWaitsForCharge => write!(

@@ -65,6 +65,11 @@ impl OrderQueue {
         self.under_way != 0 && self.order_id == id
     }
 
+    /// Whether the order `id` is under way or waits.
+    pub fn has(&self, id: u32) -> bool {
+        self.is_under_way(id) || self.before(id).is_ok()
+    }
+
     /// How many orders are carried out before the order `id`, which waits.
     ///
     /// # Errors
@@ -157,7 +162,8 @@ coded! {
         Placed = 3,
         /// The goods are in the gripper, whether or not it feels them.
         PickupForced = 4,
-        /// The waiting order `order_id` is not to be carried out.
+        /// The order `order_id`, which waits or whose goods are not held yet, is not to be carried
+        /// out.
         OrderCancelled = 5,
         /// The waiting order `order_id` is to change places with the one before it.
         OrderMovedUp = 6,

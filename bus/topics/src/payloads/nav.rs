@@ -76,7 +76,8 @@ coded! {
 }
 
 impl Phase {
-    /// Whether only a person who puts the robot down somewhere and says where leads out of it.
+    /// Whether only a person who puts the robot down somewhere and says where leads out of it, but
+    /// for a robot without a way ([`NavigatorStatus::needs_reset`]).
     pub const fn needs_reset(self) -> bool {
         matches!(self, Self::Stuck | Self::Lost)
     }
@@ -246,6 +247,13 @@ payload! {
 impl NavigatorStatus {
     /// `driven_by_hand` before the bridge has told it.
     pub const NEVER_HEARD: u64 = u64::MAX;
+
+    /// Whether only a person who puts the robot down and says where leads on. One that has no way
+    /// knows where it is, and goes on by itself.
+    pub fn needs_reset(&self) -> bool {
+        let is_out = self.phase.get().is_some_and(Phase::needs_reset);
+        is_out && self.failure.remedy != Remedy::Way
+    }
 }
 
 payload! {

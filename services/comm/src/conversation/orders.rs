@@ -4,7 +4,7 @@
 //! presses and requests as the commands of `lager`. In doubt the robot stands and says why.
 
 use lager_lines::extension::{Action as Wanted, Edge, Mode as WantedMode, Pick as WantedPick, Put};
-use lager_topics::{Ask, AskKind, Mode, Order, Phase, Pick, Refusal, WorldAsk, WorldAskKind};
+use lager_topics::{Ask, AskKind, Goal, Mode, Order, Phase, Pick, Refusal, WorldAsk, WorldAskKind};
 use lager_wire::{Command, OperatorCommand, WheelCommand};
 
 use super::{Conversation, MOST_STOPS, STOPPED};
@@ -111,14 +111,14 @@ impl Conversation {
             }
             Wanted::Add { order: id, product } => {
                 let queue = self.known.queue.unwrap_or_default();
-                if queue.is_under_way(id) || queue.before(id).is_ok() {
+                if queue.has(id) {
                     return Err(format!("there is an order {id} already"));
                 }
                 let product = product.get();
                 self.tasks.order(now, asker, Order { id, product });
             }
             Wanted::Cancel { order } => {
-                self.before(order)?;
+                self.may_cancel(order)?;
                 let id = self.ids.fresh(now);
                 self.tasks.cancel(now, asker, id, order);
             }
@@ -209,6 +209,20 @@ impl Conversation {
             return Err("the robot is moving; drive it by hand or stop it first".into());
         }
         Ok(())
+    }
+
+    /// An order is taken back as long as its goods are not held.
+    fn may_cancel(&self, order: u32) -> Result<(), String> {
+        let queue = self.known.queue.unwrap_or_default();
+        if !queue.is_under_way(order) {
+            return self.before(order).map(drop);
+        }
+        match self.known.status.map(|status| status.goal) {
+            Some(goal) if goal == Goal::Delivery => Err(format!(
+                "order {order} is under way and its goods are in the claw: they are delivered first"
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// How many orders wait before this one.

@@ -3,9 +3,9 @@
 use lager_comm::Senses;
 use lager_topics::{
     Answer, AskKind, BlockedWay, BlockedWays, DistanceFrame, Event, EventKind, Failure,
-    FailureKind, Finish, Heading, InputKind, LineFrame, MapProduct, Mode, NavigatorStatus, Order,
-    OrderQueue, Origin, Outcome, Phase, Pick, Refusal, Remedy, Role, SteeringReport, StopCause,
-    Thought, ThoughtKind, Truth, WaitingOrder, WarehouseMap, WorldAnswer, WorldAskKind,
+    FailureKind, Finish, Goal, Heading, InputKind, LineFrame, MapProduct, Mode, NavigatorStatus,
+    Order, OrderQueue, Origin, Outcome, Phase, Pick, Refusal, Remedy, Role, SteeringReport,
+    StopCause, Thought, ThoughtKind, Truth, WaitingOrder, WarehouseMap, WorldAnswer, WorldAskKind,
     WorldRefusal,
 };
 
@@ -387,13 +387,36 @@ fn orders_are_cancelled_moved_and_cleared() {
     assert_eq!(robot.pressed.expect("a press").order_id, 5);
     assert_eq!(pass(&mut robot, 300), [""; 0], "it is not pressed twice");
     assert_eq!(robot.queue(&queue(&[4, 6])), ["done 1"]);
-    let said = robot.hears(&["do 2 cancel 9", "do 3 cancel 1"]);
+    let said = robot.hears(&["do 2 cancel 9"]);
     assert!(
         said[0].starts_with("refused 2 no order 9 waits"),
         "{said:?}"
     );
+    let said = robot.hears(&["do 3 first 1"]);
     assert!(
-        said[1].starts_with("refused 3 order 1 is under way"),
+        said[0].starts_with("refused 3 order 1 is under way"),
+        "{said:?}"
+    );
+
+    // What is under way is taken back as long as its goods are not held.
+    assert_eq!(
+        robot.hears(&["do 7 cancel 1"]),
+        ["[presses OrderCancelled]"]
+    );
+    let left = OrderQueue {
+        under_way: 0,
+        ..queue(&[4, 6])
+    };
+    assert_eq!(robot.queue(&left), ["done 7"]);
+    robot.queue(&queue(&[4, 6]));
+    robot.status(&NavigatorStatus {
+        goal: Goal::Delivery.into(),
+        ..NavigatorStatus::default()
+    });
+    robot.told();
+    let said = robot.hears(&["do 8 cancel 1"]);
+    assert!(
+        said[0].starts_with("refused 8 order 1 is under way and its goods are in the claw"),
         "{said:?}"
     );
 

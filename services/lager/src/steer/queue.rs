@@ -37,9 +37,15 @@ impl Operator {
     /// `lager queue cancel`.
     pub fn cancel(&self, id: u32) -> Result<String> {
         let (mut queue, now) = self.queue()?;
-        now.before(id)?;
-        let gone = |queue: &OrderQueue| queue.before(id).is_err();
-        self.say_until(InputKind::OrderCancelled, id, &mut queue, gone)?;
+        if !now.is_under_way(id) {
+            now.before(id)?;
+        }
+        let gone = |queue: &OrderQueue| !queue.has(id);
+        let said = self.say_until(InputKind::OrderCancelled, id, &mut queue, gone);
+        if said.is_err() && now.is_under_way(id) {
+            bail!("order {id} is carried out: its goods are in the claw, or about to be");
+        }
+        said?;
         Ok(format!("order {id} is taken back"))
     }
 

@@ -20,7 +20,7 @@ impl Mission {
         };
         if map.station(order.product).is_none() {
             return self.refuse(order, FailureKind::UnknownProduct, out);
-        } else if self.phase.needs_reset() {
+        } else if self.needs_reset() {
             return self.refuse(order, FailureKind::NeedsReset, out);
         }
         let before = self.queue.waiting().len();
@@ -46,6 +46,38 @@ impl Mission {
             think_of_product(ThoughtKind::OrderCancelled, order.product, out);
             self.need_no_way();
         }
+    }
+
+    /// Whether the order with this number is the one under way.
+    pub(crate) fn is_under_way(&self, id: u32) -> bool {
+        let is_at_work = matches!(self.goal, Goal::Product | Goal::Delivery);
+        is_at_work && self.order.id == id
+    }
+
+    /// A person takes the order under way back, whose goods the robot does not hold. It ends what it
+    /// is about, and goes home from the next place where it decides, or on the next order. Whether
+    /// another manoeuvre begins at once.
+    pub(crate) fn cancel_under_way(&mut self, out: &mut Output) -> bool {
+        think_of_product(ThoughtKind::OrderCancelled, self.order.product, out);
+        out.queue_changed = true;
+        self.goal = Goal::Home;
+        self.tries = 0;
+        self.none_reachable = None;
+        match self.phase {
+            Phase::Approaching => self.phase = Phase::Driving,
+            Phase::Picking => return self.leave(false, out),
+            Phase::Stuck if self.waits_for_way() => self.go_on_for_a_way(out),
+            _ => {
+                self.find_way(out);
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Too late to take the order under way back.
+    pub(crate) fn keep_order(&self, out: &mut Output) {
+        think_of_product(ThoughtKind::OrderKept, self.order.product, out);
     }
 
     /// A person wants a waiting order to be carried out earlier.
@@ -75,7 +107,7 @@ impl Mission {
 
     /// The orders as they are published.
     pub(crate) fn order_queue(&self) -> OrderQueue {
-        let is_under_way = matches!(self.goal, Goal::Product | Goal::Delivery);
+        let is_under_way = self.is_under_way(self.order.id);
         self.queue.to_payload(is_under_way.then_some(self.order))
     }
 
@@ -145,6 +177,28 @@ impl Mission {
         true
     }
 
+    /// The robot stands for want of a way to its goal, and one of the waiting orders can be reached
+    /// instead. Whether it begins that one.
+    pub(crate) fn overtake(&mut self, out: &mut Output) -> bool {
+        let stands = self.phase == Phase::Stuck && self.waits_for_way() && !self.must_park();
+        let now = (self.tables.blocks.revision(), self.queue.revision());
+        if !stands || self.none_reachable == Some(now) {
+            return false;
+        }
+        self.none_reachable = Some(now);
+        self.put_off(out) || self.begin_on_the_way_home(out)
+    }
+
+    /// Begins a waiting order from where it stands instead of going home first. Whether there is one
+    /// that can be reached.
+    pub(super) fn begin_on_the_way_home(&mut self, out: &mut Output) -> bool {
+        if self.goal != Goal::Home {
+            return false;
+        }
+        let reachable = self.first_reachable();
+        reachable.is_some_and(|index| self.begin_order(index, out))
+    }
+
     /// The first waiting order to whose goods there is a way from here.
     fn first_reachable(&mut self) -> Option<usize> {
         let map = self.map.as_ref()?;
@@ -198,6 +252,11 @@ impl Mission {
     /// The robot stands at the goods, turned in (L7).
     pub(super) fn be_in_position(&mut self, out: &mut Output) {
         self.phase = Phase::Picking;
+        if self.goal == Goal::Home {
+            // The order was taken back meanwhile.
+            self.leave(false, out);
+            return;
+        }
         out.announce(EventKind::InPosition, self.place, self.order);
         let kind = match self.pick {
             Pick::Auto => ThoughtKind::Picking,
@@ -250,8 +309,8 @@ impl Mission {
         self.leave(forced, out)
     }
 
-    /// Leaves with the goods: back onto the edge, towards the end from which the delivery corner is
-    /// nearer. Whether there is a way.
+    /// Leaves with the goods, or without them if the order was taken back: back onto the edge,
+    /// towards the end from which the delivery corner is nearer. Whether that changes anything.
     pub(super) fn leave(&mut self, forced: bool, out: &mut Output) -> bool {
         let (Some(map), Some(station)) = (&self.map, self.station()) else {
             return false;
@@ -274,12 +333,17 @@ impl Mission {
             return false;
         };
         self.place.node = from;
-        self.goal = Goal::Delivery;
+        let has_goods = self.goal != Goal::Home;
+        if has_goods {
+            self.goal = Goal::Delivery;
+        }
         self.tries = 0;
         self.forced = forced;
         self.failure = Failure::default();
         self.plan_from_edge(towards, heading, out);
-        think_of_product(ThoughtKind::HasGoods, self.order.product, out);
+        if has_goods {
+            think_of_product(ThoughtKind::HasGoods, self.order.product, out);
+        }
         self.target = heading;
         self.phase = Phase::Leaving;
         true

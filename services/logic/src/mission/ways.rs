@@ -68,8 +68,9 @@ impl Mission {
     /// The first map of this process: a fresh robot stands at the start, one that was restarted
     /// stands where it was.
     pub(super) fn take_first_map(&mut self, map: Map, out: &mut Output) -> bool {
-        let station_is_missing =
-            self.goal == Goal::Product && map.station(self.order.product).is_none();
+        let is_at_station = matches!(self.phase, Phase::Positioning | Phase::Picking);
+        let needs_station = self.goal == Goal::Product || is_at_station;
+        let station_is_missing = needs_station && map.station(self.order.product).is_none();
         let place_is_missing = !map.contains(self.place.node) || station_is_missing;
         if self.blocked_floor != [0; 2] && self.blocked_floor != map.size() {
             self.tables.blocks.clear();
@@ -176,9 +177,16 @@ impl Mission {
         if !waits || !has_way || self.phase != Phase::Stuck {
             return false;
         }
-        self.failure = Failure::default();
-        self.set_out(out);
+        self.go_on_for_a_way(out);
         true
+    }
+
+    /// Sets out from the node at which it has stood for want of a way.
+    pub(super) fn go_on_for_a_way(&mut self, out: &mut Output) {
+        self.failure = Failure::default();
+        // Where it is to stand at the node all the same, it is not stuck there.
+        self.phase = Phase::Driving;
+        self.set_out(out);
     }
 
     /// Something stands on the way ahead.
@@ -209,7 +217,7 @@ impl Mission {
     }
 
     /// Whether it stands for want of a way.
-    fn waits_for_way(&self) -> bool {
+    pub(super) fn waits_for_way(&self) -> bool {
         matches!(
             self.failure.kind.get(),
             Some(FailureKind::NoWay | FailureKind::Unreachable)

@@ -75,7 +75,11 @@ impl Navigator {
                     | Phase::TurningBack
                     | Phase::Exiting
             );
-        if !carries || self.mission.forced {
+        // An order was taken back at the goods: the arm may still reach out over them.
+        let withdraws = self.mission.goal == Goal::Home
+            && self.mission.phase == Phase::Leaving
+            && self.holding.joint_off.is_some();
+        if !(carries || withdraws) || self.mission.forced {
             self.holding.joint_off = None;
         } else if self.command.command() == STANDBY || !self.active {
             self.holding.watch_arm(&self.senses.arm, &self.config, out);

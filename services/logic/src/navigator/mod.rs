@@ -290,7 +290,7 @@ impl Navigator {
 
     /// Begins what had to wait: tries the blocked ways again, or begins the next order.
     fn begin_what_waits(&mut self, now: Duration, out: &mut Output) {
-        if self.active && self.mission.try_again(out) {
+        if self.active && (self.mission.try_again(out) || self.mission.overtake(out)) {
             self.begin(now, out);
         }
         if self.mission.phase == Phase::WaitingForOrder

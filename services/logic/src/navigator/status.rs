@@ -5,7 +5,7 @@
 //! successor has its map is judged when the map is there. The blocked ways and the waiting orders
 //! are published beside the status.
 
-use lager_topics::{BlockedWays, Hold, Mode, NavigatorStatus, Order, OrderQueue, Remedy};
+use lager_topics::{BlockedWays, Hold, Joint, Mode, NavigatorStatus, Order, OrderQueue, Remedy};
 use lager_wire::{Command, WheelCommand};
 
 use super::Navigator;
@@ -117,6 +117,10 @@ impl Navigator {
         }
         if status.hold == Hold::Link {
             (mission.parked, mission.link_lost) = (true, true);
+        }
+        if status.hold == Hold::Arm {
+            // The next report tells which joint it is, if it is one still.
+            navigator.holding.joint_off = Some(Joint::Base);
         }
         navigator.frames = status.frames;
         navigator.by_hand = ByHand::from_status(status.driven_by_hand);

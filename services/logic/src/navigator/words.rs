@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Heading, Mode, Phase, Pick, ThoughtKind, WarehouseMap};
+use lager_topics::{FailureKind, Goal, Heading, Mode, Phase, Pick, ThoughtKind, WarehouseMap};
 
 use super::{Input, Navigator};
 use crate::blocks::Block;
@@ -28,6 +28,7 @@ impl Navigator {
         match input {
             Input::Map(map) => self.take_map(now, map, out),
             Input::Order(order) => self.mission.take_order(order, out),
+            Input::Cancel(id) if self.mission.is_under_way(id) => self.cancel_under_way(now, out),
             Input::Cancel(id) => self.mission.cancel(id, out),
             Input::MoveUp(id) => self.mission.move_up(id, out),
             Input::ClearQueue => self.mission.clear_queue(out),
@@ -94,6 +95,28 @@ impl Navigator {
             && self.claw_is_empty().is_some();
         if waits && pick == Pick::Auto {
             self.begin(now, out);
+        }
+    }
+
+    /// A person takes the order under way back. Goods that are held, or are being gripped, are
+    /// delivered all the same.
+    fn cancel_under_way(&mut self, now: Duration, out: &mut Output) {
+        let is_at_goods = self.mission.phase == Phase::Picking;
+        let has_goods = match is_at_goods {
+            true => {
+                let is_gripping = matches!(self.manoeuvre, Manoeuvre::Arm(_));
+                is_gripping || self.claw_is_empty().is_none()
+            }
+            false => self.mission.goal == Goal::Delivery,
+        };
+        if has_goods {
+            return self.mission.keep_order(out);
+        }
+        if self.mission.cancel_under_way(out) {
+            self.begin(now, out);
+        }
+        if is_at_goods {
+            self.holding.watch_arm(&self.senses.arm, &self.config, out);
         }
     }
 

@@ -114,6 +114,20 @@ fn a_robot_driven_by_hand_asks_for_a_reset_and_fetches_again_after_it() {
 }
 
 #[test]
+fn a_robot_driven_away_from_its_goods_by_hand_does_not_leave_with_them() {
+    let mut trial = run_to(Phase::Picking);
+    set_autonomous(&mut trial, false);
+    trial.body.manual_duty = 100.0;
+    trial.run_for(SECOND / 2);
+    trial.body.manual_duty = 0.0;
+    set_autonomous(&mut trial, true);
+    trial.run_for(SECOND * 2);
+    assert_eq!(trial.phase(), Phase::Stuck, "{}", trial.story());
+    let failure = trial.navigator.status().failure;
+    assert_eq!(failure.kind, FailureKind::DrivenByHand, "{failure}");
+}
+
+#[test]
 fn a_robot_driven_by_hand_while_its_navigator_was_away_asks_for_a_reset() {
     let mut trial = run_to(Phase::Exiting);
     set_autonomous(&mut trial, false);

@@ -6,7 +6,7 @@ use std::time::Duration;
 use lager_logic::node::Node;
 use lager_logic::queue::MOST_ORDERS;
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{BlockSource, EventKind, FailureKind, Heading, OrderQueue, Phase, Side};
+use lager_topics::{BlockSource, EventKind, FailureKind, Heading, Hold, OrderQueue, Phase, Side};
 
 use crate::double::{Body, Trouble};
 use crate::floor::Exit;
@@ -83,9 +83,9 @@ fn waiting_orders_are_cancelled_moved_up_and_cleared_while_it_drives() {
         "before the first there is no place"
     );
     trial.tell(Input::Cancel(2));
-    trial.tell(Input::Cancel(1));
     trial.tell(Input::Cancel(77));
     trial.tell(Input::MoveUp(77));
+    trial.tell(Input::MoveUp(1));
     assert_eq!(waiting(&trial), [4, 3], "what is under way does not wait");
     let mut cleared = trial.clone();
     trial.deliver(3);
@@ -156,6 +156,105 @@ fn who_waits_at_home_for_a_way_to_a_cancelled_order_waits_no_more() {
     assert!(trial.navigator.status().failure.is_none());
     trial.order(2, 2);
     trial.deliver(1);
+}
+
+/// A robot on its way to product 1 that has no way there any more, and no other order.
+fn without_a_way() -> Trial {
+    let mut trial = busy(&[1]);
+    way(&mut trial, (2, 0), Heading::Up, false);
+    let stands = |trial: &Trial| trial.phase() == Phase::Stuck;
+    assert!(trial.run_until(SECOND * 30, stands), "{}", trial.story());
+    let failure = trial.navigator.status().failure;
+    assert_eq!(failure.kind, FailureKind::NoWay, "{failure}");
+    trial
+}
+
+#[test]
+fn who_waits_for_a_way_takes_orders_and_carries_out_what_can_be_reached() {
+    let mut trial = without_a_way();
+    assert!(!trial.navigator.status().needs_reset());
+    trial.order(2, 2);
+    assert_eq!(orders(&trial, EventKind::Refused), [0; 0]);
+    trial.deliver_but(1, 1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2]);
+    assert_eq!(waiting(&trial), [1]);
+    way(&mut trial, (2, 0), Heading::Up, true);
+    trial.deliver(2);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2, 1]);
+}
+
+#[test]
+fn who_waits_for_a_way_and_is_driven_by_hand_does_not_know_its_place_any_more() {
+    let mut trial = without_a_way();
+    trial.body.autonomous = false;
+    trial.tell_mode();
+    trial.body.manual_duty = 100.0;
+    trial.run_for(SECOND);
+    trial.body.manual_duty = 0.0;
+    let failure = trial.navigator.status().failure;
+    assert_eq!(failure.kind, FailureKind::DrivenByHand, "{failure}");
+    trial.order(2, 2);
+    assert_eq!(orders(&trial, EventKind::Refused), [2]);
+}
+
+#[test]
+fn the_order_under_way_is_taken_back_at_any_moment_before_its_goods_are_held() {
+    let mut trial = busy(&[1]);
+    let mut count = 0;
+    // The operator says after 600 ms that the goods are held, which the claw feels.
+    while trial.phase() != Phase::Picking {
+        let mut fork = trial.clone();
+        fork.tell(Input::Cancel(1));
+        assert_eq!((fork.queue.under_way, fork.queue.count), (0, 0));
+        if count % 7 == 0 {
+            fork.kill(Duration::from_millis(300));
+        }
+        fork.order(2, 2);
+        fork.deliver(1);
+        assert_eq!(
+            orders(&fork, EventKind::ItemDelivered),
+            [2],
+            "{}",
+            fork.story()
+        );
+        trial.run_for(Duration::from_millis(95));
+        count += 1;
+    }
+    assert!(count > 100, "only {count} moments");
+    trial.tell(Input::Cancel(1));
+    assert_eq!(trial.queue.under_way, 1);
+    let said = trial.thoughts.last().unwrap();
+    assert!(said.contains("I bring product 1 all the same"), "{said}");
+    trial.deliver(1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [1]);
+}
+
+#[test]
+fn who_stands_at_goods_that_nobody_picks_leaves_without_them_when_the_arm_is_carried() {
+    let mut trial = busy(&[1]);
+    let stands = |trial: &Trial| trial.phase() == Phase::Picking;
+    assert!(trial.run_until(SECOND * 90, stands), "{}", trial.story());
+    let [shoulder, claw] = [1, 7];
+    trial.body.servos[claw] = 210;
+    trial.body.claw_load = -20;
+    trial.body.servos[shoulder] += 100;
+    trial.run_for(SECOND / 10);
+    trial.tell(Input::Cancel(1));
+    trial.run_for(SECOND / 2);
+    trial.kill(SECOND / 5);
+    trial.run_for(SECOND);
+    let (status, order) = (trial.navigator.status(), trial.navigator.current_order());
+    assert_eq!(status.hold, Hold::Arm, "{}", trial.story());
+    assert_eq!(
+        order.map(|order| (order.code, order.arm_granted)),
+        Some((1, 1))
+    );
+    trial.body.servos[shoulder] -= 100;
+    trial.order(2, 2);
+    trial.run_for(SECOND);
+    (trial.body.servos[claw], trial.body.claw_load) = (399, -311);
+    trial.deliver(1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2]);
 }
 
 #[test]
