@@ -2,13 +2,16 @@
 //! The robot comes up again by itself, or ends with a sentence, and Ctrl-C always ends it.
 
 use std::fs::{self, File};
+use std::io::Read as _;
+use std::net::TcpListener;
+use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lager_ports::Subscriber;
 use lager_tests::{Domain, Running, has_ended, is_stopped, pid, wait_for};
-use lager_topics::{LinkHealth, NavStatus, Phase};
+use lager_topics::{LinkHealth, NavStatus, Phase, StopCause};
 use rustix::process::{Signal, kill_process};
 use serde_json::{Value, json};
 
@@ -73,6 +76,18 @@ fn kill(process: u32, signal: Signal) {
     kill_process(pid(process), signal).expect("a living process");
 }
 
+/// A robot that was started again on a cleared bus moves nothing until somebody says where it is.
+fn assert_stands_lost(domain: &Domain, cause: StopCause) {
+    let observer = domain.observe("r1", 1.0);
+    let mut health: Subscriber<LinkHealth> = observer.subscriber().expect("a topic");
+    let mut status: Subscriber<NavStatus> = observer.subscriber().expect("a topic");
+    let health = wait_for("the bridge", || health.latest().expect("readable"));
+    assert_eq!(health.stopped, 1, "{health:?}");
+    assert_eq!(health.stop_cause, cause, "{health:?}");
+    let status = wait_for("logic", || status.latest().expect("readable"));
+    assert_eq!(status.phase, Phase::Lost, "{status:?}");
+}
+
 /// What a robot leaves that was started again on a cleared bus: a stop, as nobody knows where it
 /// is.
 fn assert_only_a_stop_is_left(domain: &Domain) {
@@ -131,7 +146,11 @@ fn a_robot_comes_up_again_on_an_emptied_bus() {
     let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     // A bus that was cleared has names of its own.
-    for (emptied, next) in [("iceoryx2", "iceoryx2-1"), ("r1", "r1")] {
+    for (emptied, next, cause) in [
+        ("iceoryx2", "iceoryx2-1", StopCause::StateLost),
+        // The bridge notices it first, and stops.
+        ("r1", "r1", StopCause::WordRemoved),
+    ] {
         let folder = domain.bus_folder().join(emptied);
         let attendant = service(&mut up, "attend", None);
         // The robot makes files in it meanwhile.
@@ -141,6 +160,7 @@ fn a_robot_comes_up_again_on_an_emptied_bus() {
         service(&mut up, "attend", Some(attendant));
         wait_until_up(&domain, &mut up);
         assert!(domain.bus_folder().join(next).is_dir());
+        assert_stands_lost(&domain, cause);
     }
     interrupt(&mut up, 3);
     assert_only_a_stop_is_left(&domain);
@@ -156,7 +176,72 @@ fn a_robot_comes_up_again_when_its_memory_is_cut_off() {
     wait_until_up(&domain, &mut up);
     let told = up.output();
     assert!(told.contains("the bus is damaged"), "{told}");
+    assert_stands_lost(&domain, StopCause::StateLost);
     interrupt(&mut up, 3);
+    assert_only_a_stop_is_left(&domain);
+}
+
+/// What the lists of ends of a robot's topics are, as far as `others` have none of them in use.
+fn own_topics(domain: &Domain, robot: &[u32], others: &[u32]) -> Vec<PathBuf> {
+    let maps = |process: &u32| {
+        // One that has ended has nothing mapped.
+        fs::read_to_string(format!("/proc/{process}/maps")).unwrap_or_default()
+    };
+    let of = |processes: &[u32]| processes.iter().map(maps).collect::<String>();
+    let (own, foreign) = (of(robot), of(others));
+    let is_mapped = |maps: &str, path: &PathBuf| maps.contains(path.to_str().expect("UTF-8"));
+    segments(domain)
+        .into_iter()
+        .filter(|path| path.extension().is_some_and(|end| end == "dynamic"))
+        .filter(|path| is_mapped(&own, path) && !is_mapped(&foreign, path))
+        .collect()
+}
+
+#[test]
+fn a_robot_whose_topics_are_overwritten_comes_up_again_beside_another_that_notices_nothing() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless", "--no-station"]);
+    let mut other = domain.start(&["--name", "r2", "up", "--headless", "--no-station"]);
+    const SERVICES: [&str; 4] = ["attend", "simulator", "bridge", "logic"];
+    let others = |other: &mut Running| SERVICES.map(|name| service(other, name, None)).to_vec();
+    let before = others(&mut other);
+    let observer = domain.observe("r2", 1.0);
+    let mut health: Subscriber<LinkHealth> = observer.subscriber().expect("a topic");
+    let mut is_whole = || {
+        let health = health.latest().expect("readable")?;
+        let boards = [health.sensor.up, health.steering.up];
+        (health.stopped == 0 && boards == [1, 1]).then_some(health.stamp().writer)
+    };
+    wait_for("the other robot", &mut is_whole);
+
+    let attendant = service(&mut up, "attend", None);
+    let own = SERVICES.map(|name| service(&mut up, name, None));
+    let foreign: Vec<u32> = before.iter().copied().chain([std::process::id()]).collect();
+    let topics = own_topics(&domain, &own, &foreign);
+    assert!(topics.len() > 10, "{topics:#?}");
+    for topic in topics {
+        let length = fs::metadata(&topic).expect("a segment").len();
+        let file = File::options().write(true).open(topic).expect("ours");
+        let noise = vec![0xa5; usize::try_from(length).expect("a length")];
+        file.write_all_at(&noise, 0).expect("as long as it was");
+    }
+    service(&mut up, "attend", Some(attendant));
+    wait_until_up(&domain, &mut up);
+    let told = up.output();
+    assert!(told.contains("the bus is damaged"), "{told}");
+    assert_stands_lost(&domain, StopCause::StateLost);
+
+    let whole = wait_for("the other robot still", &mut is_whole);
+    assert_eq!(others(&mut other), before, "{}", other.output());
+    assert_eq!(Some(whole), other.service("bridge"));
+    let told = other.output() + &other.log();
+    assert!(
+        !told.contains("damaged") && !told.contains("ended"),
+        "{told}"
+    );
+    interrupt(&mut up, 3);
+    interrupt(&mut other, 0);
+    drop((health, observer));
     assert_only_a_stop_is_left(&domain);
 }
 
@@ -241,6 +326,39 @@ fn a_stopped_service_is_replaced_by_itself() {
     service(&mut up, "bridge", Some(bridge));
     wait_until_up(&domain, &mut up);
     assert_eq!(others(&mut up), before, "{}", up.output());
+    interrupt(&mut up, 0);
+    domain.assert_clean();
+}
+
+/// Nobody hears whether comm lives. `strace` keeps a call of it from returning.
+#[test]
+fn a_comm_that_hangs_ends_itself_with_a_sentence() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless", "--no-station"]);
+    let station = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = station.local_addr().expect("an address").to_string();
+    let comm = domain.lager(&["comm", "--station", &address]);
+    let mut traced = Command::new("strace")
+        .args(["-f", "-o", "/dev/null", "-e", "trace=sendto"])
+        .args(["-e", "inject=sendto:delay_enter=6000000"])
+        .arg(comm.get_program())
+        .args(comm.get_args())
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("strace, which tests/run installs");
+    let _robot = station.accept().expect("the robot's call");
+    let ended = wait_for("its end", || traced.try_wait().expect("a child"));
+    let mut said = String::new();
+    let told = traced
+        .stderr
+        .take()
+        .expect("its words")
+        .read_to_string(&mut said);
+    told.expect("UTF-8");
+    assert_eq!(ended.code(), Some(1), "{said}");
+    assert!(said.contains("has taken 3 s"), "{said}");
     interrupt(&mut up, 0);
     domain.assert_clean();
 }

@@ -4,6 +4,9 @@
 //! **Safe state**: silence. When this process ends, for whatever reason, its command is no longer
 //! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with
 //! its orders.
+//!
+//! Nobody listens whether it lives, so its turns run under a watch: a call that does not return ends
+//! the process, and `up` starts it again.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -11,12 +14,13 @@ use std::path::PathBuf;
 use lager_lines::{MAX_LINE, Name, to_line};
 use lager_ports::{
     Bus, Cause, Clock, Policy, PortError, Publisher, ReceiveError, Sample, SendError, Shutdown,
-    StopPage, StopWord, Subscriber, Waiter,
+    StopPage, StopWord, Subscriber, Waiter, Watchdog,
 };
 use lager_topics::{
     BridgeRequest, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue,
-    NavBlocks, NavMap, NavRoute, NavStatus, OperatorInput, Role, SensorDistance, SensorLine,
-    SteeringCommand, SteeringState, StopCause, Topic, TruthPose, WarehouseMap, WorldRequest,
+    NavBlocks, NavMap, NavRoute, NavStatus, OperatorInput, Request, Role, SensorDistance,
+    SensorLine, SteeringCommand, SteeringState, StopCause, Topic, TruthPose, WarehouseMap,
+    WorldRequest,
 };
 
 use crate::action::Action;
@@ -51,12 +55,18 @@ pub struct CommConfig {
     pub resume: bool,
 }
 
-/// Runs the communication unit until `shutdown` is requested.
+/// Runs the communication unit until `shutdown` is requested. `watchdog` watches its turns, and
+/// ends the process when one does not come to its end.
 ///
 /// # Errors
 /// Comm's place on the bus cannot be had; the sentence says what to do.
-pub fn run(bus: &Bus, config: &CommConfig, shutdown: &Shutdown) -> Result<(), PortError> {
-    let mut shell = Shell::new(bus, config)?;
+pub fn run(
+    bus: &Bus,
+    config: &CommConfig,
+    watchdog: &Watchdog,
+    shutdown: &Shutdown,
+) -> Result<(), PortError> {
+    let mut shell = Shell::new(&Opening { bus, watchdog }, config)?;
     shutdown.wake(shell.waiter.ringer()?);
     while !shutdown.is_requested() {
         shell.turn();
@@ -64,9 +74,33 @@ pub fn run(bus: &Bus, config: &CommConfig, shutdown: &Shutdown) -> Result<(), Po
     Ok(())
 }
 
+/// Opens one port after the other; each may take as long as any other call.
+struct Opening<'a> {
+    bus: &'a Bus,
+    watchdog: &'a Watchdog,
+}
+
+impl Opening<'_> {
+    fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, PortError> {
+        self.watchdog.enter("opening a topic");
+        self.bus.subscriber()
+    }
+
+    fn publisher<T: Topic>(&self) -> Result<Publisher<T>, PortError> {
+        self.watchdog.enter("opening a topic");
+        self.bus.publisher()
+    }
+
+    fn asking<R: Request>(&self, waiter: &Waiter) -> Result<Asking<R>, PortError> {
+        self.watchdog.enter("opening a request");
+        Asking::new(self.bus, waiter.ringer()?)
+    }
+}
+
 struct Shell {
     clock: Clock,
     waiter: Waiter,
+    watchdog: Watchdog,
     conversation: Conversation,
     link: Link,
     stop_word: PathBuf,
@@ -94,7 +128,9 @@ struct Shell {
 }
 
 impl Shell {
-    fn new(bus: &Bus, config: &CommConfig) -> Result<Self, PortError> {
+    fn new(opening: &Opening<'_>, config: &CommConfig) -> Result<Self, PortError> {
+        let Opening { bus, watchdog } = opening;
+        watchdog.enter("asking for the map that is kept");
         let kept = match config.resume {
             true => bus.kept::<NavMap>(RESUME_WAIT).unwrap_or_else(|error| {
                 tracing::warn!("the map is asked for anew: {error}");
@@ -102,31 +138,33 @@ impl Shell {
             }),
             false => None,
         };
+        watchdog.enter("opening the bells");
         let waiter = bus.waiter(Policy::Block)?;
         let shell = Self {
             clock: bus.clock(),
             link: Link::new(config.station.clone(), waiter.ringer()?),
-            bridge: Asking::new(bus, waiter.ringer()?)?,
-            world: Asking::new(bus, waiter.ringer()?)?,
+            bridge: opening.asking(&waiter)?,
+            world: opening.asking(&waiter)?,
             waiter,
+            watchdog: (*watchdog).clone(),
             conversation: Conversation::new(config.name.clone(), kept, config.link_lost),
             stop_word: bus.place().folder_of(bus.robot()).join(StopPage::FILE),
-            health: bus.subscriber()?,
-            status: bus.subscriber()?,
-            queue: bus.subscriber()?,
-            events: bus.subscriber()?,
-            reports: bus.subscriber()?,
-            route: bus.subscriber()?,
-            thoughts: bus.subscriber()?,
-            line: bus.subscriber()?,
-            distance: bus.subscriber()?,
-            blocks: bus.subscriber()?,
-            latency: bus.subscriber()?,
-            truth: bus.subscriber()?,
-            map: bus.publisher()?,
-            orders: bus.publisher()?,
-            inputs: bus.publisher()?,
-            commands: bus.publisher()?,
+            health: opening.subscriber()?,
+            status: opening.subscriber()?,
+            queue: opening.subscriber()?,
+            events: opening.subscriber()?,
+            reports: opening.subscriber()?,
+            route: opening.subscriber()?,
+            thoughts: opening.subscriber()?,
+            line: opening.subscriber()?,
+            distance: opening.subscriber()?,
+            blocks: opening.subscriber()?,
+            latency: opening.subscriber()?,
+            truth: opening.subscriber()?,
+            map: opening.publisher()?,
+            orders: opening.publisher()?,
+            inputs: opening.publisher()?,
+            commands: opening.publisher()?,
             complaints: 0,
         };
         if let Some(map) = kept {
@@ -136,10 +174,12 @@ impl Shell {
     }
 
     fn turn(&mut self) {
+        self.watchdog.leave();
         let due = self.conversation.due();
         let left = due.map(|due| self.clock.real(due.saturating_sub(self.clock.now())));
         self.waiter
             .wait(left.unwrap_or(LONGEST_WAIT).min(LONGEST_WAIT));
+        self.watchdog.enter("a turn");
         let now = self.now();
         self.conversation.turn(now);
         self.act();

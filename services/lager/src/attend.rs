@@ -15,7 +15,7 @@ mod ears;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_ports::{Bus, Cause, Clock, Inventory, OpenError, Publisher, Shutdown};
+use lager_ports::{Bus, BusConfig, Cause, Clock, Inventory, OpenError, Publisher, Shutdown};
 use lager_topics::{NavMap, Role};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
@@ -52,9 +52,7 @@ pub fn run(config: &Config, parent: Option<u32>, shutdown: &Shutdown) -> Result<
     supervisor::adopt(parent.context(stranger)?, shutdown)?;
     let begin = first_word(&line)?;
     let address = config.bus()?;
-    if begin.sweep == Sweep::TheDead || !address.place()?.clear(&address.robot) {
-        lager_ports::remove_stale_nodes(&address)?;
-    }
+    make_room(&address, begin.sweep)?;
     line.send(&Word::Swept)?;
     if begin.sweep == Sweep::EverythingAndEnd {
         return Ok(());
@@ -70,6 +68,20 @@ pub fn run(config: &Config, parent: Option<u32>, shutdown: &Shutdown) -> Result<
         attendant.wait();
     }
     attendant.last_words()
+}
+
+/// Removes what is left on the bus. A damaged one is cleared, or, while another robot is up, rid of
+/// everything that no process has open: the other robot goes on, and this one's services make their
+/// files anew.
+fn make_room(address: &BusConfig, sweep: Sweep) -> Result<()> {
+    if sweep != Sweep::TheDead {
+        if address.place()?.clear(&address.robot) {
+            return Ok(());
+        }
+        lager_ports::mend(address)?;
+    }
+    lager_ports::remove_stale_nodes(address)?;
+    Ok(())
 }
 
 fn first_word(line: &Line) -> Result<Begin> {

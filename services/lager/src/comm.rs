@@ -1,12 +1,19 @@
-//! `lager comm`: what the communication unit is told when it starts.
+//! `lager comm`: what the communication unit is told when it starts, and the watch over it.
+
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use lager_comm::CommConfig;
 use lager_lines::Name;
+use lager_ports::{GivenUp, Shutdown, Watchdog};
 
 use crate::cli::CommArgs;
 use crate::config::{Config, StationSection};
+use crate::exit;
 use crate::runtime::RuntimeFolder;
+
+/// How long one call into the bus may take, in real time.
+const CALL: Duration = Duration::from_secs(3);
 
 /// The configuration it runs with, and what it does. Started beside a robot that is up it takes
 /// over that robot's clock, in which leases count.
@@ -30,4 +37,20 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
         resume: args.service.resume,
     };
     Ok((joined, wanted))
+}
+
+/// Ends this process when a call into the bus hangs: comm says nothing on the bus by which others
+/// could tell that it lives. `up` starts another one.
+///
+/// # Errors
+/// The system has no thread for it.
+pub fn watch(shutdown: &Shutdown) -> Result<Watchdog> {
+    let end = |why| match why {
+        GivenUp::Interrupted => std::process::exit(exit::INTERRUPTED),
+        GivenUp::Hung { what } => {
+            tracing::error!("{what} has taken {} s; it hangs", CALL.as_secs());
+            std::process::exit(1);
+        }
+    };
+    Watchdog::start(CALL, shutdown, end).context("there is no thread for the watch over the bus")
 }

@@ -48,7 +48,7 @@ use anyhow::{Context, Result};
 use clap::FromArgMatches;
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, Shutdown};
+use lager_ports::{Bus, Shutdown, Watchdog};
 use lager_simulator::SimulatorConfig;
 use lager_topics::{Mode, Role, TOPICS};
 use lager_wire::OperatorCommand;
@@ -131,7 +131,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Bridge(args) => {
-            service(&config, Role::Bridge, &args, &shutdown, |bus, resume| {
+            service(&config, Role::Bridge, &args, &shutdown, |bus, resume, _| {
                 let bridge = BridgeConfig {
                     ports: [config.serial.sensor.clone(), config.serial.steering.clone()],
                     baud: config.serial.baud,
@@ -147,7 +147,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Logic(args) => {
-            service(&config, Role::Logic, &args, &shutdown, |bus, resume| {
+            service(&config, Role::Logic, &args, &shutdown, |bus, resume, _| {
                 let logic = LogicConfig {
                     resume,
                     ..config.navigator()
@@ -157,18 +157,24 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Simulator(args) => {
-            service(&config, Role::Simulator, &args, &shutdown, |bus, resume| {
-                let simulator = SimulatorConfig {
-                    warehouse: config.warehouse()?,
-                    seed: config.simulator.seed,
-                    obstacles: config.simulator.obstacles,
-                    baud: config.serial.baud,
-                    sensor_link: config.serial.sensor.clone(),
-                    steering_link: config.serial.steering.clone(),
-                    resume,
-                };
-                Ok(lager_simulator::run(bus, &simulator, &shutdown)?)
-            })?;
+            service(
+                &config,
+                Role::Simulator,
+                &args,
+                &shutdown,
+                |bus, resume, _| {
+                    let simulator = SimulatorConfig {
+                        warehouse: config.warehouse()?,
+                        seed: config.simulator.seed,
+                        obstacles: config.simulator.obstacles,
+                        baud: config.serial.baud,
+                        sensor_link: config.serial.sensor.clone(),
+                        steering_link: config.serial.steering.clone(),
+                        resume,
+                    };
+                    Ok(lager_simulator::run(bus, &simulator, &shutdown)?)
+                },
+            )?;
             return Ok(ExitCode::SUCCESS);
         }
         Command::Emulator(args) => {
@@ -185,14 +191,15 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                 Role::Simulator,
                 &args,
                 &shutdown,
-                |bus, resume| emulator::run(bus, &config, resume, &shutdown),
+                |bus, resume, _| emulator::run(bus, &config, resume, &shutdown),
             )?;
             return Ok(ExitCode::SUCCESS);
         }
         Command::Comm(args) => {
             let (running, wanted) = comm::prepare(&config, &args)?;
-            service(&running, Role::Comm, &args.service, &shutdown, |bus, _| {
-                Ok(lager_comm::run(bus, &wanted, &shutdown)?)
+            let args = &args.service;
+            service(&running, Role::Comm, args, &shutdown, |bus, _, watchdog| {
+                Ok(lager_comm::run(bus, &wanted, watchdog, &shutdown)?)
             })?;
             return Ok(ExitCode::SUCCESS);
         }
@@ -333,7 +340,7 @@ fn service(
     role: Role,
     args: &ServiceArgs,
     shutdown: &Shutdown,
-    run: impl FnOnce(&Bus, bool) -> Result<()>,
+    run: impl FnOnce(&Bus, bool, &Watchdog) -> Result<()>,
 ) -> Result<()> {
     // Before the first thread: all of them inherit it.
     let mut wanted = config.realtime.wanted(role);
@@ -346,10 +353,15 @@ fn service(
     let bus = config.bus()?;
     // Two of a kind would both steer; a supervised successor may meet its predecessor's end.
     let _lock = bus.place()?.lock(&bus.robot, role)?;
-    let bus = Bus::open(&bus, role)?;
-    let result = run(&bus, args.resume);
+    let watchdog = match role {
+        Role::Comm => comm::watch(shutdown)?,
+        // The attendant listens whether it lives.
+        _ => Watchdog::default(),
+    };
+    let bus = watchdog.over("joining the bus", || Bus::open(&bus, role))?;
+    let result = run(&bus, args.resume, &watchdog);
     // A killed supervisor left its node behind; the last process to go sweeps it.
-    bus.sweep();
+    watchdog.over("sweeping the bus", || bus.sweep());
     result
 }
 

@@ -38,7 +38,8 @@ impl Service {
         }
     }
 
-    /// Whether it says something on the bus again and again as long as it lives.
+    /// Whether it says something on the bus again and again as long as it lives. Comm does not, and
+    /// watches over its calls into the bus itself.
     pub fn is_heard(self) -> bool {
         !matches!(self, Self::Comm | Self::Station)
     }
