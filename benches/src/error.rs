@@ -34,16 +34,6 @@ pub enum BenchError {
         /// What the kernel says.
         detail: String,
     },
-    /// Other work keeps the measured services from running.
-    #[error(
-        "{overtaken} of {frames} frames were not answered before logic went blind half a millisecond later: the machine is too busy to measure the path; end what else runs on it and start again"
-    )]
-    Overloaded {
-        /// Frames put aside.
-        overtaken: u64,
-        /// Frames sent.
-        frames: u64,
-    },
     /// A process of the path was ready to run and the kernel did not let it.
     #[error(
         "`{contender}` did not answer within {limit:?}, because one of its processes is ready to run and gets no core: end what else runs on this machine and start again"

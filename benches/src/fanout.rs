@@ -227,7 +227,7 @@ impl<const WORDS: usize> Session<WORDS> {
     }
 
     fn publish_ours(&mut self) -> Result<(), BenchError> {
-        let mut loan = self.ours.loan().map_err(failed)?;
+        let mut loan = self.ours.loan_uninit().map_err(failed)?;
         loan.words.copy_from_slice(&self.source.words);
         slow::publish(self.observers);
         loan.send().map_err(failed)

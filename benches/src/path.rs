@@ -15,6 +15,7 @@
 //! | `path` | `lager/block` | `floor` |
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
+//! | `path-overtaken` | the samples of each `lager` row whose command was overtaken | |
 //! | `path-stages` | each stage of `lager`, as the robot itself publishes it | |
 //!
 //! An observer is a process of its own on a node of its own, subscribed to `sensor/line` and
@@ -36,6 +37,7 @@ use crate::error::BenchError;
 use crate::machine::{self, Awake, Bound, cores_for};
 use crate::report::{Mode, Options, Regime, Report, Row};
 use crate::run::{self, Entry};
+use crate::stats::Quantiles;
 use floor::Floor;
 use pace::{Chain, TURN, turn};
 use players::Place;
@@ -187,6 +189,7 @@ fn path(regime: Regime, entries: &[Entry], options: &Options) -> Result<Vec<Row>
         if entry.name == "floor" {
             continue;
         }
+        rows.push(overtaken(chain.overtaken(), entry, regime));
         // Counts are published once a second.
         turn(&mut **chain, A_SECOND)?;
         let before = chain.counted()?;
@@ -216,14 +219,40 @@ fn path_observed(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchErr
     }
     // Last of all: what a thread starts inherits its core.
     machine::pin(ends)?;
-    run::measure(
+    let mut rows = run::measure(
         "path@observed",
         regime,
         OBSERVED,
         options,
         turns(options),
         |index| turn(&mut robots[index], TURN),
-    )
+    )?;
+    for (entry, robot) in OBSERVED.iter().zip(&robots) {
+        rows.push(overtaken(robot.overtaken(), entry, regime));
+    }
+    Ok(rows)
+}
+
+/// How many of a robot's frames were overtaken; all 0 if none was.
+fn overtaken(times: &[u64], entry: &Entry, regime: Regime) -> Row {
+    let times = Quantiles::of(&mut times.to_vec());
+    let told = |figure: fn(&Quantiles) -> u64| times.as_ref().map_or(0, figure);
+    Row {
+        name: entry.name.to_owned(),
+        variant: entry.variant.to_owned(),
+        what: "path-overtaken".to_owned(),
+        mode: entry.mode,
+        regime,
+        n: told(|times| times.n),
+        p50_ns: told(|times| times.p50_ns),
+        p99_ns: told(|times| times.p99_ns),
+        p999_ns: told(|times| times.p999_ns),
+        ratio_to: String::new(),
+        ratio_p50: 1.0,
+        ratio_p99: 1.0,
+        ratios: Vec::new(),
+        cpu_percent: None,
+    }
 }
 
 /// One chain for the criterion bench. Stays in the thread that opened it, which is bound to a core

@@ -8,11 +8,12 @@
 //! ```
 //!
 //! Timed is `t1 - t0`, for which the writer is kept from its work. The typed ports publish and
-//! ring; bare iceoryx2 publishes the same and notifies a listener for each reader (`event`).
+//! ring; bare iceoryx2 publishes the same and notifies a listener for each reader (`event`), or, as
+//! the typed ports do it, one listener for the actor while 64 readers poll (`event-1`).
 //!
 //! The cost of the ring alone is the difference between publishing on a topic with an actor and
 //! publishing on one with as many readers but no actor, measured in pairs (`lager/ring`). It
-//! compares with iceoryx2 notifying without publishing anything (`notify`).
+//! compares with iceoryx2 notifying without publishing anything (`notify`, `notify-1`).
 
 mod audience;
 mod ringer;
@@ -65,21 +66,56 @@ enum Contender {
     Lager,
     /// The same, less what it costs to publish where nobody is to be rung.
     Ring,
-    /// Bare iceoryx2 notifies a listener of each reader.
-    Notify,
-    /// Bare iceoryx2 publishes and then notifies.
-    Event,
+    /// Bare iceoryx2 notifies so many listeners.
+    Notify(Listeners),
+    /// Bare iceoryx2 publishes and then notifies so many listeners.
+    Event(Listeners),
+}
+
+/// Who listens on bare iceoryx2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+enum Listeners {
+    /// Every reader.
+    All,
+    /// The actor; the observers poll.
+    Actor,
+}
+
+impl Listeners {
+    const fn count(self) -> usize {
+        match self {
+            Self::All => OBSERVERS + 1,
+            Self::Actor => 1,
+        }
+    }
+
+    /// The event and the topic; a service keeps its number of listeners.
+    const fn service(self) -> &'static str {
+        match self {
+            Self::All => "bench/bare-ring",
+            Self::Actor => "bench/bare-ring-1",
+        }
+    }
 }
 
 impl Contender {
-    const ALL: [Self; 4] = [Self::Lager, Self::Ring, Self::Event, Self::Notify];
+    const ALL: [Self; 6] = [
+        Self::Lager,
+        Self::Ring,
+        Self::Event(Listeners::All),
+        Self::Notify(Listeners::All),
+        Self::Event(Listeners::Actor),
+        Self::Notify(Listeners::Actor),
+    ];
 
     fn entry(self, mode: Mode) -> Entry {
         let (name, variant, against): (_, _, &[&str]) = match self {
-            Self::Lager => ("lager", "", &["iceoryx2/event"]),
-            Self::Ring => ("lager", "ring", &["iceoryx2/notify"]),
-            Self::Notify => ("iceoryx2", "notify", &[]),
-            Self::Event => ("iceoryx2", "event", &[]),
+            Self::Lager => ("lager", "", &["iceoryx2/event", "iceoryx2/event-1"]),
+            Self::Ring => ("lager", "ring", &["iceoryx2/notify", "iceoryx2/notify-1"]),
+            Self::Notify(Listeners::All) => ("iceoryx2", "notify", &[]),
+            Self::Event(Listeners::All) => ("iceoryx2", "event", &[]),
+            Self::Notify(Listeners::Actor) => ("iceoryx2", "notify-1", &[]),
+            Self::Event(Listeners::Actor) => ("iceoryx2", "event-1", &[]),
         };
         Entry {
             name,
@@ -266,11 +302,6 @@ impl Place {
         }
     }
 }
-
-const BARE: &str = "bench/bare-ring";
-
-/// A listener for each observer and one for the actor.
-const LISTENERS: usize = OBSERVERS + 1;
 
 fn broken(error: impl core::fmt::Display) -> Fault {
     Fault::Broken(error.to_string())

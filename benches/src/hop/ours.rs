@@ -54,14 +54,14 @@ where
     }
 
     fn receive(&mut self) -> Result<Ball, Fault> {
-        let Self {
-            subscriber, waiter, ..
-        } = self;
         let mut start = None;
         loop {
-            // A ring may come after its sample was found, and then ends the next wait for nothing.
-            if let Some(found) = waiter.wait_for(TIME_OUT, || subscriber.receive().transpose()) {
-                return found.map(|sample| *sample).map_err(broken);
+            self.waiter.wait(TIME_OUT);
+            // A sample may be found before its ring, which then ends the next wait for nothing.
+            if self.waiter.has::<Back>()
+                && let Some(sample) = self.subscriber.receive().map_err(broken)?
+            {
+                return Ok(*sample);
             }
             if start.get_or_insert_with(Instant::now).elapsed() > LIMIT {
                 return Err(Fault::Silent);

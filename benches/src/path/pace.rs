@@ -40,6 +40,10 @@ pub(super) trait Chain {
     fn end(&mut self) -> Result<(), BenchError>;
     /// Processor time of the chain's processes while frames were counted, in percent of one core.
     fn cpu_percent(&self) -> Option<f64>;
+    /// The times of the frames that counted and whose command was overtaken by another one, in ns.
+    fn overtaken(&self) -> &[u64] {
+        &[]
+    }
     /// What the chain itself has counted, as of the last second, if it counts anything.
     fn counted(&mut self) -> Result<Option<Counted>, BenchError> {
         Ok(None)

@@ -12,8 +12,8 @@
 //! by turns. A command answers a frame if it is the one that frame asks for and its seq is new;
 //! repetitions of the command in force carry the old one. On a machine that keeps logic from
 //! running for half a millisecond, logic may go blind right after it saw, and the bridge then
-//! writes the later of both orders alone: such a frame is put aside, and counted. The steering
-//! board reports that its wheels stand, so the robot drives towards its goods for as long as it is
+//! writes the later of both orders alone. Such a frame counts with the time until that command was
+//! read, and how many they are is a row of its own (`path-overtaken`). The steering board reports that its wheels stand, so the robot drives towards its goods for as long as it is
 //! measured.
 
 mod chain;
@@ -49,9 +49,6 @@ const REPORT_EVERY: u64 = 100_000_000;
 /// Frames that must be answered one after the other before a robot counts as awake.
 const IN_A_ROW: usize = 5;
 
-/// So many frames may be put aside whatever their part of all frames is.
-const TOO_FEW_TO_JUDGE: u64 = 20;
-
 /// Who asks and orders here, in the sentences of errors.
 const OPERATOR: &str = "the operator of the measurement";
 
@@ -61,8 +58,8 @@ const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
 enum Answer {
     /// The command it asks for was read so many ns after it was written.
     After(u64),
-    /// Another command came in its place.
-    Overtaken,
+    /// Another command came in its place, so many ns after it was written.
+    Overtaken(u64),
     /// Nothing new came in time.
     None,
 }
@@ -82,8 +79,10 @@ pub(super) struct Robot {
     last: (u8, u8),
     reported_ns: u64,
     frames: u64,
-    /// Frames put aside; more than one in ten end the measurement.
-    overtaken: u64,
+    /// Frames count.
+    counts: bool,
+    /// The times of those that count and whose command was overtaken, in ns.
+    overtaken: Vec<u64>,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
     path_latency: Subscriber<LatencyPath>,
@@ -135,7 +134,8 @@ impl Robot {
             last: (0, 0),
             reported_ns: 0,
             frames: 0,
-            overtaken: 0,
+            counts: false,
+            overtaken: Vec::new(),
             health: bus.subscriber().map_err(bus_error(OPERATOR))?,
             status: bus.subscriber().map_err(bus_error(OPERATOR))?,
             path_latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
@@ -330,7 +330,7 @@ impl Robot {
             }
             if let Some(code) = self.take(&buffer[..count]) {
                 return Ok(if (code == FOLLOW) == follows {
-                    Answer::Overtaken
+                    Answer::Overtaken(end - start)
                 } else {
                     Answer::After(end - start)
                 });

@@ -9,7 +9,7 @@ use iceoryx2::prelude::ipc;
 use lager_ports::{Policy, Subscriber, Waiter};
 use lager_topics::{OBSERVERS, Role, SensorLine, Stamp, Topic};
 
-use super::{BARE, Contender, LISTENERS, Place, Round, Unheard, broken};
+use super::{Contender, Place, Round, Unheard, broken};
 use crate::ball::{Ball, Ping, SECOND};
 use crate::baseline::iceoryx;
 use crate::baseline::{Fault, LIMIT, TIME_OUT};
@@ -78,14 +78,15 @@ impl Seats {
                     unheard,
                 }
             }
-            Contender::Notify | Contender::Event => {
+            Contender::Notify(listeners) | Contender::Event(listeners) => {
                 let member = place.member()?;
+                let (service, count) = (listeners.service(), listeners.count());
                 Self::Bare {
-                    listeners: (0..LISTENERS)
-                        .map(|_| member.listener(BARE, LISTENERS))
+                    listeners: (0..count)
+                        .map(|_| member.listener(service, count))
                         .collect::<Result<_, _>>()?,
-                    subscribers: (0..LISTENERS)
-                        .map(|_| member.subscriber(BARE, Some(&SensorLine::QOS)))
+                    subscribers: (0..=OBSERVERS)
+                        .map(|_| member.subscriber(service, Some(&SensorLine::QOS)))
                         .collect::<Result<_, _>>()?,
                 }
             }

@@ -9,9 +9,9 @@ use iceoryx2::prelude::ipc;
 use lager_ports::{Clock, Publisher};
 use lager_topics::{OBSERVERS, SensorLine, Stamp, Topic};
 
-use super::{BARE, Contender, LISTENERS, Place, Round, Unheard, broken};
+use super::{Contender, Listeners, Place, Round, Unheard, broken};
 use crate::ball::{Ball, FIRST, Ping};
-use crate::baseline::iceoryx::{self, Sender};
+use crate::baseline::iceoryx::{self, Member, Sender};
 use crate::baseline::{Fault, LIMIT};
 use crate::error::BenchError;
 use crate::error::no_bus;
@@ -84,8 +84,8 @@ enum Rope {
         /// Whether the last ball went where nobody is rung.
         unheard: bool,
     },
-    Notify(Notifier<ipc::Service>),
-    Event(Notifier<ipc::Service>, Sender<Stamp>),
+    Notify(Notifier<ipc::Service>, Listeners),
+    Event(Notifier<ipc::Service>, Listeners, Sender<Stamp>),
 }
 
 impl Rope {
@@ -100,12 +100,16 @@ impl Rope {
                     unheard: false,
                 }
             }
-            Contender::Notify => Self::Notify(place.member()?.notifier(BARE, LISTENERS)?),
-            Contender::Event => {
+            Contender::Notify(listeners) => {
+                Self::Notify(notifier(&place.member()?, listeners)?, listeners)
+            }
+            Contender::Event(listeners) => {
                 let member = place.member()?;
+                let publisher = member.publisher(listeners.service(), Some(&SensorLine::QOS))?;
                 Self::Event(
-                    member.notifier(BARE, LISTENERS)?,
-                    Sender::new(member.publisher(BARE, Some(&SensorLine::QOS))?),
+                    notifier(&member, listeners)?,
+                    listeners,
+                    Sender::new(publisher),
                 )
             }
         })
@@ -127,10 +131,10 @@ impl Rope {
                     send(loud, ball)
                 }
             }
-            Self::Notify(notifier) => notify(notifier),
-            Self::Event(notifier, sender) => {
+            Self::Notify(notifier, listeners) => notify(notifier, *listeners),
+            Self::Event(notifier, listeners, sender) => {
                 sender.send(ball)?;
-                notify(notifier)
+                notify(notifier, *listeners)
             }
         }
     }
@@ -157,13 +161,18 @@ fn send<T: Topic<Payload = Ball>>(publisher: &Publisher<T>, ball: &Ball) -> Resu
     loan.send().map_err(broken)
 }
 
-fn notify(notifier: &Notifier<ipc::Service>) -> Result<(), Fault> {
+fn notifier(member: &Member, listeners: Listeners) -> Result<Notifier<ipc::Service>, BenchError> {
+    member.notifier(listeners.service(), listeners.count())
+}
+
+fn notify(notifier: &Notifier<ipc::Service>, listeners: Listeners) -> Result<(), Fault> {
     let notified = notifier.notify().map_err(iceoryx::broken)?;
-    if notified == LISTENERS {
+    let count = listeners.count();
+    if notified == count {
         Ok(())
     } else {
         Err(Fault::Broken(format!(
-            "{notified} of {LISTENERS} listeners were notified"
+            "{notified} of {count} listeners were notified"
         )))
     }
 }

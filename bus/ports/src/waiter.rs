@@ -205,27 +205,6 @@ impl Waiter {
         self.bell.rung_for(reason) || self.everything.get()
     }
 
-    /// Waits until `look` finds something, at most `timeout` of real time, and returns that. A ring
-    /// for which `look` finds nothing also ends the wait, with `None`.
-    ///
-    /// For a thread that reads one topic. This is faster where the waiter spins, because it looks
-    /// for the sample itself and not for the ring that follows. `look` should be short, such as one
-    /// [`crate::Subscriber::receive`].
-    pub fn wait_for<R>(&self, timeout: Duration, mut look: impl FnMut() -> Option<R>) -> Option<R> {
-        let mut found = None;
-        let mut looks = 0_u32;
-        self.wait_while_not(timeout, || {
-            found = look();
-            // Look at the bell only now and then: each look makes the next ringer fetch its cache
-            // line again.
-            let hears = looks.is_multiple_of(LOOKS);
-            looks = looks.wrapping_add(1);
-            found.is_some() || (hears && self.bell.rung())
-        });
-        // The ring that ended the wait has been noticed, so what it was for is there.
-        found.or_else(look)
-    }
-
     /// How many times it has gone to sleep: each costs one system call here, and one for the
     /// process that wakes it.
     pub fn sleeps(&self) -> u64 {

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::{Answer, FOLLOW, IN_A_ROW, Robot, TOO_FEW_TO_JUDGE, UP_WITHIN};
+use super::{Answer, FOLLOW, IN_A_ROW, Robot, UP_WITHIN};
 use crate::error::BenchError;
 use crate::parts::interrupted;
 use crate::path::pace::{ANSWER_WITHIN, Chain};
@@ -28,25 +28,22 @@ impl Chain for Robot {
             self.play_boards()?;
             in_a_row = match self.exchange(20_000_000)? {
                 Answer::After(_) => in_a_row + 1,
-                Answer::Overtaken | Answer::None => 0,
+                Answer::Overtaken(_) | Answer::None => 0,
             };
         }
         Ok(())
     }
 
     fn frame(&mut self) -> Result<u64, BenchError> {
-        let time = loop {
-            match self.exchange(ANSWER_WITHIN)? {
-                Answer::After(time) => break time,
-                Answer::Overtaken => self.overtaken += 1,
-                Answer::None => return Err(self.processes.fault(&self.name, self.frames)),
+        let time = match self.exchange(ANSWER_WITHIN)? {
+            Answer::After(time) => time,
+            Answer::Overtaken(time) => {
+                if self.counts {
+                    self.overtaken.push(time);
+                }
+                time
             }
-            if self.overtaken > TOO_FEW_TO_JUDGE + self.frames / 10 {
-                return Err(BenchError::Overloaded {
-                    overtaken: self.overtaken,
-                    frames: self.frames,
-                });
-            }
+            Answer::None => return Err(self.processes.fault(&self.name, self.frames)),
         };
         // While the robot stands: a report is news to logic too, which then looks for the line.
         if self.last.0 != FOLLOW {
@@ -56,17 +53,23 @@ impl Chain for Robot {
     }
 
     fn count(&mut self) -> Result<(), BenchError> {
+        self.counts = true;
         self.urgent = self.boards_priority.map(RealTime::begin).transpose()?;
         self.processes.start_counting()
     }
 
     fn end(&mut self) -> Result<(), BenchError> {
+        self.counts = false;
         self.urgent = None;
         self.processes.rest()
     }
 
     fn cpu_percent(&self) -> Option<f64> {
         self.processes.cpu_percent()
+    }
+
+    fn overtaken(&self) -> &[u64] {
+        &self.overtaken
     }
 
     fn counted(&mut self) -> Result<Option<Counted>, BenchError> {

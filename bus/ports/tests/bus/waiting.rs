@@ -74,49 +74,6 @@ fn without_a_ring_the_wait_ends_by_its_time_out() {
 }
 
 #[test]
-fn a_sample_is_found_by_looking_for_it_under_every_policy() {
-    for policy in POLICIES {
-        let domain = Domain::new();
-        let logic = domain.open(Role::Logic);
-        let waiter = logic.waiter(policy).unwrap();
-        let mut subscriber = logic.subscriber::<SensorLine>().unwrap();
-        let bridge = domain.open(Role::Bridge);
-        let read = Barrier::new(2);
-        let mut look = || drain(&mut subscriber).pop();
-        // The ring of the first is still to be noticed when the second is looked for.
-        let publisher = bridge.publisher::<SensorLine>().unwrap();
-        for number in 0..100 {
-            send(&publisher, number);
-            assert_eq!(waiter.wait_for(LONG, &mut look), Some(number), "{policy}");
-        }
-        assert_eq!(waiter.wait_for(LONG, &mut look), None, "{policy}: its ring");
-        let start = Instant::now();
-        let timeout = Duration::from_millis(3);
-        assert_eq!(waiter.wait_for(timeout, &mut look), None, "{policy}");
-        assert!(start.elapsed() >= timeout, "{policy}");
-
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                let publisher = bridge.publisher::<SensorLine>().unwrap();
-                std::thread::sleep(Duration::from_millis(10));
-                send(&publisher, 7);
-                read.wait();
-            });
-            assert_eq!(waiter.wait_for(LONG, &mut look), Some(7), "{policy}");
-            read.wait();
-        });
-        let ringer = waiter.ringer().unwrap();
-        waiter.wait(Duration::ZERO);
-        ringer.ring();
-        assert_eq!(
-            waiter.wait_for(LONG, &mut look),
-            None,
-            "{policy}: a ring for others"
-        );
-    }
-}
-
-#[test]
 fn a_quiet_adaptive_waiter_sleeps_for_every_ring() {
     let domain = Domain::new();
     let logic = domain.open(Role::Logic);
