@@ -98,8 +98,8 @@ pub trait Topic: 'static {
     const SUMMARY: &'static str;
 }
 
-/// The number of a topic's name.
-const fn id(name: &str) -> u32 {
+/// The number of a topic's name, in the table or not.
+pub const fn id(name: &str) -> u32 {
     let hash = hash::bytes(hash::START, name.as_bytes());
     // The upper half of FNV-1a is the better mixed one; 0 is kept for "no topic".
     match (hash >> 32) as u32 {
