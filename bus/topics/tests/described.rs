@@ -296,19 +296,34 @@ fn a_payload_is_made_of_what_a_person_writes() {
 #[test]
 fn what_is_refused_names_the_field_and_what_it_may_be() {
     for (text, said) in [
-        (r#"{"wnd": 1}"#, "`Weather` has no field `wnd`; its fields are wind, gusts, sky"),
+        (
+            r#"{"wnd": 1}"#,
+            "`Weather` has no field `wnd`; its fields are wind, gusts, sky",
+        ),
         (r#"{"reserved": [1]}"#, "no field `reserved`"),
-        (r#"{"gusts": [{"mms": 1}]}"#, "`gusts.0` has no field `mms`; its fields are mm_s, sky"),
+        (
+            r#"{"gusts": [{"mms": 1}]}"#,
+            "`gusts.0` has no field `mms`; its fields are mm_s, sky",
+        ),
         (
             r#"{"gusts": [{}, {"mm_s": 40000}]}"#,
             "integer `40000`, expected a whole number from -32768 to 32767 in `gusts.1.mm_s`",
         ),
-        (r#"{"gusts": [{"mm_s": 1.5}]}"#, "a whole number from -32768 to 32767 in `gusts.0.mm_s`"),
-        (r#"{"sky": "blue"}"#, "one of Clear, Fog, Storm, or a code from 0 to 255, in `sky`"),
+        (
+            r#"{"gusts": [{"mm_s": 1.5}]}"#,
+            "a whole number from -32768 to 32767 in `gusts.0.mm_s`",
+        ),
+        (
+            r#"{"sky": "blue"}"#,
+            "one of Clear, Fog, Storm, or a code from 0 to 255, in `sky`",
+        ),
         (r#"{"sky": 256}"#, "or a code from 0 to 255, in `sky`"),
         (r#"{"wind": "strong"}"#, "expected a number in `wind`"),
         (r#"{"wind": 1, "wind": 2}"#, "`wind` stands twice"),
-        (r#"{"gusts": [{}, {}, {}, {}]}"#, "a list of at most 3 in `gusts`"),
+        (
+            r#"{"gusts": [{}, {}, {}, {}]}"#,
+            "a list of at most 3 in `gusts`",
+        ),
         (r#"{"gusts": {}}"#, "a list of at most 3 in `gusts`"),
         ("[1]", "an object with wind, gusts, sky for `Weather`"),
     ] {
@@ -327,7 +342,10 @@ fn a_path_leads_to_a_field_or_says_what_there_is() {
         assert_eq!(weather.must_have(path), Ok(()), "{path}");
     }
     for (path, said) in [
-        ("wnd", "there is no field `wnd`; the payload has wind, gusts, sky"),
+        (
+            "wnd",
+            "there is no field `wnd`; the payload has wind, gusts, sky",
+        ),
         ("gusts.3", "`gusts` has the places 0 to 2"),
         ("gusts.0.mms", "`gusts.0` has mm_s, sky"),
         ("wind.x", "`wind` has no parts"),
