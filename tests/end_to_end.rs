@@ -385,7 +385,7 @@ fn the_topic_tools_show_a_running_robot() {
         assert_eq!(pair[1]["lost"], 0);
     }
 
-    let hz = domain.run(&["topic", "hz", "sensor/line", "--count", "2", "--json"]);
+    let hz = domain.run(&["topic", "hz", "sensor/line", "--count", "50", "--json"]);
     let text = String::from_utf8_lossy(&hz.stdout).into_owned();
     let window: Value = serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
     assert!(window["samples"].as_u64().expect("samples") > 0, "{text}");

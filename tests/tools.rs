@@ -5,14 +5,18 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, is_stopped, pid, wait_for};
-use lager_topics::{LinkHealth, NavStatus, Phase};
+use lager_topics::{LinkHealth, NavStatus, Phase, SensorLine};
 use rustix::process::{Signal, kill_process};
+use serde_json::Value;
 
 /// Every tool that needs the bus of a robot that is up.
-const NEEDY: [&[&str]; 15] = [
+const NEEDY: [&[&str]; 18] = [
     &["topic", "echo", "sensor/line"],
     &["topic", "echo", "link/health", "--json"],
     &["topic", "hz", "sensor/line"],
+    &["topic", "bw", "sensor/line"],
+    &["topic", "delay", "sensor/line"],
+    &["top", "--once"],
     &["fetch", "2"],
     &["picked"],
     &["reset"],
@@ -410,4 +414,82 @@ fn up_speaks_with_one_voice_and_traces_only_where_it_is_asked_to() {
     }
     let traces = fs::read_to_string(log).expect("the traces' file");
     assert!(traces.contains("INFO"), "{traces}");
+}
+
+#[test]
+fn traces_of_a_mission_are_few_and_have_their_spans() {
+    let domain = Domain::new();
+    let log = domain.folder().join("traces.json");
+    let mut up = domain.start(&[
+        "up",
+        "--headless",
+        "--mission",
+        "1,2",
+        "--exit-when-done",
+        "--speed",
+        "5",
+        "--log",
+        log.to_str().expect("a path in UTF-8"),
+        "--log-json",
+    ]);
+    let observer = domain.observe("r1", 5.0);
+    let mut lines = observer.subscriber::<SensorLine>().expect("a topic");
+    let mut frames = 0_u64;
+    wait_for("the mission", || {
+        while lines.receive().expect("readable").is_some() {
+            frames += 1;
+        }
+        (!up.is_running()).then_some(())
+    });
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let traces = fs::read_to_string(log).expect("the traces' file");
+    let traces: Vec<Value> = traces
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("a line is a JSON value"))
+        .collect();
+    // What is told goes with what happens: processes, links, orders. Not with frames.
+    let told = traces
+        .iter()
+        .filter(|trace| trace["level"] == "INFO")
+        .count() as u64;
+    assert!(frames > 1_000, "{frames} frames");
+    assert!(told < 150, "{told} lines for {frames} frames");
+    assert!(traces.iter().all(|trace| trace["level"] != "DEBUG"));
+    let begun = |name: &str| -> Vec<&Value> {
+        let is_begin = |trace: &&Value| trace["message"] == "new" && trace["span"]["name"] == name;
+        traces.iter().filter(is_begin).collect()
+    };
+    for span in ["service", "start", "link"] {
+        assert!(!begun(span).is_empty(), "no span `{span}`: {traces:#?}");
+    }
+    assert_eq!(begun("mission").len(), 1);
+    let orders = begun("order");
+    let products: Vec<_> = orders
+        .iter()
+        .map(|order| &order["span"]["product"])
+        .collect();
+    assert_eq!(products, [1, 2]);
+    let around: Vec<_> = orders[0]["spans"]
+        .as_array()
+        .expect("spans")
+        .iter()
+        .map(|span| span["name"].as_str().expect("a name"))
+        .collect();
+    assert_eq!(around, ["service", "mission"]);
+}
+
+#[test]
+fn every_shell_is_told_how_to_complete() {
+    let domain = Domain::new();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let output = domain.run(&["completions", shell]);
+        let told = said(&output);
+        assert!(output.status.success(), "{shell}: {told}");
+        assert!(
+            told.contains("obstacle") && told.contains("delay"),
+            "{shell}"
+        );
+    }
+    let wrong = domain.run(&["completions", "cmd"]);
+    assert_eq!(wrong.status.code(), Some(2));
 }

@@ -2,12 +2,12 @@
 
 use std::fs;
 
-use lager_ports::Cause;
+use lager_ports::{Bus, Cause};
 use lager_tests::{Domain, wait_for};
-use lager_topics::{LineFrame, SensorLine, Topic};
+use lager_topics::{LineFrame, Role, SensorLine, Topic};
 use rustix::process::Signal;
 
-use crate::{Seen, done, end, guest, read, recorder, said};
+use crate::{NoiseNow, Noisy, Seen, done, end, guest, read, recorder, said};
 
 /// Records three hundred lines of robot `r1`, which somebody sends who has gone afterwards.
 fn recorded(domain: &Domain) -> Seen {
@@ -135,5 +135,112 @@ fn a_recording_is_not_played_onto_a_robot_or_beside_its_writer() {
     }
     player.signal(Signal::INT);
     assert_eq!(player.wait(), Some(0), "{}", player.log());
+    domain.assert_clean();
+}
+
+/// From the first sample's publication to the last one's, in ns.
+fn lasted(seen: &Seen) -> u64 {
+    let at = |message: Option<&(_, lager_topics::Stamp, _, _)>| {
+        let (_, stamp, ..): &(String, lager_topics::Stamp, u64, serde_json::Value) =
+            message.expect("a message");
+        stamp.publish_time_ns
+    };
+    at(seen.messages.last()) - at(seen.messages.first())
+}
+
+#[test]
+fn a_rate_stretches_a_recording_or_presses_it() {
+    let domain = Domain::new();
+    let first = lasted(&recorded(&domain));
+    let mut played = Vec::new();
+    for (rate, file) in [("0.5", "slow.mcap"), ("100", "fast.mcap")] {
+        let recorder = recorder(&domain, &["--name", "r2", file]);
+        let play = ["--name", "r2", "bag", "play", "lines.mcap", "--rate", rate];
+        let told = done(&domain, &play);
+        assert!(told.contains("300 samples played"), "{told}");
+        end(recorder);
+        played.push(lasted(&read(&domain.folder().join(file))));
+    }
+    // A sample is never sent before its time. The first of them may be sent late.
+    let late = 100_000_000;
+    assert!(played[0] + late >= 2 * first, "{first} {played:?}");
+    assert!(played[1] < played[0], "{first} {played:?}");
+    for rate in ["0", "-1", "101", "fast"] {
+        let wrong = domain.run(&["bag", "play", "lines.mcap", "--rate", rate]);
+        assert_eq!(wrong.status.code(), Some(2), "{rate}: {}", said(&wrong));
+    }
+    domain.assert_clean();
+}
+
+#[test]
+fn a_loop_plays_the_same_again_until_somebody_ends_it() {
+    let domain = Domain::new();
+    let first = recorded(&domain);
+    let listener = recorder(&domain, &["--name", "r2", "again.mcap"]);
+    let play = [
+        "--name",
+        "r2",
+        "bag",
+        "play",
+        "lines.mcap",
+        "--loop",
+        "--rate",
+        "2",
+    ];
+    let mut player = domain.start(&play);
+    wait_for("the third time", || {
+        let output = listener.output();
+        let progress: serde_json::Value = serde_json::from_str(output.lines().last()?).ok()?;
+        let received = progress["topics"][0]["received"].as_u64()?;
+        (received > 650).then_some(())
+    });
+    player.signal(Signal::INT);
+    assert_eq!(player.wait(), Some(0), "{}", player.log());
+    end(listener);
+    let again = read(&domain.folder().join("again.mcap"));
+    for (place, message) in again.messages.iter().enumerate() {
+        assert_eq!(message.3, first.messages[place % 300].3, "sample {place}");
+        // One writer goes on, so that no reader takes it for a loss.
+        assert_eq!(message.1.sequence, place as u64);
+    }
+    domain.assert_clean();
+}
+
+#[test]
+fn somebodys_own_topic_is_played_to_those_who_have_it_open() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let mut noisy = Noisy::new(&bus);
+    let listener = recorder(&domain, &["--topic", "noise/now", "noise.mcap"]);
+    noisy.meet(&listener);
+    (0..100).for_each(|_| noisy.send());
+    end(listener);
+    drop((noisy, bus));
+    let kept = read(&domain.folder().join("noise.mcap"));
+
+    let play = ["--name", "r2", "bag", "play", "noise.mcap", "--rate", "50"];
+    let alone = domain.run(&play);
+    assert_eq!(alone.status.code(), Some(1), "{}", said(&alone));
+    assert!(
+        said(&alone).contains("somebody has open"),
+        "{}",
+        said(&alone)
+    );
+
+    let bus = Bus::open(&domain.bus("r2", 1.0), Role::Guest).expect("the bus opens");
+    let mut heard = bus.subscriber::<NoiseNow>().expect("a topic");
+    let mut player = domain.start(&[&play[..], &["--stamps", "recorded"]].concat());
+    for (_, stamp, _, payload) in &kept.messages {
+        let noise = wait_for("the sample", || {
+            heard.receive().expect("readable").map(|noise| {
+                assert_eq!(noise.stamp(), stamp);
+                *noise
+            })
+        });
+        assert_eq!(serde_json::to_value(noise).expect("JSON"), *payload);
+    }
+    assert_eq!(player.wait(), Some(0), "{}", player.log());
+    assert_eq!(heard.lost(), 0);
+    drop((heard, bus));
     domain.assert_clean();
 }

@@ -11,6 +11,7 @@ use iceoryx2::prelude::{
 };
 use lager_topics::{Request, Role, Topic};
 
+use crate::any::AnyPublisher;
 use crate::clock::{self, Clock};
 use crate::config::BusConfig;
 use crate::doorbell::{self, Board};
@@ -149,6 +150,15 @@ impl Bus {
     /// As for a subscriber, or the topic does not describe its samples.
     pub fn found(&self, name: &str) -> Result<Option<Found>, PortError> {
         Found::new(self, name)
+    }
+
+    /// A writer of the topic called `name`: of the table, or of one that this process was not built
+    /// with; `None` if no process has that one open. To be used in this thread.
+    ///
+    /// # Errors
+    /// As for a publisher, or the topic does not describe its samples.
+    pub fn any_publisher(&self, name: &str) -> Result<Option<AnyPublisher>, PortError> {
+        AnyPublisher::new(self, name)
     }
 
     /// A waiter, which wakes this process when a topic that it acts on has samples; to be used in

@@ -37,6 +37,7 @@
 //! **Invariant:** the public interface shows no type of iceoryx2. This crate decides nothing about
 //! the robot. After start-up, sending and receiving allocate nothing.
 
+mod any;
 mod bus;
 mod cause;
 mod clock;
@@ -74,6 +75,7 @@ mod untyped;
 mod waiter;
 mod watchdog;
 
+pub use any::AnyPublisher;
 pub use bus::Bus;
 pub use cause::Cause;
 pub use clock::Clock;

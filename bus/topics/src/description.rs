@@ -1,4 +1,4 @@
-//! A payload's layout as text, and samples read by it.
+//! A payload's layout as text, and samples read and made by it.
 //!
 //! The text travels with a topic's service, so that a tool shows samples of a topic that it was not
 //! built with. It names each type in full once, and by its name after that:
@@ -12,7 +12,11 @@
 //! **Invariant:** the text comes from another process and may be anything. Reading it allocates
 //! no more than the text is long, and a sample is read only if it has exactly the described size.
 
+mod fill;
 mod json_schema;
+mod path;
+
+pub use path::NoField;
 
 use core::fmt::{self, Write};
 use std::collections::HashMap;
@@ -21,7 +25,7 @@ use std::sync::Arc;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use crate::schema::{FieldInfo, Make};
+use crate::schema::{FieldInfo, Make, Payload};
 
 /// No payload nests types deeper.
 const DEEPEST: usize = 16;
@@ -127,6 +131,28 @@ macro_rules! numbers {
                 }
             }
 
+            /// The least and the greatest whole number; `None` of fractions.
+            fn range(self) -> Option<(i128, i128)> {
+                let limits = match self {
+                    $( Self::$variant => ($type::MIN as i128, $type::MAX as i128), )*
+                };
+                (!matches!(self, Self::F32 | Self::F64)).then_some(limits)
+            }
+
+            /// Puts a whole number there if this kind of number can have it.
+            fn put_whole(self, value: i128, to: &mut [u8]) -> bool {
+                let is_within = |(least, greatest)| (least..=greatest).contains(&value);
+                let fits = self.range().is_none_or(is_within);
+                if fits {
+                    match self {
+                        $( Self::$variant => {
+                            to.copy_from_slice(&(value as $type).to_ne_bytes());
+                        } )*
+                    }
+                }
+                fits
+            }
+
             fn serialize<S: Serializer>(self, bytes: &[u8], to: S) -> Result<S::Ok, S::Error> {
                 match self {
                     $( Self::$variant => {
@@ -192,6 +218,14 @@ impl Description {
             return Err(parser.error("the end"));
         }
         Ok(Self { name, record })
+    }
+
+    /// Of a payload that this build has.
+    ///
+    /// # Panics
+    /// Never: what [`describe`] writes can be read.
+    pub fn of<P: Payload>() -> Self {
+        Self::parse(&describe(&P::MAKE)).expect("our own description")
     }
 
     /// The payload's name.

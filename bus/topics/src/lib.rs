@@ -34,15 +34,15 @@ pub mod private {
 // The derives in `payload!` name this crate as its users do.
 extern crate self as lager_topics;
 
-pub use description::{Described, Description, DescriptionError, describe};
+pub use description::{Described, Description, DescriptionError, NoField, describe};
 pub use payloads::*;
 pub use role::{Role, UnknownRole};
-pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo};
+pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo, bytes};
 pub use stamp::Stamp;
 pub use table::{
     BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder,
     MissionQueue, NavBlocks, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request,
     SERVICE_SLOTS, SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS, Topic,
-    TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, visit,
+    TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, id, visit,
 };
 pub use tag::{Coded, Tag};

@@ -151,6 +151,13 @@ pub trait Payload:
 {
 }
 
+/// A payload as it lies in memory.
+#[allow(unsafe_code, reason = "a payload is read as bytes")]
+pub fn bytes<P: Payload>(payload: &P) -> &[u8] {
+    // SAFETY: a payload is a `Field`, so it has no padding and all of its bytes are initialised.
+    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(payload).cast(), size_of::<P>()) }
+}
+
 /// Defines a payload: `repr(C)`, `Copy`, no implicit padding, exactly the given size.
 ///
 /// A field may state its blank value after `=`; otherwise it is the type's own. Fields whose names

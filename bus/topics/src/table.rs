@@ -98,8 +98,8 @@ pub trait Topic: 'static {
     const SUMMARY: &'static str;
 }
 
-/// The number of a topic's name.
-const fn id(name: &str) -> u32 {
+/// The number of a topic's name, in the table or not.
+pub const fn id(name: &str) -> u32 {
     let hash = hash::bytes(hash::START, name.as_bytes());
     // The upper half of FNV-1a is the better mixed one; 0 is kept for "no topic".
     match (hash >> 32) as u32 {
@@ -146,6 +146,9 @@ pub struct TopicEntry {
     pub qos: Qos,
     /// One line for people.
     pub summary: &'static str,
+    /// The longest time between two samples of a robot that works, in ms of its own time; `None`
+    /// where samples come only when something happens.
+    pub period_ms: Option<u32>,
 }
 
 /// Work to be done with a topic's static type; see [`visit`].
@@ -173,10 +176,18 @@ impl fmt::Display for UnknownTopic {
 
 impl std::error::Error for UnknownTopic {}
 
+/// A topic's period, where it has one.
+const fn period(stated: &[u32]) -> Option<u32> {
+    match stated {
+        [] => None,
+        [ms, ..] => Some(*ms),
+    }
+}
+
 macro_rules! topics {
     ($(
         $topic:ident = $name:literal, $payload:ty, $summary:literal,
-        { $($qos:tt)* };
+        { $($qos:tt)* } $(, every $period:literal ms)?;
     )*) => {
         $(
             #[doc = concat!("`", $name, "`: ", $summary)]
@@ -199,6 +210,7 @@ macro_rules! topics {
                 layout: StructInfo::of::<$payload>(),
                 qos: <$topic as Topic>::QOS,
                 summary: $summary,
+                period_ms: period(&[$( $period )?]),
             }, )*
         ];
 
@@ -220,11 +232,11 @@ topics! {
     // reports.
     SensorLine = "sensor/line", LineFrame,
     "The line under the robot, as the sensor board classifies it.",
-    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false }, every 10 ms;
 
     SensorDistance = "sensor/distance", DistanceFrame,
     "The distance to what is in front of the robot.",
-    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false }, every 10 ms;
 
     SteeringCommand = "steering/command", SteeringOrder,
     "Orders to the arbiter in the bridge.",
@@ -232,15 +244,15 @@ topics! {
 
     SteeringState = "steering/state", SteeringReport,
     "What the steering board does, with the arm's servos.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false };
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false }, every 5 ms;
 
     LinkHealth = "link/health", Health,
     "Both serial links and who may steer.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[Role::Logic], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[Role::Logic], republish: true }, every 100 ms;
 
     NavStatus = "nav/status", NavigatorStatus,
     "Where the robot is and what it is doing.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 50 ms;
 
     NavMap = "nav/map", WarehouseMap,
     "The warehouse and where its products stand.",
@@ -276,15 +288,15 @@ topics! {
 
     LatencyPath = "latency/path", PathLatency,
     "How long sensor frames take until logic has decided, stage by stage, once a second.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 1000 ms;
 
     LatencyCommand = "latency/command", CommandLatency,
     "How long logic's orders take from the frame they rest on to the wire, once a second.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 1000 ms;
 
     TruthPose = "truth/pose", Truth,
     "The simulated world as it really is.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 20 ms;
 }
 
 /// `bridge/request`: changes of the mode and of settings, answered by the bridge.

@@ -1,7 +1,7 @@
 //! Every topic as a tool sees it that was built without it.
 
 use lager_topics::{
-    Coded, Description, Field, Payload, Role, TOPICS, Tag, Topic, TopicVisitor, coded, describe,
+    Coded, Description, Field, Role, TOPICS, Tag, Topic, TopicVisitor, bytes, coded, describe,
     payload, visit,
 };
 use proptest::prelude::*;
@@ -43,12 +43,6 @@ payload! {
         /// Fills the gap.
         pub reserved: [u8; 3],
     }
-}
-
-#[allow(unsafe_code)]
-fn bytes<P: Payload>(payload: &P) -> &[u8] {
-    // SAFETY: a payload has no padding, so that all of its bytes are initialised.
-    unsafe { std::slice::from_raw_parts(std::ptr::from_ref(payload).cast(), size_of::<P>()) }
 }
 
 #[test]
@@ -273,6 +267,127 @@ proptest! {
             let bytes = vec![1; description.size()];
             let seen = serde_json::to_value(description.read(&bytes).unwrap());
             prop_assert!(seen.is_ok());
+        }
+    }
+}
+
+/// A blank `Weather`, filled with what `text` says.
+fn filled(text: &str) -> Result<Vec<u8>, String> {
+    let mut filled = bytes(&Weather::default()).to_vec();
+    let mut json = serde_json::Deserializer::from_str(text);
+    let made = Description::of::<Weather>().fill(&mut json, &mut filled);
+    made.map(|()| filled).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_payload_is_made_of_what_a_person_writes() {
+    let text = r#"{"gusts": [{}, {"mm_s": -300, "sky": "storm"}], "wind": 3, "sky": 7}"#;
+    let mut weather = Weather {
+        wind: 3.0,
+        sky: Sky::Fog.into(),
+        ..Weather::default()
+    };
+    weather.gusts[1].mm_s = -300;
+    weather.gusts[1].sky = Sky::Storm.into();
+    assert_eq!(filled(text).unwrap(), bytes(&weather));
+    assert_eq!(filled("{}").unwrap(), bytes(&Weather::default()));
+}
+
+#[test]
+fn what_is_refused_names_the_field_and_what_it_may_be() {
+    for (text, said) in [
+        (
+            r#"{"wnd": 1}"#,
+            "`Weather` has no field `wnd`; its fields are wind, gusts, sky",
+        ),
+        (r#"{"reserved": [1]}"#, "no field `reserved`"),
+        (
+            r#"{"gusts": [{"mms": 1}]}"#,
+            "`gusts.0` has no field `mms`; its fields are mm_s, sky",
+        ),
+        (
+            r#"{"gusts": [{}, {"mm_s": 40000}]}"#,
+            "integer `40000`, expected a whole number from -32768 to 32767 in `gusts.1.mm_s`",
+        ),
+        (
+            r#"{"gusts": [{"mm_s": 1.5}]}"#,
+            "a whole number from -32768 to 32767 in `gusts.0.mm_s`",
+        ),
+        (
+            r#"{"sky": "blue"}"#,
+            "one of Clear, Fog, Storm, or a code from 0 to 255, in `sky`",
+        ),
+        (r#"{"sky": 256}"#, "or a code from 0 to 255, in `sky`"),
+        (r#"{"wind": "strong"}"#, "expected a number in `wind`"),
+        (r#"{"wind": 1, "wind": 2}"#, "`wind` stands twice"),
+        (
+            r#"{"gusts": [{}, {}, {}, {}]}"#,
+            "a list of at most 3 in `gusts`",
+        ),
+        (r#"{"gusts": {}}"#, "a list of at most 3 in `gusts`"),
+        ("[1]", "an object with wind, gusts, sky for `Weather`"),
+    ] {
+        let error = filled(text).expect_err(text);
+        assert!(error.contains(said), "{text}: {error}");
+    }
+    let mut short = vec![0; 3];
+    let text = &mut serde_json::Deserializer::from_str("{}");
+    assert!(Description::of::<Weather>().fill(text, &mut short).is_err());
+}
+
+#[test]
+fn a_path_leads_to_a_field_or_says_what_there_is() {
+    let weather = Description::of::<Weather>();
+    for path in ["wind", "gusts", "gusts.2", "gusts.2.sky"] {
+        assert_eq!(weather.must_have(path), Ok(()), "{path}");
+    }
+    for (path, said) in [
+        (
+            "wnd",
+            "there is no field `wnd`; the payload has wind, gusts, sky",
+        ),
+        ("gusts.3", "`gusts` has the places 0 to 2"),
+        ("gusts.0.mms", "`gusts.0` has mm_s, sky"),
+        ("wind.x", "`wind` has no parts"),
+        ("reserved", "the payload has wind"),
+        ("", "the payload has wind"),
+    ] {
+        let error = weather.must_have(path).unwrap_err().to_string();
+        assert!(error.contains(said), "{path}: {error}");
+    }
+}
+
+/// Any bytes of a topic's payload, shown and made again.
+struct ThereAndBack(u64);
+
+impl TopicVisitor for ThereAndBack {
+    type Output = ();
+
+    fn visit<T: Topic>(self) {
+        let description = Description::of::<T::Payload>();
+        let mut dice = self.0 | 1;
+        let any: Vec<u8> = (0..description.size())
+            .map(|_| {
+                dice = dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (dice >> 56) as u8
+            })
+            .collect();
+        let shown = serde_json::to_string(&description.read(&any).unwrap()).unwrap();
+        let mut made = vec![0; any.len()];
+        let json = &mut serde_json::Deserializer::from_str(&shown);
+        description.fill(json, &mut made).unwrap();
+        let again = serde_json::to_string(&description.read(&made).unwrap()).unwrap();
+        assert_eq!(shown, again, "{}", T::NAME);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn whatever_a_sample_shows_makes_the_same_sample(dice: u64) {
+        for entry in TOPICS {
+            visit(entry.name, ThereAndBack(dice)).unwrap();
         }
     }
 }

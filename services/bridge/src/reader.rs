@@ -108,6 +108,9 @@ impl<'a> Reader<'a> {
         while !self.stopped() {
             match SerialPort::open(self.path, self.baud) {
                 Ok(port) => {
+                    // As long as the port is there; nothing is traced for a frame.
+                    let link = tracing::info_span!("link", port = %self.path.display());
+                    let _link = link.entered();
                     tracing::info!(
                         port = %self.path.display(),
                         baud = self.baud,

@@ -190,6 +190,7 @@ impl Thread {
             let start = Instant::now();
             match self.connect() {
                 Ok(stream) => {
+                    let _link = tracing::info_span!("link", station = %self.station).entered();
                     tracing::info!("connected to the external computer at {}", self.station);
                     said.clear();
                     if self.hold(stream).is_none() {

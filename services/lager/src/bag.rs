@@ -242,7 +242,9 @@ fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> 
     let bus = patience.watchdog.over("joining the bus", join)?;
     let mut begun = |left_out: &[String]| {
         for topic in left_out {
-            let line = format!("{topic} is not played: it is in no table of this build");
+            let line = format!(
+                "{topic} is not played: this build does not know it and nobody has it open"
+            );
             voice::say(&Speaker::Tool.line(&line));
         }
     };

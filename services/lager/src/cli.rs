@@ -3,6 +3,8 @@
 mod bag;
 pub mod help;
 mod realtime;
+mod top;
+mod topic;
 mod values;
 
 use std::ops::RangeInclusive;
@@ -14,6 +16,8 @@ use lager_wire::OperatorCommand;
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
+pub use top::TopArgs;
+pub use topic::{TopicArgs, TopicCommand};
 
 pub use values::Fetch;
 
@@ -108,6 +112,9 @@ pub struct GlobalArgs {
     /// Append traces to this file: those RUST_LOG asks for, or `info`
     #[arg(long, global = true, value_name = "FILE", help_heading = "Output")]
     pub log: Option<PathBuf>,
+    /// Write traces as JSON, one value a line: to the file of --log, else to standard error
+    #[arg(long, global = true, help_heading = "Output")]
+    pub log_json: bool,
 }
 
 /// The subcommands.
@@ -117,7 +124,9 @@ pub enum Command {
     Up(UpArgs),
     /// Run the whole robot in one process in virtual time: deterministic, no bus
     Simulate(SimulateArgs),
-    /// Look at any topic of the bus
+    /// See the whole robot on one screen: its links, its mission, and every topic's rate and losses
+    Top(TopArgs),
+    /// Look at any topic of the bus, measure it, and publish on it
     Topic(TopicArgs),
     /// Record the bus, and look at recordings, mend and play them
     Bag(BagArgs),
@@ -278,6 +287,15 @@ typed before it is asked for waits; `styrcomm 1` stops and goes first. One GaG i
         /// of the bus]
         #[arg(long, value_name = "SOCKET", help_heading = "Station")]
         socket: Option<PathBuf>,
+    },
+    /// Print what makes a shell complete this command line
+    #[command(after_help = "Examples:
+  lager completions bash > ~/.local/share/bash-completion/completions/lager
+  lager completions zsh > ~/.zfunc/_lager
+  lager completions fish > ~/.config/fish/completions/lager.fish")]
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
     },
     /// What `up` needs done on the bus; only `up` starts it
     #[command(hide = true)]
@@ -471,60 +489,6 @@ pub struct SimulateArgs {
     /// One line of JSON a run
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-}
-
-/// `lager topic`.
-#[derive(Debug, Args)]
-pub struct TopicArgs {
-    /// What to show
-    #[command(subcommand)]
-    pub command: TopicCommand,
-    /// Print JSON, one value a line
-    #[arg(long, global = true, help_heading = "Output")]
-    pub json: bool,
-}
-
-/// The topic tools.
-#[derive(Debug, Subcommand)]
-pub enum TopicCommand {
-    /// Every topic on the bus: of every robot, or with --name of that one
-    List,
-    /// One topic: what it carries, its limits, who writes and reads it
-    Info {
-        /// The topic's name, such as sensor/line
-        #[arg(value_parser = values::topic)]
-        topic: String,
-    },
-    /// Write the table of topics for programs in another language
-    Schema {
-        /// Write layouts.py and its stub into this folder, as bus/python has them
-        #[arg(long, value_name = "FOLDER", required = true)]
-        python: PathBuf,
-    },
-    /// Print each sample with its stamp
-    Echo {
-        /// The topic's name, such as sensor/line
-        #[arg(value_parser = values::topic)]
-        topic: String,
-        /// End after this many samples
-        #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count)]
-        count: Option<u64>,
-        /// Wait for the robot if it is not up
-        #[arg(long)]
-        wait: bool,
-    },
-    /// Measure rate, age and loss, once a second
-    Hz {
-        /// The topic's name, such as sensor/line
-        #[arg(value_parser = values::topic)]
-        topic: String,
-        /// End after this many seconds
-        #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count)]
-        count: Option<u64>,
-        /// Wait for the robot if it is not up
-        #[arg(long)]
-        wait: bool,
-    },
 }
 
 /// `lager bench`.

@@ -115,6 +115,8 @@ pub struct LogSection {
     /// The file that traces are appended to, instead of none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// One JSON value a line instead of text for people.
+    pub json: bool,
 }
 
 /// `[bus]`: where it lives, and how it is waited for.

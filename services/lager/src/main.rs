@@ -35,6 +35,8 @@ mod steer;
 mod stop;
 mod supervisor;
 mod terminal;
+mod top;
+mod topic;
 mod up;
 mod voice;
 mod words;
@@ -50,7 +52,7 @@ use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
 use lager_ports::{Bus, Shutdown, Watchdog};
 use lager_simulator::SimulatorConfig;
-use lager_topics::{Mode, Role, TOPICS};
+use lager_topics::{Mode, Role};
 use lager_wire::OperatorCommand;
 
 use crate::cli::{
@@ -71,7 +73,7 @@ fn main() -> ExitCode {
     let ended = configure(&cli.global).and_then(|config| {
         looked_at = Some(config.clone());
         let own = own_voice(&cli.command, &config);
-        voice::begin(own, config.log.file.as_deref())?;
+        voice::begin(own, &config.log)?;
         // `up` has no robot to speak for as long as it can end with an error.
         if !matches!(cli.command, Command::Up(_)) {
             speaker = own;
@@ -220,9 +222,14 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         Command::Topic(args) => {
-            topic(&config, args, cli.global.name.is_none(), &patience()?)?;
+            topic::run(&config, args, cli.global.name.is_none(), &patience()?)?;
             return Ok(ExitCode::SUCCESS);
         }
+        Command::Top(args) => {
+            top::run(&config, &args, &patience()?)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Completions { shell } => return Ok(topic::completions(shell)),
         Command::Bag(args) => return bag::run(&config, args, &shutdown),
         Command::Bench(args) => {
             // It has a bus of its own and gives up by itself; on Ctrl-C it takes the time to sweep.
@@ -316,6 +323,7 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
     if global.log.is_some() {
         config.log.file.clone_from(&global.log);
     }
+    config.log.json |= global.log_json;
     config.validate()?;
     Ok(config)
 }
@@ -342,6 +350,9 @@ fn service(
     shutdown: &Shutdown,
     run: impl FnOnce(&Bus, bool, &Watchdog) -> Result<()>,
 ) -> Result<()> {
+    let span = tracing::info_span!("service", service = %role, robot = %config.name);
+    let _service = span.entered();
+    let start = tracing::info_span!("start").entered();
     // Before the first thread: all of them inherit it.
     let mut wanted = config.realtime.wanted(role);
     args.apply(&mut wanted);
@@ -359,39 +370,9 @@ fn service(
         _ => Watchdog::default(),
     };
     let bus = watchdog.over("joining the bus", || Bus::open(&bus, role))?;
+    drop(start);
     let result = run(&bus, args.resume, &watchdog);
     // A killed supervisor left its node behind; the last process to go sweeps it.
     watchdog.over("sweeping the bus", || bus.sweep());
     result
-}
-
-/// The topic tools, on standard output.
-fn topic(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patience) -> Result<()> {
-    if let TopicCommand::Echo { wait: false, topic, .. }
-    | TopicCommand::Hz { wait: false, topic, .. } = &args.command
-        // Other people's topics need no robot.
-        && TOPICS.iter().any(|entry| entry.name == topic)
-    {
-        diagnose::must_be_up(config)?;
-    }
-    let join = || Bus::open(&config.bus()?, Role::Observer).map_err(anyhow::Error::from);
-    let bus = patience.watchdog.over("joining the bus", join)?;
-    let mut tools = lager_monitor::Tools {
-        bus: &bus,
-        watchdog: &patience.watchdog,
-        shutdown: &patience.shutdown,
-        as_json: args.json,
-        out: &mut std::io::BufWriter::new(std::io::stdout().lock()),
-    };
-    let shown = match args.command {
-        TopicCommand::List => tools.list(every_robot),
-        TopicCommand::Schema { .. } => unreachable!("it needs no bus"),
-        TopicCommand::Info { topic } => tools.info(&topic),
-        TopicCommand::Echo { topic, count, .. } => tools.echo(&topic, count),
-        TopicCommand::Hz { topic, count, .. } => tools.hz(&topic, count),
-    };
-    match shown.and_then(|()| Ok(tools.out.flush()?)) {
-        Err(error) if error.is_closed_output() => Ok(()),
-        shown => Ok(shown?),
-    }
 }

@@ -64,6 +64,7 @@ impl Patience {
 
 /// Ends the process; what hangs cannot be called back.
 fn give_up(config: &Config, why: GivenUp) {
+    lager_monitor::leave_screen();
     let what = match why {
         GivenUp::Interrupted => std::process::exit(exit::INTERRUPTED),
         GivenUp::Hung { what } => what,

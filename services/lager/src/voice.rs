@@ -7,7 +7,9 @@
 //!
 //! `up`'s narrator says what the robot does. A fault in a service is an event of `tracing`, and is
 //! shown in the same form on standard error. Traces are for debugging: they are shown, in the form
-//! of `tracing`, only where `RUST_LOG` asks for them, or written to the file of `--log`.
+//! of `tracing`, only where `RUST_LOG` asks for them, or written to the file of `--log`. With
+//! `--log-json` each is a JSON value with the spans that it stands in: the service and its start, a
+//! link, a mission and its orders. Nothing is traced at `info` for a frame.
 
 use std::fmt;
 use std::fs::File;
@@ -23,16 +25,17 @@ use tracing::level_filters::LevelFilter;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt::FmtContext;
-use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
+use tracing_subscriber::fmt::MakeWriter;
+use tracing_subscriber::fmt::format::{FmtSpan, FormatEvent, FormatFields, Writer};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{Layer, Registry};
 
-use crate::config::Config;
+use crate::config::{Config, LogSection};
 
-/// What is traced into a file where `RUST_LOG` does not say.
-const INTO_A_FILE: LevelFilter = LevelFilter::INFO;
+/// What is traced into a file, or as JSON, where `RUST_LOG` does not say.
+const UNASKED: LevelFilter = LevelFilter::INFO;
 
 /// A line of the terminal.
 pub fn line(time: Duration, who: &str, what: &str) -> String {
@@ -97,26 +100,26 @@ fn started_ns(process: u32) -> Option<u64> {
 ///
 /// # Errors
 /// The file cannot be written, or `RUST_LOG` is no list of targets and levels.
-pub fn begin(speaker: Speaker, log: Option<&Path>) -> Result<()> {
+pub fn begin(speaker: Speaker, log: &LogSection) -> Result<()> {
     let wanted = wanted(std::env::var("RUST_LOG").ok().as_deref())?;
-    let file = log.map(open).transpose()?;
+    let unasked = || Targets::new().with_default(UNASKED);
+    let file = log.file.as_deref().map(open).transpose()?;
     let (in_file, on_terminal) = match file {
         Some(file) => {
-            let filter = wanted.unwrap_or_else(|| Targets::new().with_default(INTO_A_FILE));
-            let traces = tracing_subscriber::fmt::layer()
-                .with_writer(Mutex::new(file))
-                .with_ansi(false)
-                .with_filter(filter);
-            (Some(traces), None)
+            let filter = wanted.unwrap_or_else(unasked);
+            (
+                Some(traces(Mutex::new(file), false, log.json, filter)),
+                None,
+            )
         }
+        None if log.json => (None, Some(wanted.unwrap_or_else(unasked))),
         None => (None, wanted),
     };
-    let terminal: Box<dyn Layer<_> + Send + Sync> = match on_terminal {
-        Some(filter) => tracing_subscriber::fmt::layer()
-            .with_writer(std::io::stderr)
-            .with_ansi(std::io::stderr().is_terminal())
-            .with_filter(filter)
-            .boxed(),
+    let terminal = match on_terminal {
+        Some(filter) => {
+            let is_coloured = std::io::stderr().is_terminal();
+            traces(std::io::stderr, is_coloured, log.json, filter)
+        }
         None => tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .event_format(Lines(speaker))
@@ -125,6 +128,29 @@ pub fn begin(speaker: Speaker, log: Option<&Path>) -> Result<()> {
     };
     Registry::default().with(terminal).with(in_file).init();
     Ok(())
+}
+
+/// A layer of its own kind, whatever it writes.
+type Traces<S> = Box<dyn Layer<S> + Send + Sync>;
+
+/// Traces for people or programs, with a line for the begin and the end of each span.
+fn traces<S>(
+    to: impl for<'a> MakeWriter<'a> + Send + Sync + 'static,
+    is_coloured: bool,
+    as_json: bool,
+    filter: Targets,
+) -> Traces<S>
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+{
+    let layer = tracing_subscriber::fmt::layer()
+        .with_writer(to)
+        .with_ansi(is_coloured)
+        .with_span_events(FmtSpan::NEW | FmtSpan::CLOSE);
+    match as_json {
+        true => layer.json().flatten_event(true).with_filter(filter).boxed(),
+        false => layer.with_filter(filter).boxed(),
+    }
 }
 
 /// What `RUST_LOG` asks for: nothing if it is unset or empty.

@@ -31,6 +31,7 @@ mod place;
 pub mod queue;
 pub mod route;
 mod shell;
+mod traced;
 pub mod turn;
 
 pub use config::LogicConfig;

@@ -35,6 +35,7 @@ use crate::config::LogicConfig;
 use crate::latency::FrameMeter;
 use crate::navigator::{Input, Navigator};
 use crate::node::Node;
+use crate::traced::Traced;
 
 /// How often the order in force is renewed, in robot time; its lease is three times as long.
 const RENEWAL: Duration = Duration::from_millis(40);
@@ -121,6 +122,7 @@ struct Shell {
     renewal_due: Duration,
     lost_before: u64,
     complaints: u32,
+    traced: Traced,
 }
 
 impl Shell {
@@ -179,6 +181,7 @@ impl Shell {
             renewal_due: Duration::ZERO,
             lost_before: kept.map_or(0, |status| status.frames_lost),
             complaints: 0,
+            traced: Traced::default(),
         })
     }
 
@@ -404,7 +407,9 @@ impl Shell {
     }
 
     fn publish_queue(&mut self, cause: Cause) {
-        let sent = self.queue.send(cause, self.navigator.queue());
+        let queue = self.navigator.queue();
+        self.traced.follow(&queue);
+        let sent = self.queue.send(cause, queue);
         self.check(sent);
     }
 

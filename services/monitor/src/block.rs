@@ -321,7 +321,7 @@ fn plain(name: &str, value: &Value, blank: &Value) -> String {
 }
 
 /// A variant's name as words: `LeftOfLine` is `left of line`.
-fn words(variant: &str) -> String {
+pub(crate) fn words(variant: &str) -> String {
     let mut words = String::new();
     for character in variant.chars() {
         if character.is_ascii_uppercase() && !words.is_empty() {

@@ -5,25 +5,38 @@ use std::io::Write;
 use std::time::Instant;
 
 use lager_ports::{Clock, Source};
-use lager_topics::{Stamp, Topic, TopicVisitor, by_id, visit};
+use lager_topics::{Description, Stamp, Topic, TopicVisitor, by_id, visit};
 use serde_json::{Value, json};
 
 use crate::block::Blocks;
+use crate::measure::Limits;
 use crate::source::Shown;
-use crate::{Count, ToolError, Tools};
+use crate::{Count, POLL, ToolError, Tools};
+
+/// What `topic echo` shows, and when it ends.
+#[derive(Clone, Debug, Default)]
+pub struct EchoConfig {
+    /// Fields by their dotted paths, the only ones that are shown; empty for whole samples.
+    pub fields: Vec<String>,
+    /// When to end.
+    pub limits: Limits,
+}
 
 impl<W: Write> Tools<'_, W> {
-    /// `topic echo`: each sample of `name`, until `count` samples or the shutdown.
+    /// `topic echo`: each sample of `name`, or some of its fields, until a limit or the shutdown.
     ///
     /// # Errors
-    /// No topic has that name, it cannot be read, or the output cannot be written.
-    pub fn echo(&mut self, name: &str, count: Option<u64>) -> Result<(), ToolError> {
-        match visit(name, Echo { tools: self, count }) {
+    /// No topic has that name, its samples have no such field, it cannot be read, or the output
+    /// cannot be written.
+    pub fn echo(&mut self, name: &str, config: &EchoConfig) -> Result<(), ToolError> {
+        let tools = &mut *self;
+        match visit(name, Echo { tools, config }) {
             Ok(echoed) => echoed,
             Err(unknown) => {
                 let found = self.found(name, unknown)?;
+                must_have(found.description(), config)?;
                 let blocks = Blocks::of_found(&found)?;
-                self.echo_from(name, found, blocks, count)
+                self.echo_from(name, found, blocks, config)
             }
         }
     }
@@ -46,17 +59,23 @@ impl<W: Write> Tools<'_, W> {
 
 struct Echo<'a, 'b, W> {
     tools: &'a mut Tools<'b, W>,
-    count: Option<u64>,
+    config: &'a EchoConfig,
+}
+
+fn must_have(description: &Description, config: &EchoConfig) -> Result<(), ToolError> {
+    let mut fields = config.fields.iter();
+    Ok(fields.try_for_each(|field| description.must_have(field))?)
 }
 
 impl<W: Write> TopicVisitor for Echo<'_, '_, W> {
     type Output = Result<(), ToolError>;
 
     fn visit<T: Topic>(self) -> Self::Output {
+        must_have(&Description::of::<T::Payload>(), self.config)?;
         let subscriber = self.tools.subscriber::<T>()?;
         let blocks = Blocks::new::<T>()?;
         self.tools
-            .echo_from(T::NAME, subscriber, blocks, self.count)
+            .echo_from(T::NAME, subscriber, blocks, self.config)
     }
 }
 
@@ -66,15 +85,16 @@ impl<W: Write> Tools<'_, W> {
         name: &str,
         mut from: impl Source,
         mut blocks: Blocks,
-        count: Option<u64>,
+        config: &EchoConfig,
     ) -> Result<(), ToolError> {
         let mut writers = HashMap::new();
         let (mut shown, mut lost) = (0, 0);
-        let mut heard = Instant::now();
-        while !self.shutdown.is_requested() && count.is_none_or(|count| shown < count) {
+        let began = Instant::now();
+        let mut heard = began;
+        while !self.shutdown.is_requested() && !config.limits.are_reached(began, shown) {
             let Some((stamp, payload)) = self.receive(&mut from, Shown)? else {
                 self.out.flush()?;
-                self.pause(heard)?;
+                self.pause(heard, POLL)?;
                 continue;
             };
             let payload = payload?;
@@ -85,13 +105,20 @@ impl<W: Write> Tools<'_, W> {
                     "topic": name, "sequence": stamp.sequence, "epoch": stamp.epoch,
                     "writer": stamp.writer, "source_time_ns": stamp.source_time_ns,
                     "publish_time_ns": stamp.publish_time_ns, "cause": cause(&stamp),
-                    "lost": from.lost(), "payload": payload,
+                    "lost": from.lost(), "payload": chosen(payload, &config.fields),
                 });
                 writeln!(self.out, "{value}")?;
             } else {
                 if from.lost() > lost {
                     let newly = usize::try_from(from.lost() - lost).unwrap_or(usize::MAX);
                     writeln!(self.out, "-- {} lost", Count(newly, "sample"))?;
+                }
+                if !config.fields.is_empty() {
+                    let values = config.fields.iter().map(|path| plain(at(&payload, path)));
+                    let values: Vec<String> = values.collect();
+                    writeln!(self.out, "{}", values.join("\t"))?;
+                    (lost, shown) = (from.lost(), shown + 1);
+                    continue;
                 }
                 let writer = writers
                     .entry(stamp.writer)
@@ -107,6 +134,35 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
+/// What of a sample was asked for: all, or an object of the fields by their paths.
+fn chosen(payload: Value, fields: &[String]) -> Value {
+    if fields.is_empty() {
+        return payload;
+    }
+    let value = |path: &String| (path.clone(), at(&payload, path).clone());
+    Value::Object(fields.iter().map(value).collect())
+}
+
+/// What stands at a path; null behind the end of a list that ends early.
+fn at<'a>(payload: &'a Value, path: &str) -> &'a Value {
+    path.split('.').fold(payload, |value, part| match value {
+        Value::Array(list) => part
+            .parse()
+            .ok()
+            .and_then(|place: usize| list.get(place))
+            .unwrap_or(&Value::Null),
+        value => &value[part],
+    })
+}
+
+/// A value for people: text without quotes.
+fn plain(value: &Value) -> String {
+    match value.as_str() {
+        Some(text) => text.to_owned(),
+        None => value.to_string(),
+    }
+}
+
 /// What a sample followed from, for programs; null = from no sample.
 fn cause(stamp: &Stamp) -> Value {
     if stamp.cause_topic == 0 {
@@ -118,4 +174,21 @@ fn cause(stamp: &Stamp) -> Value {
         "publish_time_ns": stamp.cause_publish_time_ns,
         "receive_time_ns": stamp.cause_receive_time_ns,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_is_found_by_its_path() {
+        let payload = json!({"sensor": {"up": 1}, "orders": [{"id": 7}], "mode": "Manual"});
+        assert_eq!(at(&payload, "sensor.up"), &json!(1));
+        assert_eq!(at(&payload, "orders.0.id"), &json!(7));
+        assert_eq!(at(&payload, "orders.1.id"), &Value::Null);
+        assert_eq!(plain(at(&payload, "mode")), "Manual");
+        let fields = ["mode".to_owned(), "sensor.up".to_owned()];
+        let chosen = chosen(payload, &fields);
+        assert_eq!(chosen, json!({"mode": "Manual", "sensor.up": 1}));
+    }
 }

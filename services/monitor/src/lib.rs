@@ -1,21 +1,26 @@
-//! The topic tools: list, info, echo and hz, for any topic of any robot, by name; and the table of
-//! topics for Python programs (`python.rs`), which needs no robot.
+//! The topic tools: list, info, echo, hz, bw, delay and pub, for any topic of any robot, by name;
+//! `lager top`, which shows all of them at once (`top`); and the table of topics for Python programs
+//! (`python.rs`), which needs no robot.
 //!
-//! They are observers: they poll, hold no listener and never slow the path. They know no topic,
-//! except for the sentences of some samples (`sentence.rs`). The table leads from a name to its
+//! All but pub are observers: they poll, hold no listener and never slow the path. They know no
+//! topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`. The table leads from a name to its
 //! static type; a topic that is in no table brings its description along. Each tool writes text or
 //! one JSON value a line to the writer that it is given, and says how many samples it lost. Every
 //! call into the bus is made under a watchdog, so that a tool reports a bus that does not answer and
 //! does not wait for it.
 
 mod block;
+mod delay;
 mod describe;
 mod durations;
 mod echo;
+mod measure;
+mod publish;
 mod python;
 mod rate;
 mod sentence;
 mod source;
+mod top;
 
 use std::fmt;
 use std::io::{self, Write};
@@ -25,9 +30,13 @@ use lager_ports::{
     Bus, Found, IntrospectError, Look, PortError, ReceiveError, Shortage, Shutdown, Source,
     Subscriber, Watchdog,
 };
-use lager_topics::{Topic, UnknownTopic};
+use lager_topics::{NoField, Topic, UnknownTopic};
 
+pub use echo::EchoConfig;
+pub use measure::Limits;
+pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
+pub use top::{Recorded, TopConfig, leave_screen};
 
 /// The pace at which an observer polls.
 const POLL: Duration = Duration::from_millis(5);
@@ -73,7 +82,7 @@ impl<W: Write> Tools<'_, W> {
     /// Waits a moment for the next sample. A subscriber that cannot reach a writer for want of
     /// something, or whose bus was cleared, hears nothing and no error, so whoever has heard
     /// nothing asks.
-    fn pause(&self, silent_since: Instant) -> Result<(), ToolError> {
+    fn pause(&self, silent_since: Instant, pace: Duration) -> Result<(), ToolError> {
         if silent_since.elapsed() >= SILENCE {
             if let Some(shortage) = Shortage::now() {
                 return Err(ToolError::Short(shortage));
@@ -82,7 +91,7 @@ impl<W: Write> Tools<'_, W> {
                 return Err(ToolError::Cleared);
             }
         }
-        std::thread::sleep(POLL);
+        std::thread::sleep(pace);
         Ok(())
     }
 }
@@ -116,6 +125,9 @@ pub enum ToolError {
     /// The output could not be written.
     #[error("cannot write the output: {0}")]
     Output(#[from] io::Error),
+    /// No sample has such a field.
+    #[error(transparent)]
+    NoField(#[from] NoField),
     /// A sample could not be put into JSON.
     #[error("cannot put a sample into JSON: {0}")]
     Json(#[from] serde_json::Error),

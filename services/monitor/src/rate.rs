@@ -1,48 +1,51 @@
-//! `topic hz`: rate, age and loss of one topic, once a second, from the stamps alone.
+//! `topic hz` and `topic bw`: rate, age, bytes and loss of one topic, once a second, from the stamps
+//! alone.
 
 use std::io::Write;
-use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Source};
-use lager_topics::{Stamp, Topic, TopicVisitor, visit};
-use serde_json::json;
+use lager_topics::Stamp;
+use serde_json::{Value, json};
 
-use crate::source::Stamped;
-use crate::{ToolError, Tools};
-
-/// One line is printed for each window.
-const WINDOW: Duration = Duration::from_secs(1);
+use crate::measure::{Gauge, Limits, Plan, Seen};
+use crate::{POLL, ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
-    /// `topic hz`: measures `name` until `windows` lines are printed or the shutdown.
+    /// `topic hz`: measures the rate of `name` until a limit or the shutdown.
     ///
     /// # Errors
     /// No topic has that name, it cannot be read, or the output cannot be written.
-    pub fn hz(&mut self, name: &str, windows: Option<u64>) -> Result<(), ToolError> {
-        match visit(
-            name,
-            Hz {
-                tools: self,
-                windows,
-            },
-        ) {
-            Ok(measured) => measured,
-            Err(unknown) => {
-                let found = self.found(name, unknown)?;
-                self.hz_from(name, found, windows)
-            }
-        }
+    pub fn hz(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
+        let plan = Plan {
+            limits,
+            pace: POLL,
+            head: "",
+            gauge: |_| Rate::default(),
+        };
+        self.measure(name, plan)
     }
-}
 
-struct Hz<'a, 'b, W> {
-    tools: &'a mut Tools<'b, W>,
-    windows: Option<u64>,
+    /// `topic bw`: measures the bytes a second of `name`, stamps included, until a limit or the
+    /// shutdown.
+    ///
+    /// # Errors
+    /// As [`Tools::hz`].
+    pub fn bandwidth(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
+        let plan = Plan {
+            limits,
+            pace: POLL,
+            head: "",
+            gauge: |payload| Bandwidth {
+                payload,
+                rate: Rate::default(),
+            },
+        };
+        self.measure(name, plan)
+    }
 }
 
 /// What the stamps of one window tell.
 #[derive(Debug, Default)]
-struct Window {
+struct Rate {
     samples: u64,
     first_ns: u64,
     last_ns: u64,
@@ -50,23 +53,9 @@ struct Window {
     oldest_source_ns: u64,
 }
 
-impl Window {
-    fn add(&mut self, stamp: &Stamp, now_ns: u64) {
-        if self.samples == 0 {
-            self.first_ns = stamp.publish_time_ns;
-        } else {
-            let gap = stamp.publish_time_ns.saturating_sub(self.last_ns);
-            self.longest_gap_ns = self.longest_gap_ns.max(gap);
-        }
-        self.last_ns = stamp.publish_time_ns;
-        self.oldest_source_ns = self
-            .oldest_source_ns
-            .max(now_ns.saturating_sub(stamp.source_time_ns));
-        self.samples += 1;
-    }
-
+impl Rate {
     /// Samples a second between the first and the last of the window.
-    fn rate(&self) -> f64 {
+    fn hz(&self) -> f64 {
         let span = self.last_ns.saturating_sub(self.first_ns);
         if self.samples < 2 || span == 0 {
             return 0.0;
@@ -75,61 +64,73 @@ impl Window {
     }
 }
 
-impl<W: Write> TopicVisitor for Hz<'_, '_, W> {
-    type Output = Result<(), ToolError>;
+impl Gauge for Rate {
+    fn add(&mut self, seen: &Seen) {
+        let stamp = &seen.stamp;
+        if self.samples == 0 {
+            self.first_ns = stamp.publish_time_ns;
+        } else {
+            let gap = stamp.publish_time_ns.saturating_sub(self.last_ns);
+            self.longest_gap_ns = self.longest_gap_ns.max(gap);
+        }
+        self.last_ns = stamp.publish_time_ns;
+        let age = seen.received_ns.saturating_sub(stamp.source_time_ns);
+        self.oldest_source_ns = self.oldest_source_ns.max(age);
+        self.samples += 1;
+    }
 
-    fn visit<T: Topic>(self) -> Self::Output {
-        let subscriber = self.tools.subscriber::<T>()?;
-        self.tools.hz_from(T::NAME, subscriber, self.windows)
+    fn as_json(&self) -> Value {
+        json!({
+            "hz": self.hz(), "longest_gap_ns": self.longest_gap_ns,
+            "oldest_ns": self.oldest_source_ns,
+        })
+    }
+
+    fn as_text(&self) -> String {
+        format!(
+            "{:9.2} Hz   longest gap {:8.3} ms   oldest {:8.3} ms",
+            self.hz(),
+            self.longest_gap_ns as f64 / 1e6,
+            self.oldest_source_ns as f64 / 1e6,
+        )
     }
 }
 
-impl<W: Write> Tools<'_, W> {
-    fn hz_from(
-        &mut self,
-        name: &str,
-        mut from: impl Source,
-        windows: Option<u64>,
-    ) -> Result<(), ToolError> {
-        let (mut printed, mut lost) = (0, 0);
-        let mut heard = Instant::now();
-        while windows.is_none_or(|count| printed < count) {
-            let mut window = Window::default();
-            let end = Instant::now() + WINDOW;
-            while Instant::now() < end {
-                if self.shutdown.is_requested() {
-                    return Ok(());
-                }
-                while let Some(stamp) = self.receive(&mut from, Stamped)? {
-                    window.add(&stamp, Clock::monotonic_ns());
-                    heard = Instant::now();
-                }
-                self.pause(heard)?;
-            }
-            let newly_lost = from.lost() - lost;
-            lost = from.lost();
-            printed += 1;
-            if self.as_json {
-                let value = json!({
-                    "topic": name, "hz": window.rate(), "samples": window.samples,
-                    "longest_gap_ns": window.longest_gap_ns,
-                    "oldest_ns": window.oldest_source_ns, "lost": newly_lost,
-                });
-                writeln!(self.out, "{value}")?;
-            } else if window.samples == 0 {
-                writeln!(self.out, "no sample in the last second")?;
-            } else {
-                writeln!(
-                    self.out,
-                    "{:9.2} Hz   longest gap {:8.3} ms   oldest {:8.3} ms   lost {newly_lost}",
-                    window.rate(),
-                    window.longest_gap_ns as f64 / 1e6,
-                    window.oldest_source_ns as f64 / 1e6,
-                )?;
-            }
-            self.out.flush()?;
-        }
-        Ok(())
+/// How many bytes a second a topic carries.
+struct Bandwidth {
+    /// Bytes of a payload.
+    payload: usize,
+    rate: Rate,
+}
+
+impl Bandwidth {
+    /// Bytes of a sample.
+    fn sample(&self) -> usize {
+        self.payload + size_of::<Stamp>()
+    }
+}
+
+impl Gauge for Bandwidth {
+    fn add(&mut self, seen: &Seen) {
+        self.rate.add(seen);
+    }
+
+    fn as_json(&self) -> Value {
+        json!({
+            "bytes_per_s": self.rate.hz() * self.sample() as f64,
+            "payload_bytes": self.payload, "stamp_bytes": size_of::<Stamp>(),
+        })
+    }
+
+    fn as_text(&self) -> String {
+        format!(
+            "{:9.2} KiB/s   {:6} samples of {} bytes (payload {}, stamp {})",
+            self.rate.hz() * self.sample() as f64 / 1024.0,
+            self.rate.samples,
+            self.sample(),
+            self.payload,
+            size_of::<Stamp>(),
+        )
     }
 }
 
@@ -137,29 +138,37 @@ impl<W: Write> Tools<'_, W> {
 mod tests {
     use super::*;
 
-    fn stamp(publish_time_ns: u64) -> Stamp {
-        Stamp {
-            publish_time_ns,
-            source_time_ns: publish_time_ns - 500,
-            ..Stamp::default()
+    fn seen(publish_time_ns: u64, received_ns: u64) -> Seen {
+        Seen {
+            stamp: Stamp {
+                publish_time_ns,
+                source_time_ns: publish_time_ns - 500,
+                ..Stamp::default()
+            },
+            looked_ns: received_ns,
+            received_ns,
         }
     }
 
     #[test]
-    fn a_window_tells_rate_longest_gap_and_oldest_sample() {
-        let mut window = Window::default();
+    fn a_window_tells_rate_longest_gap_oldest_sample_and_bytes() {
+        let mut gauge = Bandwidth {
+            payload: 64,
+            rate: Rate::default(),
+        };
         for at in [1_000_000, 2_000_000, 5_000_000] {
-            window.add(&stamp(at), at + 100);
+            gauge.add(&seen(at, at + 100));
         }
-        assert!((window.rate() - 500.0).abs() < 1e-9);
-        assert_eq!(window.longest_gap_ns, 3_000_000);
-        assert_eq!(window.oldest_source_ns, 600);
+        assert!((gauge.rate.hz() - 500.0).abs() < 1e-9);
+        assert_eq!(gauge.rate.longest_gap_ns, 3_000_000);
+        assert_eq!(gauge.rate.oldest_source_ns, 600);
+        assert_eq!(gauge.as_json()["bytes_per_s"], json!(500.0 * 120.0));
     }
 
     #[test]
     fn one_sample_has_no_rate() {
-        let mut window = Window::default();
-        window.add(&stamp(1_000), 1_000);
-        assert!(window.rate() < f64::EPSILON);
+        let mut rate = Rate::default();
+        rate.add(&seen(1_000, 1_000));
+        assert!(rate.hz() < f64::EPSILON);
     }
 }

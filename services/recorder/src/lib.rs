@@ -32,6 +32,7 @@ mod part;
 mod play;
 mod record;
 mod recover;
+mod samples;
 mod tally;
 
 pub use bag::BagError;
@@ -43,3 +44,4 @@ pub use look::{check, info};
 pub use play::{PlayConfig, PlayError, Stamps, play};
 pub use record::{LiveCount, Progress, Recorded, record};
 pub use recover::recover;
+pub use samples::samples;

@@ -11,17 +11,20 @@
 //! machine's clock since its start: after a restart of the machine they may lie ahead, and readers
 //! count no losses in such a stream.
 //!
-//! Topics that are in no table of this build are not played, since nothing here can write them.
+//! A user's own topic is played onto the bus of those who have it open, laid out as its creator
+//! says. One that nobody has open when the player starts is not played: nobody would hear it, and a
+//! recording does not say how its bytes lie.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use lager_journal::{Envelope, EnvelopeSchema, Overview, Selection, TopicOverview};
+use lager_journal::{Envelope, EnvelopeSchema, Overview, Selection};
 use lager_ports::{
-    Bus, Cause, IntrospectError, LockError, PortError, Publisher, SendError, Shutdown, Watchdog,
+    AnyPublisher, Bus, IntrospectError, LockError, PortError, SendError, Shutdown, Watchdog,
 };
-use lager_topics::{Description, Make, Role, TOPICS, Topic, TopicVisitor, describe, visit};
+use lager_topics::Role;
+use serde_json::Value;
 
 use crate::bag::{Bag, BagError};
 
@@ -45,7 +48,7 @@ pub enum Stamps {
 pub struct PlayConfig {
     /// The recording.
     pub file: PathBuf,
-    /// Names of topics; empty for all that this build can write.
+    /// Names of topics; empty for all that this build knows or somebody has open.
     pub topics: Vec<String>,
     /// How many times as fast as it was recorded.
     pub rate: f64,
@@ -138,30 +141,24 @@ pub fn play(
     let bag = Bag::open(&config.file)?;
     let overview = bag.overview()?;
     bag.must_have(&overview, &config.topics)?;
-    let selection = select(config, &overview)?;
     let robot = bus.robot();
     // Held until the last sample is out. A bridge that is just ending is waited for.
     let _name = bus.place().lock_name(robot)?;
     let _bridge = bus.place().lock(robot, Role::Bridge)?;
-    let wanted = selection.topics.as_deref().unwrap_or_default();
-    watchdog.over("looking at the topics", || must_be_free(bus, wanted))?;
-    let mut writers: BTreeMap<&str, Box<dyn Writer>> = BTreeMap::new();
-    for name in wanted {
-        let open = || visit(name, Open { bus });
-        let writer = watchdog.over("opening the topic", open);
-        writers.insert(name, writer.expect("a topic of the table")?);
-    }
-    let here = |topic: &&TopicOverview| !wanted.contains(&topic.name);
-    let others: Vec<_> = overview.topics.iter().filter(here).collect();
-    let asked =
-        |topic: &&&TopicOverview| config.topics.is_empty() || config.topics.contains(&topic.name);
-    let others = others.iter().filter(asked).map(|topic| topic.name.clone());
-    begun(&others.collect::<Vec<_>>());
+    let is_wanted = |name: &String| config.topics.is_empty() || config.topics.contains(name);
+    let topics = overview.topics.iter().map(|topic| topic.name.clone());
+    let wanted: Vec<String> = topics.filter(is_wanted).collect();
+    watchdog.over("looking at the topics", || must_be_free(bus, &wanted))?;
+    let writers = watchdog.over("opening the topics", || open(bus, &overview, &wanted))?;
+    let selection = select(config, &overview, &writers)?;
+    let is_left_out = |name: &&String| !writers.contains_key(*name);
+    let left_out: Vec<String> = wanted.iter().filter(is_left_out).cloned().collect();
+    begun(&left_out);
 
     let mut played = Played::default();
     let pace = Pace {
         shutdown,
-        writers: &mut writers,
+        writers: &writers,
     };
     if !pace.rest_until(Instant::now() + MEET) {
         return Ok(played);
@@ -177,8 +174,8 @@ pub fn play(
             if !is_done {
                 return Ok(false);
             }
-            if let Some(writer) = pace.writers.get_mut(topic) {
-                let send = || writer.send(message, config.stamps);
+            if let Some(writer) = pace.writers.get(topic) {
+                let send = || send(writer, message, config.stamps);
                 watchdog.over("publishing a sample", send)?;
                 played.samples += 1;
             }
@@ -197,30 +194,38 @@ pub fn play(
     Ok(played)
 }
 
-/// The topics that are played, all of this build's table, and the times between which.
-fn select(config: &PlayConfig, overview: &Overview) -> Result<Selection, PlayError> {
-    let in_table = |name: &str| TOPICS.iter().find(|entry| entry.name == name);
-    let mut topics = Vec::new();
+/// Opens the topics that this build or somebody on the bus knows.
+fn open(bus: &Bus, overview: &Overview, wanted: &[String]) -> Result<Writers, PlayError> {
+    let mut writers = Writers::new();
     for topic in &overview.topics {
-        let is_wanted = config.topics.is_empty() || config.topics.contains(&topic.name);
-        let Some(entry) = in_table(&topic.name).filter(|_| is_wanted) else {
+        if !wanted.contains(&topic.name) {
+            continue;
+        }
+        let Some(publisher) = bus.any_publisher(&topic.name)? else {
             continue;
         };
-        let make = Make::Record(entry.layout);
-        let description = Description::parse(&describe(&make)).expect("our own description");
-        if !EnvelopeSchema::of(&description).fits(&topic.schema_text) {
+        if !EnvelopeSchema::of(publisher.description()).fits(&topic.schema_text) {
             let topic = topic.name.clone();
             return Err(PlayError::Layout { topic });
         }
-        topics.push(topic.name.clone());
+        writers.insert(topic.name.clone(), publisher);
     }
-    if topics.is_empty() {
-        let why = "it has no topic that this build can write".to_owned();
+    Ok(writers)
+}
+
+/// The topics that are played, and the times between which.
+fn select(
+    config: &PlayConfig,
+    overview: &Overview,
+    writers: &Writers,
+) -> Result<Selection, PlayError> {
+    if writers.is_empty() {
+        let why = "it has no topic that this build knows or that somebody has open".to_owned();
         return Err(PlayError::Nothing { why });
     }
     let at = |time: Duration| overview.begin_ns.saturating_add(time.as_nanos() as u64);
     Ok(Selection {
-        topics: Some(topics),
+        topics: Some(writers.keys().cloned().collect()),
         from_ns: Some(at(config.from)),
         before_ns: config.to.map(at),
     })
@@ -228,12 +233,9 @@ fn select(config: &PlayConfig, overview: &Overview) -> Result<Selection, PlayErr
 
 fn must_be_free(bus: &Bus, wanted: &[String]) -> Result<(), PlayError> {
     bus.sweep();
-    for topic in bus.topics_of(bus.robot()) {
-        let Some(writer) = topic
-            .writers
-            .first()
-            .filter(|_| wanted.contains(&topic.name))
-        else {
+    for topic in bus.topics()? {
+        let is_wanted = topic.robot == *bus.robot() && wanted.contains(&topic.name);
+        let Some(writer) = topic.writers.first().filter(|_| is_wanted) else {
             continue;
         };
         let role = writer
@@ -248,52 +250,32 @@ fn must_be_free(bus: &Bus, wanted: &[String]) -> Result<(), PlayError> {
     Ok(())
 }
 
-/// A topic that is played.
-trait Writer {
-    fn send(&mut self, message: &[u8], stamps: Stamps) -> Result<(), PlayError>;
+/// The topics that are played, by their names.
+type Writers = BTreeMap<String, AnyPublisher>;
 
-    /// Gives readers that have come the last value of a state.
-    fn tick(&self);
-}
-
-impl<T: Topic> Writer for Publisher<T> {
-    fn send(&mut self, message: &[u8], stamps: Stamps) -> Result<(), PlayError> {
-        let envelope: Envelope<T::Payload> =
-            serde_json::from_slice(message).map_err(|error| PlayError::Message {
-                topic: T::NAME.to_owned(),
-                error,
-            })?;
-        match stamps {
-            Stamps::New => Self::send(self, Cause::OWN, envelope.payload)?,
-            Stamps::Recorded => self.replay(envelope.payload, envelope.stamp)?,
-        }
-        Ok(())
+fn send(writer: &AnyPublisher, message: &[u8], stamps: Stamps) -> Result<(), PlayError> {
+    let unreadable = |error| PlayError::Message {
+        topic: writer.name().to_owned(),
+        error,
+    };
+    let envelope: Envelope<Value> = serde_json::from_slice(message).map_err(unreadable)?;
+    let mut payload = writer.blank().to_vec();
+    let filled = writer.description().fill(&envelope.payload, &mut payload);
+    filled.map_err(unreadable)?;
+    match stamps {
+        Stamps::New => writer.send(&payload)?,
+        Stamps::Recorded => writer.replay(&payload, envelope.stamp)?,
     }
-
-    fn tick(&self) {
-        Self::tick(self);
-    }
-}
-
-struct Open<'a> {
-    bus: &'a Bus,
-}
-
-impl TopicVisitor for Open<'_> {
-    type Output = Result<Box<dyn Writer>, PortError>;
-
-    fn visit<T: Topic>(self) -> Self::Output {
-        Ok(Box::new(self.bus.publisher::<T>()?))
-    }
+    Ok(())
 }
 
 /// Waits in real time.
-struct Pace<'a, 'names> {
+struct Pace<'a> {
     shutdown: &'a Shutdown,
-    writers: &'a mut BTreeMap<&'names str, Box<dyn Writer>>,
+    writers: &'a Writers,
 }
 
-impl Pace<'_, '_> {
+impl Pace<'_> {
     /// Whether that moment came before the wish to end.
     fn rest_until(&self, moment: Instant) -> bool {
         loop {
@@ -305,7 +287,7 @@ impl Pace<'_, '_> {
                 return true;
             }
             if left > LOOK {
-                self.writers.values().for_each(|writer| writer.tick());
+                self.writers.values().for_each(AnyPublisher::tick);
             }
             std::thread::sleep(left.min(LOOK));
         }

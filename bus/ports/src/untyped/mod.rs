@@ -22,6 +22,7 @@
 )]
 
 mod asking;
+mod foreign;
 mod reader;
 mod writer;
 
@@ -38,6 +39,7 @@ use lager_topics::{Field, Make, Qos, Request, Role, Schema, Stamp, Topic};
 use crate::transport::Ipc;
 
 pub(crate) use asking::{Answerer, Asker};
+pub(crate) use foreign::Foreign;
 pub(crate) use reader::{Reader, Taken};
 pub(crate) use writer::{Lent, Ring, Writer, republish_states};
 

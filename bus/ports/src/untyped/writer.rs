@@ -32,7 +32,7 @@ pub(crate) struct Writer {
     writer: u32,
 }
 
-type Port = Publisher<Ipc, Bytes, Header>;
+pub(super) type Port = Publisher<Ipc, Bytes, Header>;
 type Loaned = SampleMut<Ipc, Bytes, Header>;
 
 ends_here!(Port, Loaned, StandardListeners);
@@ -214,7 +214,7 @@ fn refused(error: LoanError) -> SendError {
 }
 
 /// The current time, made unique within the process.
-fn new_epoch() -> u64 {
+pub(super) fn new_epoch() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
     let now = Clock::monotonic_ns();
     let last = LAST

@@ -67,16 +67,8 @@ impl Serialize for Of<'_> {
 
 impl Number {
     fn schema<M: SerializeMap>(self, map: &mut M) -> Result<(), M::Error> {
-        let (least, greatest) = match self {
-            Self::F32 | Self::F64 => return map.serialize_entry("type", "number"),
-            Self::U8 => (0, u64::from(u8::MAX)),
-            Self::U16 => (0, u64::from(u16::MAX)),
-            Self::U32 => (0, u64::from(u32::MAX)),
-            Self::U64 => (0, u64::MAX),
-            Self::I8 => (i64::from(i8::MIN), i8::MAX as u64),
-            Self::I16 => (i64::from(i16::MIN), i16::MAX as u64),
-            Self::I32 => (i64::from(i32::MIN), i32::MAX as u64),
-            Self::I64 => (i64::MIN, i64::MAX as u64),
+        let Some((least, greatest)) = self.range() else {
+            return map.serialize_entry("type", "number");
         };
         map.serialize_entry("type", "integer")?;
         map.serialize_entry("minimum", &least)?;

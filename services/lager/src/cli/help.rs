@@ -33,9 +33,9 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "gag",
         ],
     ),
-    ("Look at it", &["topic", "bag"]),
+    ("Look at it", &["top", "topic", "bag"]),
     ("Measure", &["bench"]),
-    ("Set up and mend", &["doctor", "config"]),
+    ("Set up and mend", &["doctor", "config", "completions"]),
     (
         "The services, as `up` or systemd starts them",
         &[

@@ -20,6 +20,8 @@ use crate::config::{BAUD_RATES, SPEEDS};
 const LONGEST_DRIVE_S: f64 = 86_400.0;
 /// The longest virtual time of `lager simulate`, in seconds: a year.
 const LONGEST_RUN_S: u64 = 365 * 86_400;
+/// How many samples a second are published.
+const HZ: RangeInclusive<f64> = 0.001..=10_000.0;
 /// How many times as fast as it was recorded a recording is played.
 const RATES: RangeInclusive<f64> = 0.01..=100.0;
 
@@ -100,6 +102,17 @@ fn command(
             names.join(", ")
         )
     })
+}
+
+/// How many samples a second are published.
+pub fn hz(text: &str) -> Result<f64, String> {
+    let rate: f64 = text.parse().map_err(said)?;
+    if HZ.contains(&rate) {
+        Ok(rate)
+    } else {
+        let (least, most) = (HZ.start(), HZ.end());
+        Err(format!("give {least} to {most} samples a second"))
+    }
 }
 
 /// The name of a topic of the table, or one whose first part stands in no name there: such topics

@@ -43,6 +43,8 @@ warehouse = {warehouse}
 # File that all processes of the robot append their traces to: those that RUST_LOG asks for, or
 # \"info\". Unset, nothing is traced unless RUST_LOG asks for it, and then on standard error.
 {log}
+# Traces as JSON, one value a line, for programs: into that file, or on standard error without one.
+json = {log_json}
 
 [bus]
 # The folder in which all of the bus lives, at most 37 bytes; unset, it is /run/lager where that is
@@ -191,6 +193,7 @@ debounce_ms = {debounce}
             },
             warehouse = quoted(&self.warehouse),
             log = unset_path("file", &self.log.file),
+            log_json = self.log.json,
             folder = unset_path("folder", &self.bus.folder),
             sensor = quoted(&self.serial.sensor.to_string_lossy()),
             steering = quoted(&self.serial.steering.to_string_lossy()),
@@ -299,6 +302,7 @@ mod tests {
             warehouse: "a \"quoted\" name".into(),
             log: LogSection {
                 file: Some("/var/log/lager".into()),
+                json: true,
             },
             bus: BusSection {
                 folder: Some("/run/warehouse".into()),

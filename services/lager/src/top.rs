@@ -1,0 +1,67 @@
+//! `lager top`: joins the bus, or reads a recording, for the monitor's screen.
+
+use std::io::{BufWriter, IsTerminal, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use lager_monitor::{Recorded, ToolError, Tools, TopConfig};
+use lager_topics::Role;
+
+use crate::cli::TopArgs;
+use crate::config::Config;
+use crate::patience::Patience;
+use crate::{diagnose, exit, topic};
+
+/// How long the one picture is measured.
+const ONCE: Duration = Duration::from_secs(2);
+
+/// Shows it until a key, or prints one picture.
+pub fn run(config: &Config, args: &TopArgs, patience: &Patience) -> Result<()> {
+    if !args.once && !std::io::stdout().is_terminal() {
+        let what = "standard output is no terminal; `lager top --once` prints one picture";
+        return Err(exit::Usage(what.to_owned()).into());
+    }
+    if let Some(file) = &args.bag {
+        return over(file, args, patience);
+    }
+    diagnose::must_be_up(config)?;
+    let bus = topic::join(config, Role::Monitor, &patience.watchdog)?;
+    let out = &mut BufWriter::new(std::io::stdout());
+    let mut tools = Tools {
+        bus: &bus,
+        watchdog: &patience.watchdog,
+        shutdown: &patience.shutdown,
+        as_json: args.json,
+        out,
+    };
+    let measured = args.duration.map_or(ONCE, Duration::from_secs_f64);
+    let shown = tools.top(&TopConfig {
+        filter: args.filter.clone(),
+        once: args.once.then_some(measured),
+    });
+    match shown.and_then(|()| Ok(out.flush()?)) {
+        Err(error) if error.is_closed_output() => Ok(()),
+        shown => Ok(shown?),
+    }
+}
+
+/// The same over a recording.
+fn over(file: &Path, args: &TopArgs, patience: &Patience) -> Result<()> {
+    let name = file.display().to_string();
+    let mut recorded = None;
+    lager_recorder::samples(file, &mut |robot, topic, envelope| {
+        let recorded = recorded.get_or_insert_with(|| Recorded::new(&name, robot, &args.filter));
+        let lacking = envelope.lost + envelope.dropped;
+        recorded.take(topic, &envelope.stamp, lacking, envelope.payload);
+    })?;
+    let recorded = recorded.with_context(|| format!("{name} has no samples"))?;
+    let out = &mut BufWriter::new(std::io::stdout());
+    let shown = recorded
+        .show(args.once, args.json, &patience.shutdown, out)
+        .and_then(|()| out.flush());
+    match shown.map_err(ToolError::from) {
+        Err(error) if error.is_closed_output() => Ok(()),
+        shown => Ok(shown?),
+    }
+}

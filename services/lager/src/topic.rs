@@ -1,0 +1,175 @@
+//! `lager topic`: joins the bus for the topic tools, and hands them standard output and input.
+
+use std::io::{BufWriter, Write};
+use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, sync_channel};
+
+use anyhow::{Context, Result};
+use lager_monitor::{EchoConfig, Payloads, PublishError, Publishing, ToolError, Tools};
+use lager_ports::{Bus, Watchdog};
+use lager_topics::{Role, TOPICS};
+use serde_json::Value;
+
+use crate::cli::{TopicArgs, TopicCommand};
+use crate::config::Config;
+use crate::patience::Patience;
+use crate::{diagnose, exit};
+
+/// Payloads that are read ahead of their publication.
+const READ_AHEAD: usize = 16;
+
+/// The topic tools, on standard output.
+pub fn run(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patience) -> Result<()> {
+    if let TopicCommand::Echo { watch, .. }
+    | TopicCommand::Hz { watch }
+    | TopicCommand::Bw { watch }
+    | TopicCommand::Delay { watch } = &args.command
+        && !watch.wait
+        // Other people's topics need no robot.
+        && TOPICS.iter().any(|entry| entry.name == watch.topic)
+    {
+        diagnose::must_be_up(config)?;
+    }
+    let role = match args.command {
+        TopicCommand::Pub { .. } => Role::Operator,
+        _ => Role::Observer,
+    };
+    let bus = join(config, role, &patience.watchdog)?;
+    let mut tools = Tools {
+        bus: &bus,
+        watchdog: &patience.watchdog,
+        shutdown: &patience.shutdown,
+        as_json: args.json,
+        out: &mut BufWriter::new(std::io::stdout().lock()),
+    };
+    let shown = match args.command {
+        TopicCommand::List => tools.list(every_robot),
+        TopicCommand::Schema { .. } => unreachable!("it needs no bus"),
+        TopicCommand::Info { topic } => tools.info(&topic),
+        TopicCommand::Echo { watch, field } => {
+            let echo = EchoConfig {
+                fields: field,
+                limits: watch.until.limits(),
+            };
+            tools.echo(&watch.topic, &echo)
+        }
+        TopicCommand::Hz { watch } => tools.hz(&watch.topic, watch.until.limits()),
+        TopicCommand::Bw { watch } => tools.bandwidth(&watch.topic, watch.until.limits()),
+        TopicCommand::Delay { watch } => tools.delay(&watch.topic, watch.until.limits()),
+        TopicCommand::Pub {
+            topic,
+            payload,
+            rate,
+            until,
+            live,
+        } => {
+            let mut limits = until.limits();
+            let payloads = match &payload {
+                Some(text) => {
+                    if rate.is_none() {
+                        limits.count = limits.count.or(Some(1));
+                    }
+                    Payloads::One(parsed(text)?)
+                }
+                None => Payloads::Each(read_on()?),
+            };
+            let what = Publishing {
+                payloads,
+                rate,
+                limits,
+                live,
+            };
+            let published = tools.publish(&topic, &what);
+            return ended(
+                published.map_err(|error| refused(error, payload.is_some())),
+                tools.out,
+            );
+        }
+    };
+    ended(shown.map_err(as_usage), tools.out)
+}
+
+/// Joins the bus.
+pub fn join(config: &Config, role: Role, watchdog: &Watchdog) -> Result<Bus> {
+    let join = || Bus::open(&config.bus()?, role).map_err(anyhow::Error::from);
+    watchdog.over("joining the bus", join)
+}
+
+/// A reader that has gone, as after `| head`, is no error.
+fn ended(shown: Result<()>, out: &mut impl Write) -> Result<()> {
+    let flushed = shown.and_then(|()| Ok(out.flush().map_err(ToolError::Output)?));
+    match flushed {
+        Err(error)
+            if error
+                .downcast_ref()
+                .is_some_and(ToolError::is_closed_output) =>
+        {
+            Ok(())
+        }
+        flushed => flushed,
+    }
+}
+
+/// A field that there is not makes no sense, whatever the robot does.
+fn as_usage(error: ToolError) -> anyhow::Error {
+    match error {
+        ToolError::NoField(error) => exit::Usage(error.to_string()).into(),
+        error => error.into(),
+    }
+}
+
+fn refused(error: PublishError, is_argument: bool) -> anyhow::Error {
+    match error {
+        PublishError::Payload { topic, error, .. } if is_argument => {
+            exit::Usage(format!("{topic}: {error}")).into()
+        }
+        PublishError::Up {
+            topic,
+            remedy,
+            lock,
+        } => {
+            let what = format!("{topic} is not published beside a robot: {remedy}");
+            // Its own exit code.
+            anyhow::Error::from(lock).context(what)
+        }
+        error => error.into(),
+    }
+}
+
+fn parsed(text: &str) -> Result<Value> {
+    let parsed = serde_json::from_str(text);
+    parsed.map_err(|error| exit::Usage(format!("the payload is no JSON: {error}")).into())
+}
+
+/// The JSON values on standard input, read by a thread that ends with the process: a read of a
+/// terminal cannot be called back.
+fn read_on() -> Result<Receiver<Result<Value, String>>> {
+    let (to, from) = sync_channel(READ_AHEAD);
+    let read = move || {
+        let values = serde_json::Deserializer::from_reader(std::io::stdin()).into_iter();
+        for value in values {
+            let is_end = value.is_err();
+            if to.send(value.map_err(|error| error.to_string())).is_err() || is_end {
+                break;
+            }
+        }
+    };
+    let thread = std::thread::Builder::new().name("input".to_owned());
+    thread.spawn(read).context("cannot start a thread")?;
+    Ok(from)
+}
+
+/// `lager completions`: on standard output.
+pub fn completions(shell: clap_complete::Shell) -> ExitCode {
+    let mut script = Vec::new();
+    clap_complete::generate(
+        shell,
+        &mut crate::cli::help::command(),
+        "lager",
+        &mut script,
+    );
+    match std::io::stdout().write_all(&script) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) => exit::FAILED,
+    }
+}

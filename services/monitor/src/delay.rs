@@ -1,0 +1,175 @@
+//! `topic delay`: how old samples are when they are published and when an observer has them.
+//!
+//! An observer is never woken: it looks every millisecond, and a sample waits for its look. That
+//! wait is the observer's own and says nothing of the bus, so it is told apart by the moment at which
+//! each look begins:
+//!
+//! ```text
+//!  source_time --> publish_time ~~~~> look --> received
+//!    | written     |    own wait     | read    |       a sample that waited for the look
+//!
+//!  source_time --> look ... publish_time ----> received
+//!    | written            |          read      |       one that came during the look
+//! ```
+//!
+//! What the bus takes is in `read`, as far as an observer can see it: a sample that waited had
+//! arrived long before. `lager bench hop` measures how long a woken receiver takes.
+
+use std::io::Write;
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+use serde_json::{Value, json};
+
+use crate::measure::{Gauge, Limits, Plan, Seen};
+use crate::{ToolError, Tools};
+
+/// Between two looks: a fifth of the other tools' pace, so that the own wait is short.
+const POLL: Duration = Duration::from_millis(1);
+
+/// The longest delay that is told from longer ones, in ns: a minute.
+const LONGEST_NS: u64 = 60_000_000_000;
+
+impl<W: Write> Tools<'_, W> {
+    /// `topic delay`: measures the delays of `name` until a limit or the shutdown.
+    ///
+    /// # Errors
+    /// No topic has that name, it cannot be read, or the output cannot be written.
+    pub fn delay(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
+        let plan = Plan {
+            limits,
+            pace: POLL,
+            head: HEAD,
+            gauge: |_| Delays::default(),
+        };
+        self.measure(name, plan)
+    }
+}
+
+const HEAD: &str = "\
+         source -> publish (ms)            publish -> receive (ms)           own wait
+samples     p50      p99      max         p50      p99      max         p50      max";
+
+/// One stage's delays, in ns.
+#[derive(Debug)]
+pub(crate) struct Stage(Histogram<u64>);
+
+impl Default for Stage {
+    fn default() -> Self {
+        // Three digits are exact.
+        Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("bounds that make sense"))
+    }
+}
+
+impl Stage {
+    pub(crate) fn add(&mut self, ns: u64) {
+        self.0.saturating_record(ns);
+    }
+
+    pub(crate) fn at(&self, percent: f64) -> u64 {
+        match self.0.is_empty() {
+            true => 0,
+            false => self.0.value_at_percentile(percent),
+        }
+    }
+
+    pub(crate) fn max(&self) -> u64 {
+        match self.0.is_empty() {
+            true => 0,
+            false => self.0.max(),
+        }
+    }
+
+    fn as_json(&self) -> Value {
+        json!({
+            "p50_ns": self.at(50.0), "p90_ns": self.at(90.0), "p99_ns": self.at(99.0),
+            "p999_ns": self.at(99.9), "max_ns": self.max(),
+        })
+    }
+}
+
+/// The delays of one window.
+#[derive(Debug, Default)]
+struct Delays {
+    samples: u64,
+    /// From the source to the publication.
+    written: Stage,
+    /// From the publication to the look that found the sample.
+    own_wait: Stage,
+    /// From there, or from the publication if that came later, to the sample in hand.
+    read: Stage,
+}
+
+impl Gauge for Delays {
+    fn add(&mut self, seen: &Seen) {
+        let published = seen.stamp.publish_time_ns;
+        self.samples += 1;
+        self.written
+            .add(published.saturating_sub(seen.stamp.source_time_ns));
+        self.own_wait.add(seen.looked_ns.saturating_sub(published));
+        self.read.add(
+            seen.received_ns
+                .saturating_sub(seen.looked_ns.max(published)),
+        );
+    }
+
+    fn as_json(&self) -> Value {
+        json!({
+            "source_to_publish": self.written.as_json(),
+            "publish_to_receive": self.read.as_json(),
+            "own_wait": self.own_wait.as_json(),
+        })
+    }
+
+    fn as_text(&self) -> String {
+        let ms = |ns: u64| ns as f64 / 1e6;
+        let three = |stage: &Stage| {
+            format!(
+                "{:8.3} {:8.3} {:8.3}",
+                ms(stage.at(50.0)),
+                ms(stage.at(99.0)),
+                ms(stage.max())
+            )
+        };
+        format!(
+            "{:7} {}    {}    {:8.3} {:8.3}",
+            self.samples,
+            three(&self.written),
+            three(&self.read),
+            ms(self.own_wait.at(50.0)),
+            ms(self.own_wait.max()),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_topics::Stamp;
+
+    use super::*;
+
+    fn seen(source: u64, published: u64, looked_ns: u64, received_ns: u64) -> Seen {
+        Seen {
+            stamp: Stamp {
+                source_time_ns: source,
+                publish_time_ns: published,
+                ..Stamp::default()
+            },
+            looked_ns,
+            received_ns,
+        }
+    }
+
+    #[test]
+    fn the_observers_own_wait_is_no_delay_of_the_bus() {
+        let mut delays = Delays::default();
+        delays.add(&seen(1_000, 3_000, 903_000, 903_500));
+        assert_eq!(delays.written.max(), 2_000);
+        assert_eq!(delays.own_wait.max() / 1_000, 900);
+        assert_eq!(delays.read.max(), 500);
+        // One that comes while the observer looks has waited for nobody.
+        let mut delays = Delays::default();
+        delays.add(&seen(1_000, 3_000, 2_500, 3_700));
+        assert_eq!((delays.own_wait.max(), delays.read.max()), (0, 700));
+    }
+}

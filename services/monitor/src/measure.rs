@@ -1,0 +1,155 @@
+//! What `topic hz`, `bw` and `delay` share: they look at stamps only, and tell each second what the
+//! samples of that second were.
+
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use lager_ports::{Clock, Source};
+use lager_topics::{Stamp, Topic, TopicVisitor, visit};
+use serde_json::{Value, json};
+
+use crate::source::Stamped;
+use crate::{ToolError, Tools};
+
+/// One line is printed for each window.
+const WINDOW: Duration = Duration::from_secs(1);
+
+/// When a tool ends by itself; whatever comes first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Limits {
+    /// After so long.
+    pub duration: Option<Duration>,
+    /// After so many samples.
+    pub count: Option<u64>,
+}
+
+impl Limits {
+    /// Whether it is to end after so long and so many samples.
+    pub(crate) fn are_reached(&self, began: Instant, samples: u64) -> bool {
+        self.count.is_some_and(|count| samples >= count)
+            || self
+                .duration
+                .is_some_and(|duration| began.elapsed() >= duration)
+    }
+}
+
+/// One sample as an observer meets it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    pub(crate) stamp: Stamp,
+    /// When the look at the queue began that found it.
+    pub(crate) looked_ns: u64,
+    pub(crate) received_ns: u64,
+}
+
+/// What is measured of the samples of one window.
+pub(crate) trait Gauge {
+    fn add(&mut self, seen: &Seen);
+
+    /// For programs, an object.
+    fn as_json(&self) -> Value;
+
+    /// For people, what stands before the losses.
+    fn as_text(&self) -> String;
+}
+
+/// What is measured and how.
+pub(crate) struct Plan<F> {
+    pub(crate) limits: Limits,
+    /// Between two looks.
+    pub(crate) pace: Duration,
+    /// The line above the first one; none if it is empty.
+    pub(crate) head: &'static str,
+    /// Makes a gauge for payloads of so many bytes.
+    pub(crate) gauge: F,
+}
+
+impl<W: Write> Tools<'_, W> {
+    pub(crate) fn measure<G: Gauge, F: Fn(usize) -> G>(
+        &mut self,
+        name: &str,
+        plan: Plan<F>,
+    ) -> Result<(), ToolError> {
+        let tools = &mut *self;
+        match visit(name, Measure { tools, plan: &plan }) {
+            Ok(measured) => measured,
+            Err(unknown) => {
+                let found = self.found(name, unknown)?;
+                let size = found.description().size();
+                self.measure_from(name, size, found, &plan)
+            }
+        }
+    }
+
+    fn measure_from<G: Gauge, F: Fn(usize) -> G>(
+        &mut self,
+        name: &str,
+        size: usize,
+        mut from: impl Source,
+        plan: &Plan<F>,
+    ) -> Result<(), ToolError> {
+        let began = Instant::now();
+        let (mut total, mut lost, mut is_over) = (0, 0, false);
+        let mut heard = began;
+        if !self.as_json && !plan.head.is_empty() {
+            writeln!(self.out, "{}", plan.head)?;
+        }
+        while !is_over {
+            let mut gauge = (plan.gauge)(size);
+            let before = total;
+            let end = Instant::now() + WINDOW;
+            while !is_over && Instant::now() < end {
+                if self.shutdown.is_requested() {
+                    return Ok(());
+                }
+                let looked_ns = Clock::monotonic_ns();
+                while !is_over && let Some(stamp) = self.receive(&mut from, Stamped)? {
+                    let received_ns = Clock::monotonic_ns();
+                    gauge.add(&Seen {
+                        stamp,
+                        looked_ns,
+                        received_ns,
+                    });
+                    total += 1;
+                    heard = Instant::now();
+                    is_over = plan.limits.are_reached(began, total);
+                }
+                is_over |= plan.limits.are_reached(began, total);
+                if !is_over {
+                    self.pause(heard, plan.pace)?;
+                }
+            }
+            let newly_lost = from.lost() - lost;
+            lost = from.lost();
+            if self.as_json {
+                let mut value = gauge.as_json();
+                value["topic"] = json!(name);
+                value["samples"] = json!(total - before);
+                value["lost"] = json!(newly_lost);
+                writeln!(self.out, "{value}")?;
+            } else if total == before {
+                writeln!(self.out, "no sample in the last second")?;
+            } else {
+                writeln!(self.out, "{}   lost {newly_lost}", gauge.as_text())?;
+            }
+            self.out.flush()?;
+        }
+        Ok(())
+    }
+}
+
+struct Measure<'a, 'b, W, F> {
+    tools: &'a mut Tools<'b, W>,
+    plan: &'a Plan<F>,
+}
+
+impl<W: Write, G: Gauge, F: Fn(usize) -> G> TopicVisitor for Measure<'_, '_, W, F> {
+    type Output = Result<(), ToolError>;
+
+    fn visit<T: Topic>(self) -> Self::Output {
+        let subscriber = self.tools.subscriber::<T>()?;
+        let size = size_of::<T::Payload>();
+        self.tools
+            .measure_from(T::NAME, size, subscriber, self.plan)
+    }
+}

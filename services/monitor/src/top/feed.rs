@@ -1,0 +1,223 @@
+//! The bus end of `lager top`: reads the topics that the model wants, and looks who is on them.
+//!
+//! A row that is closed or filtered out has no subscription; of it only the bus is asked, which knows
+//! its ends. The head takes four states of the robot and the stop word.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use lager_ports::{
+    Bus, Clock, NodeState, PortError, ReceiveError, Source, StopPage, StopWord, Subscriber,
+    Watchdog,
+};
+use lager_topics::{LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit};
+
+use super::head::Load;
+use super::model::Model;
+use super::row::Life;
+use crate::ToolError;
+use crate::source::Stamped;
+
+/// Samples that are taken of one topic in one look.
+const TURN: u64 = 1_024;
+
+/// What reads a robot's bus.
+pub(crate) struct Feed<'a> {
+    bus: &'a Bus,
+    watchdog: &'a Watchdog,
+    open: BTreeMap<String, Box<dyn Pull>>,
+    /// Topics that cannot be read, such as one of another build.
+    refused: BTreeSet<String>,
+    health: Subscriber<LinkHealth>,
+    status: Subscriber<NavStatus>,
+    queue: Subscriber<MissionQueue>,
+    path: Subscriber<LatencyPath>,
+    /// Real and robot time at the last look at the clock.
+    clock: Clock,
+    clocked: (Instant, std::time::Duration),
+}
+
+impl<'a> Feed<'a> {
+    /// Joins the states of the head.
+    ///
+    /// # Errors
+    /// Too many observers, or a process of another build.
+    pub(crate) fn new(bus: &'a Bus, watchdog: &'a Watchdog) -> Result<Self, ToolError> {
+        let open = || -> Result<Self, PortError> {
+            let clock = bus.clock();
+            Ok(Self {
+                bus,
+                watchdog,
+                open: BTreeMap::new(),
+                refused: BTreeSet::new(),
+                health: bus.subscriber()?,
+                status: bus.subscriber()?,
+                queue: bus.subscriber()?,
+                path: bus.subscriber()?,
+                clocked: (Instant::now(), clock.now()),
+                clock,
+            })
+        };
+        Ok(watchdog.over("opening the topics", open)?)
+    }
+
+    /// Looks who is on the topics, and reads those that the model wants.
+    pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
+        let bus = self.bus;
+        let look = || bus.topics();
+        let mut topics = self.watchdog.over("looking at the topics", look)?;
+        topics.retain(|topic| topic.robot == *bus.robot());
+        let nodes = self
+            .watchdog
+            .over("looking at the processes", || bus.nodes());
+        let nodes = nodes?;
+        model.take_ends(&topics, |pid| {
+            let node = nodes.iter().find(|node| node.pid == pid);
+            match node.map(|node| node.state) {
+                Some(NodeState::Stale) => Life::Dead,
+                _ => life(pid),
+            }
+        });
+        let word = bus.place().robot(bus.robot()).join(StopPage::FILE);
+        let told = StopWord::read(&word).ok().flatten();
+        model.head.stop = told.and_then(|told| told.stop());
+        model.head.load = load();
+        let (then, robot_then) = self.clocked;
+        self.clocked = (Instant::now(), self.clock.now());
+        let real = (self.clocked.0 - then).as_secs_f64();
+        if real > 0.1 {
+            let robot = self.clocked.1.saturating_sub(robot_then);
+            model.head.pace = Some(robot.as_secs_f64() / real);
+        }
+        self.follow(model)
+    }
+
+    /// Opens what the model wants and closes the rest.
+    pub(crate) fn follow(&mut self, model: &mut Model) -> Result<(), ToolError> {
+        let wanted: BTreeSet<String> = model.wanted().map(str::to_owned).collect();
+        self.open.retain(|name, _| {
+            let stays = wanted.contains(name);
+            if !stays {
+                model.row(name).rest();
+            }
+            stays
+        });
+        for name in wanted {
+            if self.open.contains_key(&name) || self.refused.contains(&name) {
+                continue;
+            }
+            let open = || match visit(&name, Open { bus: self.bus }) {
+                Ok(opened) => opened.map(Some),
+                Err(_) => {
+                    let found = self.bus.found(&name)?;
+                    Ok(found.map(|found| Box::new(Pulled::new(found)) as Box<dyn Pull>))
+                }
+            };
+            match self.watchdog.over("opening the topic", open) {
+                Ok(Some(pull)) => drop(self.open.insert(name, pull)),
+                Ok(None) => {}
+                Err(_) => drop(self.refused.insert(name)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what has come.
+    pub(crate) fn drain(&mut self, model: &mut Model) -> Result<(), ToolError> {
+        self.watchdog.enter("reading the topics");
+        let drained = self.drain_all(model);
+        self.watchdog.leave();
+        Ok(drained?)
+    }
+
+    fn drain_all(&mut self, model: &mut Model) -> Result<(), ReceiveError> {
+        for (name, pull) in &mut self.open {
+            pull.pull(name, model)?;
+        }
+        if let Some(health) = self.health.latest()? {
+            let at_ns = health.stamp().publish_time_ns;
+            model.head.take_health(*health, at_ns);
+        }
+        if let Some(status) = self.status.latest()? {
+            model.head.status = Some(*status);
+        }
+        if let Some(queue) = self.queue.latest()? {
+            model.head.queue = Some(*queue);
+        }
+        if let Some(path) = self.path.latest()? {
+            model.head.path = Some(*path);
+        }
+        Ok(())
+    }
+}
+
+/// A topic that is read.
+trait Pull {
+    fn pull(&mut self, name: &str, model: &mut Model) -> Result<(), ReceiveError>;
+}
+
+struct Pulled<S> {
+    from: S,
+    lost: u64,
+}
+
+impl<S> Pulled<S> {
+    fn new(from: S) -> Self {
+        Self { from, lost: 0 }
+    }
+}
+
+impl<S: Source> Pull for Pulled<S> {
+    fn pull(&mut self, name: &str, model: &mut Model) -> Result<(), ReceiveError> {
+        let mut found = 0;
+        while found < TURN
+            && let Some(stamp) = self.from.next(Stamped)?
+        {
+            model.hear(name, &stamp);
+            found += 1;
+        }
+        let lost = self.from.lost() - self.lost;
+        self.lost = self.from.lost();
+        if found > 0 || lost > 0 {
+            model.row(name).look(found, lost, Clock::monotonic_ns());
+        }
+        Ok(())
+    }
+}
+
+struct Open<'a> {
+    bus: &'a Bus,
+}
+
+impl TopicVisitor for Open<'_> {
+    type Output = Result<Box<dyn Pull>, PortError>;
+
+    fn visit<T: Topic>(self) -> Self::Output {
+        Ok(Box::new(Pulled::new(self.bus.subscriber::<T>()?)))
+    }
+}
+
+/// Whether a process goes on, as the kernel has it.
+fn life(pid: u32) -> Life {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    // The state follows the name, which is in parentheses and may contain anything.
+    let state = stat
+        .rsplit(") ")
+        .next()
+        .and_then(|rest| rest.chars().next());
+    match state {
+        Some('T' | 't') => Life::Frozen,
+        Some('Z' | 'X') => Life::Dead,
+        _ => Life::Alive,
+    }
+}
+
+/// What the machine does.
+fn load() -> Load {
+    let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let minute = text.split(' ').next().and_then(|text| text.parse().ok());
+    Load {
+        minute: minute.unwrap_or_default(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+    }
+}

@@ -1,0 +1,292 @@
+//! `lager top`: the robot and all of its topics on one screen, live or over a recording.
+//!
+//! ```text
+//!   bus ──feed──> model ──render──> terminal, text or JSON
+//!   file ───────>   ^
+//!   keys ───────────┘
+//! ```
+//!
+//! [`model`] and [`render`] are pure; `feed` reads the bus and this file the terminal. It is an
+//! observer like the other tools and looks at the queues every 5 ms. What a row that is not shown
+//! would tell is not read; the figures come from stamps, so no payload is looked at but those of the
+//! head.
+
+mod feed;
+mod head;
+mod model;
+mod render;
+mod row;
+
+use std::io::{self, Write};
+use std::time::{Duration, Instant};
+
+use lager_ports::{Clock, Shutdown};
+use lager_topics::{LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic};
+use ratatui::DefaultTerminal;
+use ratatui::buffer::Buffer;
+use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
+use ratatui::layout::Rect;
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde_json::{Value, json};
+
+use self::feed::Feed;
+use self::model::{Key, Model, Pressed};
+use crate::{POLL, ToolError, Tools};
+
+/// How long one window of figures is, how often the ends are looked at, and how often it is drawn.
+const WINDOW: Duration = Duration::from_secs(1);
+/// The picture of `--once`.
+const ONCE: Rect = Rect::new(0, 0, 200, 200);
+
+/// What `lager top` shows first.
+#[derive(Clone, Debug, Default)]
+pub struct TopConfig {
+    /// Only topics whose names contain this.
+    pub filter: String,
+    /// Print what so long a time tells, and end.
+    pub once: Option<Duration>,
+}
+
+impl<W: Write> Tools<'_, W> {
+    /// `lager top` on the bus, until a key, the shutdown, or the end of its one picture.
+    ///
+    /// # Errors
+    /// The bus cannot be read, or the terminal cannot be used.
+    pub fn top(&mut self, config: &TopConfig) -> Result<(), ToolError> {
+        let mut model = Model::new(self.bus.robot().as_str());
+        model.view.filter.clone_from(&config.filter);
+        let mut feed = Feed::new(self.bus, self.watchdog)?;
+        feed.look(&mut model)?;
+        let Some(long) = config.once else {
+            let mut screen = Screen::enter()?;
+            return self.watch(&mut model, &mut feed, &mut screen);
+        };
+        let end = Instant::now() + long;
+        while Instant::now() < end && !self.shutdown.is_requested() {
+            feed.drain(&mut model)?;
+            std::thread::sleep(POLL);
+        }
+        feed.look(&mut model)?;
+        model.end_window(Clock::monotonic_ns());
+        Ok(print(&model, self.as_json, self.out)?)
+    }
+
+    fn watch(
+        &mut self,
+        model: &mut Model,
+        feed: &mut Feed<'_>,
+        screen: &mut Screen,
+    ) -> Result<(), ToolError> {
+        let mut looked = Instant::now();
+        let mut is_changed = true;
+        while !self.shutdown.is_requested() {
+            feed.drain(model)?;
+            if looked.elapsed() >= WINDOW {
+                looked = Instant::now();
+                if !self.bus.is_listed() {
+                    return Err(ToolError::Cleared);
+                }
+                feed.look(model)?;
+                model.end_window(Clock::monotonic_ns());
+                is_changed |= !model.view.is_paused;
+            }
+            match screen.key(POLL)? {
+                Some(Stroke::Leave) => return Ok(()),
+                Some(Stroke::Key(key)) => {
+                    if model.press(key) == Pressed::Quit {
+                        return Ok(());
+                    }
+                    feed.follow(model)?;
+                    is_changed = true;
+                }
+                Some(Stroke::Resized) => is_changed = true,
+                None => {}
+            }
+            if is_changed {
+                screen.draw(model)?;
+                is_changed = false;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A recording, sample by sample, and then its table. The figures are those of all of it.
+#[derive(Debug)]
+pub struct Recorded {
+    model: Model,
+    begun_ns: Option<u64>,
+    lost: std::collections::BTreeMap<String, u64>,
+}
+
+impl Recorded {
+    /// Of a file of that name and robot.
+    #[must_use]
+    pub fn new(file: &str, robot: &str, filter: &str) -> Self {
+        let mut model = Model::new(robot);
+        model.file = Some(file.to_owned());
+        filter.clone_into(&mut model.view.filter);
+        Self {
+            model,
+            begun_ns: None,
+            lost: std::collections::BTreeMap::new(),
+        }
+    }
+
+    /// Takes a sample: its stamp, how many of its topic were missed up to it, and its payload.
+    pub fn take(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: Value) {
+        let published = stamp.publish_time_ns;
+        self.begun_ns.get_or_insert(published);
+        let model = &mut self.model;
+        model.now_ns = model.now_ns.max(published);
+        model.hear(topic, stamp);
+        let known = self.lost.entry(topic.to_owned()).or_default();
+        if lost > *known {
+            model.row(topic).lose(lost - *known, published);
+            *known = lost;
+        }
+        let head = &mut model.head;
+        match topic {
+            LinkHealth::NAME => {
+                if let Some(health) = of(payload) {
+                    head.take_health(health, published);
+                }
+            }
+            NavStatus::NAME => head.status = of(payload).or(head.status),
+            MissionQueue::NAME => head.queue = of(payload).or(head.queue),
+            LatencyPath::NAME => head.path = of(payload).or(head.path),
+            _ => {}
+        }
+    }
+
+    /// Prints the table, or shows it until a key or the shutdown.
+    ///
+    /// # Errors
+    /// The output cannot be written, or the terminal cannot be used.
+    pub fn show(
+        mut self,
+        once: bool,
+        as_json: bool,
+        shutdown: &Shutdown,
+        out: &mut impl Write,
+    ) -> io::Result<()> {
+        self.model.end_window(self.model.now_ns);
+        if once {
+            return print(&self.model, as_json, out);
+        }
+        let mut screen = Screen::enter()?;
+        screen.draw(&self.model)?;
+        while !shutdown.is_requested() {
+            match screen.key(WINDOW / 10)? {
+                Some(Stroke::Leave) => break,
+                Some(Stroke::Key(key)) => {
+                    if self.model.press(key) == Pressed::Quit {
+                        break;
+                    }
+                }
+                Some(Stroke::Resized) => {}
+                None => continue,
+            }
+            screen.draw(&self.model)?;
+        }
+        Ok(())
+    }
+}
+
+/// A payload as its type; `None` if another build wrote it.
+fn of<P: for<'de> Deserialize<'de>>(payload: Value) -> Option<P> {
+    P::deserialize(payload.into_deserializer()).ok()
+}
+
+/// One picture, for people or programs.
+fn print(model: &Model, as_json: bool, out: &mut impl Write) -> io::Result<()> {
+    if as_json {
+        return writeln!(out, "{}", json!(model.as_json()));
+    }
+    let mut buffer = Buffer::empty(ONCE);
+    render::draw(model, ONCE, &mut buffer);
+    let text = render::text(&buffer);
+    // The keys stand in the last line, and blank lines above them.
+    let lines: Vec<&str> = text.lines().collect();
+    let keys = lines.len() - 1;
+    out.write_all(lines[..keys].join("\n").trim_end().as_bytes())?;
+    writeln!(out)
+}
+
+/// What a person does at the terminal.
+enum Stroke {
+    Key(Key),
+    Resized,
+    Leave,
+}
+
+/// The terminal while it is a screen; given back when this is dropped.
+struct Screen(DefaultTerminal);
+
+impl Screen {
+    fn enter() -> io::Result<Self> {
+        Ok(Self(ratatui::try_init()?))
+    }
+
+    fn draw(&mut self, model: &Model) -> io::Result<()> {
+        self.0.draw(|frame| {
+            let area = frame.area();
+            render::draw(model, area, frame.buffer_mut());
+        })?;
+        Ok(())
+    }
+
+    /// What is done within `patience`.
+    fn key(&mut self, patience: Duration) -> io::Result<Option<Stroke>> {
+        if !poll(patience)? {
+            return Ok(None);
+        }
+        Ok(match read()? {
+            Event::Key(key) if key.kind != KeyEventKind::Release => stroke(key),
+            Event::Resize(..) => Some(Stroke::Resized),
+            _ => None,
+        })
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        ratatui::restore();
+    }
+}
+
+/// Gives the terminal back if a picture is on it; for a process that ends at once.
+pub fn leave_screen() {
+    if ratatui::crossterm::terminal::is_raw_mode_enabled().unwrap_or(false) {
+        ratatui::restore();
+    }
+}
+
+fn stroke(key: KeyEvent) -> Option<Stroke> {
+    if key.modifiers.contains(KeyModifiers::CONTROL) {
+        // In this mode the terminal makes no signal of it.
+        return matches!(key.code, KeyCode::Char('c')).then_some(Stroke::Leave);
+    }
+    let key = match key.code {
+        KeyCode::Char(letter) => Key::Char(letter),
+        KeyCode::Up => Key::Up,
+        KeyCode::Down => Key::Down,
+        KeyCode::PageUp => Key::PageUp,
+        KeyCode::PageDown => Key::PageDown,
+        KeyCode::Home => Key::Home,
+        KeyCode::End => Key::End,
+        KeyCode::Enter => Key::Enter,
+        KeyCode::Backspace => Key::Backspace,
+        KeyCode::Esc => Key::Escape,
+        KeyCode::F(1) => Key::Char('?'),
+        KeyCode::F(3 | 4) => Key::Char('/'),
+        KeyCode::F(6) => Key::Char('>'),
+        KeyCode::F(10) => Key::Char('q'),
+        _ => return None,
+    };
+    Some(Stroke::Key(key))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,494 @@
+//! The screen of `lager top`: the model as text in a buffer, for any size from 80 x 24 on.
+//!
+//! ```text
+//!  robot, mode, clock, load, how many topics are in trouble
+//!  stop, both links, mission                    (four lines)
+//!  the path's total, or with room each stage
+//!  the table: the most telling columns first, the others where there is room
+//!  the keys, or the filter while it is typed
+//! ```
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Modifier, Style};
+
+use super::head::{shares, span, stages};
+use super::model::{Model, Sort};
+use super::row::{Life, Row, Trouble};
+
+/// From this height on each stage of the path has a line.
+const ROOMY: u16 = 40;
+/// Places of a histogram, from 10 us to 100 ms, eight for each power of ten.
+const PLACES: usize = 32;
+const LEAST_NS: f64 = 1e4;
+const MOST_NS: f64 = 1e8;
+/// Eight heights, and nothing.
+const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+const HELP: &[&str] = &[
+    "Up Down PgUp PgDn Home End   choose a row",
+    "Space Enter                  close it, or open it: a closed one is not read",
+    "+  -                         open, close all rows",
+    "/  F4                        filter: Enter keeps it, Esc drops it; what is",
+    "                             filtered out is not read",
+    "<  >  F6                     sort by the column before, behind",
+    "I                            turn the order round",
+    "p  Z                         pause: the picture stands, counting goes on",
+    "f                            freeze: rows keep their places",
+    "l                            latencies of the path, stage by stage",
+    "q  Esc  F10  Ctrl-C          leave",
+    "",
+    "!  samples were lost in the last 30 s    x  its writer is dead or frozen",
+    "~  less than half of what is expected    -  closed",
+    "LOST counts what was lost on the way, SKIP what this screen was too late",
+    "for, which is usual for a state. QUEUE is how many samples waited at most.",
+];
+
+/// Draws everything.
+pub(crate) fn draw(model: &Model, area: Rect, to: &mut Buffer) {
+    let mut page = Page { area, to, line: 0 };
+    head(model, &mut page);
+    let bottom = area.height.saturating_sub(1);
+    if model.view.shows_help {
+        page.line += 1;
+        for line in HELP {
+            page.put(line, Style::new());
+        }
+    } else {
+        table(model, &mut page, bottom);
+    }
+    page.line = bottom;
+    let (text, style) = footer(model);
+    page.put(&format!("{text:width$}", width = area.width.into()), style);
+}
+
+/// The buffer's lines as text, without colours.
+pub(crate) fn text(buffer: &Buffer) -> String {
+    let mut text = String::new();
+    for y in 0..buffer.area.height {
+        let cells = (0..buffer.area.width).map(|x| buffer[(x, y)].symbol());
+        let line: String = cells.collect();
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+struct Page<'a> {
+    area: Rect,
+    to: &'a mut Buffer,
+    line: u16,
+}
+
+impl Page<'_> {
+    /// Writes the next line.
+    fn put(&mut self, text: &str, style: Style) {
+        self.spans(&[(text.to_owned(), style)]);
+    }
+
+    /// Writes at the right end of the next line.
+    fn mark(&mut self, text: &str, style: Style) {
+        let length = text.chars().count();
+        let x = usize::from(self.area.right()).saturating_sub(length);
+        let y = self.area.y + self.line;
+        if self.line < self.area.height {
+            self.to.set_stringn(x as u16, y, text, length, style);
+        }
+        self.line += 1;
+    }
+
+    fn spans(&mut self, spans: &[(String, Style)]) {
+        if self.line < self.area.height {
+            let mut x = self.area.x;
+            for (text, style) in spans {
+                let left = usize::from(self.area.right().saturating_sub(x));
+                let y = self.area.y + self.line;
+                (x, _) = self.to.set_stringn(x, y, text, left, *style);
+            }
+        }
+        self.line += 1;
+    }
+}
+
+fn plain() -> Style {
+    Style::new()
+}
+
+fn bold() -> Style {
+    Style::new().add_modifier(Modifier::BOLD)
+}
+
+fn dim() -> Style {
+    Style::new().fg(Color::DarkGray)
+}
+
+fn bad() -> Style {
+    Style::new().fg(Color::Red).add_modifier(Modifier::BOLD)
+}
+
+fn head(model: &Model, page: &mut Page<'_>) {
+    let head = &model.head;
+    let now = model.now_ns;
+    let of = match &model.file {
+        Some(file) => format!("of {file}"),
+        None => format!(
+            "load {:.2} on {}",
+            head.load.minute,
+            count(head.load.cores, "core")
+        ),
+    };
+    let pace = head
+        .pace
+        .map_or(String::new(), |pace| format!("  clock x{pace:.2}"));
+    let troubled = model.troubled();
+    let (words, style) = match troubled {
+        0 => ("all topics well".to_owned(), dim()),
+        n => (format!("{} IN TROUBLE", count(n, "topic")), bad()),
+    };
+    page.spans(&[
+        (format!("lager top  {}  ", head.robot), bold()),
+        (format!("{}{pace}  {of}  ", head.mode()), plain()),
+        (words, style),
+    ]);
+    match head.stopped(now) {
+        None => page.put("stop      none", plain()),
+        Some(why) => page.put(&format!("STOPPED   {why}"), bad()),
+    }
+    for (place, name) in ["sensor", "steering"].into_iter().enumerate() {
+        let link = head.link(place, now);
+        let style = match link.starts_with("DOWN") {
+            true => bad(),
+            false => plain(),
+        };
+        page.put(&format!("{name:9} {link}"), style);
+    }
+    page.put(&format!("mission   {}", head.mission()), plain());
+    path(model, page);
+}
+
+/// The latencies of the path: one line, or one for each stage.
+fn path(model: &Model, page: &mut Page<'_>) {
+    let Some(path) = &model.head.path else {
+        return page.put("path      not measured", dim());
+    };
+    let is_roomy = page.area.height >= ROOMY;
+    let shows_all = model.view.shows_path.unwrap_or(is_roomy);
+    let all = stages(path);
+    let shown = match shows_all {
+        true => &all[..],
+        false => &all[5..],
+    };
+    for (name, stage) in shown {
+        let name = match shows_all {
+            true => format!("{:14}", format!("path {name}")),
+            false => "path     ".to_owned(),
+        };
+        let ms = |ns: u64| ns as f64 / 1e6;
+        let bars = bars(&shares::<PLACES>(stage, LEAST_NS, MOST_NS));
+        page.put(
+            &format!(
+                "{name} {bars} p50 {:.3} p99 {:.3} max {:.3} ms",
+                ms(stage.p50_ns),
+                ms(stage.p99_ns),
+                ms(stage.max_ns)
+            ),
+            plain(),
+        );
+    }
+    if shows_all {
+        page.put("               10 us   100 us  1 ms    10 ms", dim());
+    }
+}
+
+/// Shares as bars, as high as they are frequent; a rare one is seen all the same.
+fn bars(shares: &[f64]) -> String {
+    let most = shares.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let bar = |share: &f64| match *share {
+        share if share <= 0.0 => BARS[0],
+        share => BARS[((share / most * 8.0).round() as usize).clamp(1, 8)],
+    };
+    shares.iter().map(bar).collect()
+}
+
+/// A column: its head, its width, what it shows, and what it sorts by.
+struct Column {
+    head: &'static str,
+    width: usize,
+    sort: Option<Sort>,
+    cell: fn(&Row, u64) -> String,
+}
+
+/// In the order in which they stand. The ones with a lower rank are left out first.
+const COLUMNS: &[(u8, Column)] = &[
+    (
+        9,
+        column("TOPIC", 17, Some(Sort::Name), |row, _| row.name.clone()),
+    ),
+    (9, column("WRITER", 15, None, |row, _| writer(row))),
+    (2, column("STATE", 6, None, |row, _| state(row))),
+    (8, column("READERS", 7, None, |row, _| readers(row))),
+    (
+        9,
+        column("HZ", 7, Some(Sort::Hz), |row, _| {
+            measured(row, row.figures.hz)
+        }),
+    ),
+    (
+        8,
+        column("EXPECT", 6, None, |row, _| {
+            row.expected_hz.map_or("-".to_owned(), number)
+        }),
+    ),
+    (
+        9,
+        column("AGE", 6, Some(Sort::Age), |row, now| {
+            row.age(now).map_or("-".to_owned(), short)
+        }),
+    ),
+    (
+        9,
+        column("LOST", 5, Some(Sort::Lost), |row, _| many(row.lost)),
+    ),
+    (1, column("SKIP", 6, None, |row, _| many(row.overrun))),
+    (
+        3,
+        column("QUEUE", 5, None, |row, _| many(row.figures.queue)),
+    ),
+    (
+        3,
+        column("JITTER99", 8, Some(Sort::Jitter), |row, _| {
+            ms(row.figures.jitter_p99_ns)
+        }),
+    ),
+    (
+        3,
+        column("KIB/S", 7, Some(Sort::Bytes), |row, _| {
+            measured(row, row.figures.bytes_per_s / 1024.0)
+        }),
+    ),
+    (
+        3,
+        column("DELAY50", 8, None, |row, _| ms(row.figures.delay_p50_ns)),
+    ),
+    (
+        4,
+        column("DELAY99", 8, Some(Sort::Delay), |row, _| {
+            ms(row.figures.delay_p99_ns)
+        }),
+    ),
+    (
+        3,
+        column("DELAYMAX", 8, None, |row, _| ms(row.figures.delay_max_ns)),
+    ),
+    (
+        1,
+        column("SAMPLES", 9, None, |row, _| row.samples.to_string()),
+    ),
+];
+
+const fn column(
+    head: &'static str,
+    width: usize,
+    sort: Option<Sort>,
+    cell: fn(&Row, u64) -> String,
+) -> Column {
+    Column {
+        head,
+        width,
+        sort,
+        cell,
+    }
+}
+
+/// The columns that fit, in their order.
+fn fitting(width: usize) -> Vec<&'static Column> {
+    let mut kept: Vec<usize> = (0..COLUMNS.len()).collect();
+    let needs = |kept: &[usize]| {
+        1 + kept
+            .iter()
+            .map(|at| COLUMNS[*at].1.width + 1)
+            .sum::<usize>()
+    };
+    while needs(&kept) > width + 1 && kept.len() > 1 {
+        // The last one of the lowest rank.
+        let (place, _) = kept
+            .iter()
+            .enumerate()
+            .rev()
+            .min_by_key(|(_, at)| COLUMNS[**at].0)
+            .expect("there is one");
+        kept.remove(place);
+    }
+    kept.into_iter().map(|at| &COLUMNS[at].1).collect()
+}
+
+fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
+    let columns = fitting(page.area.width.into());
+    let mut head = String::from(" ");
+    for (place, column) in columns.iter().enumerate() {
+        let mark = match column.sort == Some(model.view.sort) {
+            true if model.view.is_reversed => "^",
+            true => "v",
+            false => "",
+        };
+        head += &cell(&format!("{mark}{}", column.head), column.width, place);
+    }
+    let width = usize::from(page.area.width);
+    let head_style = Style::new().add_modifier(Modifier::REVERSED);
+    page.put(&format!("{head:width$}"), head_style);
+    let rows = model.shown();
+    if rows.is_empty() {
+        let why = match model.view.filter.is_empty() {
+            true => "no topic of this robot is open",
+            false => "no topic passes the filter",
+        };
+        return page.put(&format!("  {why}"), dim());
+    }
+    // The chosen row is always in sight.
+    let room = usize::from(bottom.saturating_sub(page.line)).max(1);
+    let chosen = model.view.chosen.as_ref();
+    let at = chosen.and_then(|name| rows.iter().position(|row| row.name == *name));
+    let first = at.map_or(0, |at| (at + 1).saturating_sub(room));
+    let hidden = rows.len().saturating_sub(room);
+    if hidden > 0 {
+        // In the table's head, where there is always room.
+        page.line -= 1;
+        page.mark(&format!(" {hidden} more "), head_style);
+    }
+    for (place, row) in rows.iter().enumerate().skip(first).take(room) {
+        let trouble = row.trouble(model.now_ns);
+        let mark = match trouble {
+            Trouble::Losing => '!',
+            Trouble::Unwritten => 'x',
+            Trouble::Slow => '~',
+            Trouble::None if row.is_open => ' ',
+            Trouble::None => '-',
+        };
+        let mut line = mark.to_string();
+        for (place, column) in columns.iter().enumerate() {
+            line += &cell(&(column.cell)(row, model.now_ns), column.width, place);
+        }
+        let style = match trouble {
+            Trouble::Losing | Trouble::Unwritten => bad(),
+            Trouble::Slow => Style::new().fg(Color::Yellow),
+            Trouble::None if row.is_open => plain(),
+            Trouble::None => dim(),
+        };
+        let style = match at == Some(place) {
+            true => style.add_modifier(Modifier::REVERSED),
+            false => style,
+        };
+        page.put(&format!("{line:width$}"), style);
+    }
+}
+
+/// The two first columns are words and begin at the left.
+fn cell(text: &str, width: usize, place: usize) -> String {
+    let text: String = text.chars().take(width).collect();
+    match place {
+        0 | 1 => format!("{text:width$} "),
+        _ => format!("{text:>width$} "),
+    }
+}
+
+fn writer(row: &Row) -> String {
+    let Some(first) = row.authors.first() else {
+        return "-".to_owned();
+    };
+    let role = first
+        .role
+        .map_or("stranger".to_owned(), |role| role.to_string());
+    let more = match row.authors.len() {
+        1 => String::new(),
+        n => format!("+{}", n - 1),
+    };
+    format!("{role} {}{more}", first.pid)
+}
+
+fn state(row: &Row) -> String {
+    let worst = row.authors.iter().map(|author| author.life).max();
+    match worst {
+        None => "-",
+        Some(Life::Alive) => "alive",
+        Some(Life::Frozen) => "frozen",
+        Some(Life::Dead) => "dead",
+    }
+    .to_owned()
+}
+
+fn readers(row: &Row) -> String {
+    match row.places {
+        Some(places) => format!("{}/{places}", row.readers),
+        None => row.readers.to_string(),
+    }
+}
+
+/// A figure of samples; there is none without samples.
+fn measured(row: &Row, value: f64) -> String {
+    match row.last_ns {
+        Some(_) => number(value),
+        None => "-".to_owned(),
+    }
+}
+
+/// A number in six letters.
+fn number(value: f64) -> String {
+    match value {
+        v if v == 0.0 => "0".to_owned(),
+        v if v < 10.0 => format!("{v:.2}"),
+        v if v < 1_000.0 => format!("{v:.1}"),
+        v => format!("{v:.0}"),
+    }
+}
+
+/// A count in five letters.
+fn many(count: u64) -> String {
+    match count {
+        n if n < 100_000 => n.to_string(),
+        n if n < 10_000_000 => format!("{}k", n / 1_000),
+        n => format!("{}M", n / 1_000_000),
+    }
+}
+
+fn ms(ns: u64) -> String {
+    match ns {
+        0 => "-".to_owned(),
+        ns => format!("{:.3}", ns as f64 / 1e6),
+    }
+}
+
+fn short(age: std::time::Duration) -> String {
+    span(age).replace(' ', "")
+}
+
+fn count(number: usize, thing: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{number} {thing}{plural}")
+}
+
+fn footer(model: &Model) -> (String, Style) {
+    let view = &model.view;
+    if view.is_typing {
+        let text = format!("filter: {}_   Enter keeps it, Esc drops it", view.filter);
+        return (text, Style::new().add_modifier(Modifier::REVERSED));
+    }
+    let mut states = Vec::new();
+    if view.is_paused {
+        states.push("PAUSED".to_owned());
+    }
+    if view.is_frozen {
+        states.push("FROZEN".to_owned());
+    }
+    if !view.filter.is_empty() {
+        states.push(format!("filter {}", view.filter));
+    }
+    let states = match states.is_empty() {
+        true => String::new(),
+        false => format!("[{}] ", states.join(", ")),
+    };
+    let text = format!(
+        "{states}?:help /:filter <>:sort {} Space:close p:pause f:freeze l:path q:quit",
+        view.sort.name()
+    );
+    (text, dim())
+}

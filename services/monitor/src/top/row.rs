@@ -1,0 +1,359 @@
+//! One topic of `lager top`: what its stamps and its ends tell. Pure: times are arguments.
+
+use std::time::Duration;
+
+use lager_ports::TopicInfo;
+use lager_topics::{Role, Stamp, TopicEntry};
+use serde_json::{Value, json};
+
+use crate::delay::Stage;
+
+/// How long a loss stays in sight.
+const REMEMBERED: Duration = Duration::from_secs(30);
+/// A rate below this part of the expected one is too slow.
+const SLOW: f64 = 0.5;
+/// After so long without a sample there is no rate any more, in ns.
+const SILENT_NS: u64 = 10_000_000_000;
+
+/// Whether a process that writes a topic goes on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Life {
+    /// It does.
+    #[default]
+    Alive,
+    /// Somebody has stopped it.
+    Frozen,
+    /// It was killed, and what it left is not swept yet.
+    Dead,
+}
+
+/// A process that writes the topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Author {
+    pub(crate) role: Option<Role>,
+    pub(crate) pid: u32,
+    pub(crate) life: Life,
+}
+
+/// What the samples of one window tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Figures {
+    pub(crate) hz: f64,
+    /// How far all but one in a hundred gaps between two samples are from the mean one.
+    pub(crate) jitter_p99_ns: u64,
+    pub(crate) bytes_per_s: f64,
+    /// Most samples that waited for a look.
+    pub(crate) queue: u64,
+    /// From the source to the publication.
+    pub(crate) delay_p50_ns: u64,
+    pub(crate) delay_p99_ns: u64,
+    pub(crate) delay_max_ns: u64,
+}
+
+/// What is wrong with a topic, the worst first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Trouble {
+    /// Samples were lost a moment ago.
+    Losing,
+    /// Its writer is dead or frozen.
+    Unwritten,
+    /// It comes far less often than it should.
+    Slow,
+    /// Nothing.
+    None,
+}
+
+/// One topic.
+#[derive(Debug)]
+pub(crate) struct Row {
+    pub(crate) name: String,
+    /// Its place in the table; behind all others for what is in no table.
+    pub(crate) place: usize,
+    /// Whether its samples are looked at.
+    pub(crate) is_open: bool,
+    pub(crate) authors: Vec<Author>,
+    pub(crate) readers: usize,
+    /// Places for readers, where they are known.
+    pub(crate) places: Option<usize>,
+    pub(crate) expected_hz: Option<f64>,
+    /// Samples that wait at most.
+    buffer: u64,
+    /// Of a sample, with its stamp.
+    pub(crate) bytes: usize,
+    /// Samples of which a reader is sure that they were lost.
+    pub(crate) lost: u64,
+    /// Samples that were overwritten in this process's own full queue; usual for a state.
+    pub(crate) overrun: u64,
+    lost_at_ns: Option<u64>,
+    pub(crate) samples: u64,
+    pub(crate) last_ns: Option<u64>,
+    pub(crate) figures: Figures,
+    window: Window,
+}
+
+#[derive(Debug, Default)]
+struct Window {
+    samples: u64,
+    /// The last sample before the window.
+    before_ns: Option<u64>,
+    first_ns: u64,
+    gaps: Vec<u64>,
+    queue: u64,
+    delays: Stage,
+}
+
+impl Row {
+    pub(crate) fn new(name: &str, entry: Option<&(usize, &TopicEntry)>) -> Self {
+        let layout = entry.map(|(_, entry)| entry.layout.size + size_of::<Stamp>());
+        Self {
+            name: name.to_owned(),
+            place: entry.map_or(usize::MAX, |(place, _)| *place),
+            is_open: true,
+            authors: Vec::new(),
+            readers: 0,
+            places: entry.map(|(_, entry)| entry.qos.max_subscribers()),
+            expected_hz: entry
+                .and_then(|(_, entry)| entry.period_ms)
+                .map(|ms| 1_000.0 / f64::from(ms)),
+            buffer: entry.map_or(u64::MAX, |(_, entry)| entry.qos.buffer as u64),
+            bytes: layout.unwrap_or_default(),
+            lost: 0,
+            overrun: 0,
+            lost_at_ns: None,
+            samples: 0,
+            last_ns: None,
+            figures: Figures::default(),
+            window: Window::default(),
+        }
+    }
+
+    /// Takes who writes and reads it now.
+    pub(crate) fn take_ends(&mut self, info: &TopicInfo, life: impl Fn(u32) -> Life) {
+        self.readers = info.subscribers;
+        if let Some(description) = &info.description {
+            self.bytes = description.size() + size_of::<Stamp>();
+        }
+        let authors = info.writers.iter().map(|peer| Author {
+            role: peer.role,
+            pid: peer.pid,
+            life: life(peer.pid),
+        });
+        self.authors = authors.collect();
+    }
+
+    /// Takes a sample.
+    pub(crate) fn hear(&mut self, stamp: &Stamp) {
+        let published = stamp.publish_time_ns;
+        let window = &mut self.window;
+        match self.last_ns {
+            Some(last) => window.gaps.push(published.saturating_sub(last)),
+            None => window.first_ns = published,
+        }
+        if window.samples == 0 {
+            window.before_ns = self.last_ns;
+        }
+        window
+            .delays
+            .add(published.saturating_sub(stamp.source_time_ns));
+        window.samples += 1;
+        self.samples += 1;
+        self.last_ns = Some(published);
+    }
+
+    /// Is not looked at for a while: what is known of rates and ages is void.
+    pub(crate) fn rest(&mut self) {
+        self.last_ns = None;
+        self.figures = Figures::default();
+        self.window = Window::default();
+    }
+
+    /// Takes what one look has found: so many samples, and so many losses before them. Losses while
+    /// as many waited as the queue holds are this process's own: it was late.
+    pub(crate) fn look(&mut self, found: u64, lost: u64, now_ns: u64) {
+        self.window.queue = self.window.queue.max(found);
+        if lost == 0 {
+            return;
+        }
+        if found >= self.buffer {
+            self.overrun += lost;
+        } else {
+            self.lose(lost, now_ns);
+        }
+    }
+
+    /// Counts losses that are nobody's but the topic's.
+    pub(crate) fn lose(&mut self, lost: u64, now_ns: u64) {
+        self.lost += lost;
+        self.lost_at_ns = Some(now_ns);
+    }
+
+    /// Ends a window and begins the next one.
+    pub(crate) fn end_window(&mut self, now_ns: u64) {
+        let window = std::mem::take(&mut self.window);
+        let last = self.last_ns.unwrap_or_default();
+        let mut gaps = window.gaps;
+        let hz = match (window.samples, window.before_ns) {
+            (0, _) => {
+                // It may only be slow.
+                let silent = now_ns.saturating_sub(last);
+                let at_most = 1e9 / silent.max(1) as f64;
+                match silent < SILENT_NS {
+                    true => self.figures.hz.min(at_most),
+                    false => 0.0,
+                }
+            }
+            (samples, Some(before)) => rate(samples, before, last),
+            (samples, None) => rate(samples - 1, window.first_ns, last),
+        };
+        let mean = gaps.iter().sum::<u64>() / (gaps.len() as u64).max(1);
+        for gap in &mut gaps {
+            *gap = gap.abs_diff(mean);
+        }
+        gaps.sort_unstable();
+        let p99 = gaps.len().saturating_sub(1) * 99 / 100;
+        self.figures = Figures {
+            hz,
+            jitter_p99_ns: gaps.get(p99).copied().unwrap_or_default(),
+            bytes_per_s: hz * self.bytes as f64,
+            queue: window.queue,
+            delay_p50_ns: window.delays.at(50.0),
+            delay_p99_ns: window.delays.at(99.0),
+            delay_max_ns: window.delays.max(),
+        };
+    }
+
+    /// How old the last sample is.
+    pub(crate) fn age(&self, now_ns: u64) -> Option<Duration> {
+        let last = self.last_ns?;
+        Some(Duration::from_nanos(now_ns.saturating_sub(last)))
+    }
+
+    /// Whether samples were lost a moment ago.
+    pub(crate) fn is_losing(&self, now_ns: u64) -> bool {
+        let since = |at: u64| Duration::from_nanos(now_ns.saturating_sub(at));
+        self.lost_at_ns.is_some_and(|at| since(at) < REMEMBERED)
+    }
+
+    /// What is wrong with it.
+    pub(crate) fn trouble(&self, now_ns: u64) -> Trouble {
+        if self.is_losing(now_ns) {
+            return Trouble::Losing;
+        }
+        let is_gone = |author: &Author| author.life != Life::Alive;
+        if !self.authors.is_empty() && self.authors.iter().all(is_gone) {
+            return Trouble::Unwritten;
+        }
+        let expected = self.expected_hz.unwrap_or_default();
+        let is_measured = self.is_open && self.samples > 1;
+        match is_measured && self.figures.hz < expected * SLOW {
+            true => Trouble::Slow,
+            false => Trouble::None,
+        }
+    }
+
+    /// For programs.
+    pub(crate) fn as_json(&self, now_ns: u64) -> Value {
+        let authors = self.authors.iter().map(|author| {
+            json!({
+                "role": author.role.map(|role| role.to_string()), "pid": author.pid,
+                "state": format!("{:?}", author.life).to_lowercase(),
+            })
+        });
+        let figures = &self.figures;
+        json!({
+            "topic": self.name, "open": self.is_open, "writers": authors.collect::<Vec<_>>(),
+            "subscribers": self.readers, "subscriber_places": self.places,
+            "samples": self.samples, "hz": figures.hz, "expected_hz": self.expected_hz,
+            "age_ns": self.age(now_ns).map(|age| age.as_nanos() as u64),
+            "jitter_p99_ns": figures.jitter_p99_ns, "bytes_per_s": figures.bytes_per_s,
+            "lost": self.lost, "overrun": self.overrun, "queue": figures.queue,
+            "delay_p50_ns": figures.delay_p50_ns, "delay_p99_ns": figures.delay_p99_ns,
+            "delay_max_ns": figures.delay_max_ns,
+            "trouble": match self.trouble(now_ns) {
+                Trouble::None => Value::Null,
+                trouble => json!(format!("{trouble:?}").to_lowercase()),
+            },
+        })
+    }
+}
+
+/// So many samples from one moment to another, as samples a second.
+fn rate(samples: u64, from_ns: u64, to_ns: u64) -> f64 {
+    match to_ns.saturating_sub(from_ns) {
+        0 => 0.0,
+        span => samples as f64 * 1e9 / span as f64,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_topics::TOPICS;
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn row(name: &str) -> Row {
+        let mut entries = TOPICS.iter().enumerate();
+        let entry = entries.find(|(_, entry)| entry.name == name);
+        Row::new(name, entry.as_ref())
+    }
+
+    fn stamp(publish_time_ns: u64) -> Stamp {
+        Stamp {
+            publish_time_ns,
+            source_time_ns: publish_time_ns - MS,
+            ..Stamp::default()
+        }
+    }
+
+    #[test]
+    fn a_window_tells_rate_jitter_bytes_and_delays() {
+        let mut row = row("sensor/line");
+        for at in [0, 10, 20, 34, 40_u64] {
+            row.hear(&stamp((100 + at) * MS));
+        }
+        row.look(5, 0, 140 * MS);
+        row.end_window(1_100 * MS);
+        assert!((row.figures.hz - 100.0).abs() < 1e-6, "{:?}", row.figures);
+        assert_eq!(row.figures.jitter_p99_ns / MS, 4);
+        assert_eq!(row.figures.queue, 5);
+        assert_eq!(row.figures.delay_max_ns / MS, 1);
+        assert!((row.figures.bytes_per_s - 100.0 * row.bytes as f64).abs() < 1e-6);
+        // One sample in the next window, a second after the last one.
+        row.hear(&stamp(1_140 * MS));
+        row.end_window(1_200 * MS);
+        assert!((row.figures.hz - 1.0 / 1.0).abs() < 0.01);
+        assert_eq!(row.trouble(1_200 * MS), Trouble::Slow);
+    }
+
+    #[test]
+    fn losses_in_ones_own_full_queue_are_told_apart() {
+        let mut state = row("nav/status");
+        state.look(1, 30, MS);
+        assert_eq!((state.lost, state.overrun), (0, 30));
+        assert_eq!(state.trouble(MS), Trouble::None);
+        let mut stream = row("steering/command");
+        stream.look(3, 2, MS);
+        assert_eq!((stream.lost, stream.overrun), (2, 0));
+        assert_eq!(stream.trouble(MS), Trouble::Losing);
+        let later = MS + REMEMBERED.as_nanos() as u64;
+        assert_eq!(stream.trouble(later), Trouble::None);
+        stream.look(16, 5, MS);
+        assert_eq!((stream.lost, stream.overrun), (2, 5));
+    }
+
+    #[test]
+    fn a_topic_whose_writers_are_gone_is_in_trouble() {
+        let mut row = row("nav/map");
+        let author = |life| Author {
+            role: Some(Role::Comm),
+            pid: 7,
+            life,
+        };
+        row.authors = vec![author(Life::Dead), author(Life::Alive)];
+        assert_eq!(row.trouble(0), Trouble::None);
+        row.authors = vec![author(Life::Dead), author(Life::Frozen)];
+        assert_eq!(row.trouble(0), Trouble::Unwritten);
+    }
+}

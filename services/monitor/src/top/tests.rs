@@ -1,0 +1,283 @@
+//! The screen as text at two sizes, and what the keys do to it.
+//!
+//! The pictures in `pictures/` are what the screen showed when they were taken; `LAGER_PICTURES=take`
+//! takes them anew.
+
+use std::path::Path;
+
+use lager_ports::{Layout, Peer, RobotName, TopicInfo};
+use lager_topics::{
+    Health, Mode, NavigatorStatus, OrderQueue, PathLatency, Phase, Role, StageLatency, Stamp,
+    StopCause, TOPICS,
+};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+
+use super::head::Load;
+use super::model::{Key, Model, Pressed};
+use super::render;
+use super::row::Life;
+
+const MS: u64 = 1_000_000;
+const S: u64 = 1_000 * MS;
+
+/// Who writes the topics of the table.
+fn author(topic: &str) -> (Role, u32) {
+    match topic {
+        name if name.starts_with("nav/") || name.starts_with("mission/e") => (Role::Logic, 4_103),
+        "steering/command" | "mission/queue" | "log/thought" => (Role::Logic, 4_103),
+        "mission/order" | "operator/input" => (Role::Comm, 4_105),
+        "truth/pose" => (Role::Simulator, 4_101),
+        _ => (Role::Bridge, 4_102),
+    }
+}
+
+fn info(topic: &str, writers: Vec<Peer>) -> TopicInfo {
+    TopicInfo {
+        robot: "r1".parse::<RobotName>().expect("a name"),
+        name: topic.to_owned(),
+        entry: TOPICS.iter().find(|entry| entry.name == topic),
+        layout: Layout::Ours,
+        description: None,
+        publishers: writers.len(),
+        subscribers: 3,
+        observers: 1,
+        writers,
+        readers: Vec::new(),
+        woken: Vec::new(),
+    }
+}
+
+/// A robot that drives, ten seconds after the start of time; `weather/now` loses one in five.
+fn driving() -> Model {
+    let mut model = Model::new("r1");
+    let mut topics: Vec<TopicInfo> = TOPICS
+        .iter()
+        .map(|entry| {
+            let (role, pid) = author(entry.name);
+            let role = Some(role);
+            info(entry.name, vec![Peer { role, pid }])
+        })
+        .collect();
+    let role = Some(Role::Guest);
+    topics.push(info("weather/now", vec![Peer { role, pid: 4_200 }]));
+    model.take_ends(&topics, |_| Life::Alive);
+    for entry in TOPICS {
+        let Some(period) = entry.period_ms else {
+            continue;
+        };
+        let period = u64::from(period) * MS;
+        for number in 1..=S / period {
+            // Every tenth comes a little late.
+            let late = if number % 10 == 0 { MS / 2 } else { 0 };
+            let at = 9 * S + number * period + late;
+            let stamp = Stamp {
+                sequence: number,
+                publish_time_ns: at,
+                source_time_ns: at - 300_000 - late / 4,
+                ..Stamp::default()
+            };
+            model.hear(entry.name, &stamp);
+            model.row(entry.name).look(1, 0, at);
+        }
+    }
+    for number in (0..100_u64).filter(|number| number % 5 > 0) {
+        let at = 9 * S + number * 10 * MS;
+        let stamp = Stamp {
+            sequence: number,
+            publish_time_ns: at,
+            source_time_ns: at,
+            ..Stamp::default()
+        };
+        model.hear("weather/now", &stamp);
+        let lost = u64::from(number % 5 == 1);
+        model.row("weather/now").look(1, lost, at);
+    }
+    let mut health = Health {
+        mode: Mode::Autonomous.into(),
+        ..Health::default()
+    };
+    for board in [&mut health.sensor, &mut health.steering] {
+        (board.up, board.packets, board.epoch) = (1, 1_000, 1);
+        board.board_load_percent = 12;
+    }
+    health.sensor.lost_total = 2;
+    health.sensor.bad_crc = 1;
+    model.head.take_health(health, 10 * S - 40 * MS);
+    model.head.status = Some(NavigatorStatus {
+        phase: Phase::Driving.into(),
+        x: 3,
+        y: 1,
+        delivered: 4,
+        ..NavigatorStatus::default()
+    });
+    model.head.queue = Some(OrderQueue {
+        order_id: 7,
+        product: 2,
+        under_way: 1,
+        count: 3,
+        ..OrderQueue::default()
+    });
+    let stage = |scale: u64| StageLatency {
+        count: 1_000,
+        min_ns: 20_000 * scale,
+        p50_ns: 60_000 * scale,
+        p90_ns: 90_000 * scale,
+        p99_ns: 250_000 * scale,
+        p999_ns: 700_000 * scale,
+        max_ns: 2_100_000 * scale,
+        mean_ns: 70_000 * scale,
+    };
+    model.head.path = Some(PathLatency {
+        since_start: 1_000,
+        read_publish: stage(1),
+        publish_receive: stage(1),
+        decide: stage(1),
+        order_receive: stage(2),
+        receive_write: stage(1),
+        total: stage(5),
+        ..PathLatency::default()
+    });
+    model.head.load = Load {
+        minute: 0.84,
+        cores: 4,
+    };
+    model.head.pace = Some(1.0);
+    model.end_window(10 * S + 5 * MS);
+    model
+}
+
+fn picture(model: &Model, width: u16, height: u16) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a screen");
+    let drawn = terminal.draw(|frame| render::draw(model, frame.area(), frame.buffer_mut()));
+    let text = render::text(drawn.expect("drawn").buffer);
+    assert!(
+        text.lines()
+            .all(|line| line.chars().count() <= width.into())
+    );
+    text
+}
+
+/// Compares with the picture that was kept.
+fn check(name: &str, seen: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/top/pictures");
+    let path = folder.join(name);
+    if std::env::var_os("LAGER_PICTURES").is_some() {
+        std::fs::create_dir_all(&folder).expect("a folder");
+        std::fs::write(&path, seen).expect("a file");
+    }
+    let kept = std::fs::read_to_string(&path).expect("a kept picture");
+    assert_eq!(seen, kept, "{name} shows something else now:\n{seen}");
+}
+
+fn press(model: &mut Model, keys: &str) {
+    for key in keys.chars() {
+        assert_eq!(model.press(Key::Char(key)), Pressed::Taken);
+    }
+}
+
+#[test]
+fn a_driving_robot_at_both_sizes() {
+    let model = driving();
+    check("driving-80x24.txt", &picture(&model, 80, 24));
+    check("driving-200x60.txt", &picture(&model, 200, 60));
+}
+
+#[test]
+fn the_keys_explain_themselves_and_a_stop_is_seen() {
+    let mut model = driving();
+    press(&mut model, "?");
+    check("help-80x24.txt", &picture(&model, 80, 24));
+    press(&mut model, "x");
+    let mut health = model.head.health.expect("a state");
+    (health.stopped, health.stop_cause) = (1, StopCause::BoardResets.into());
+    health.steering.up = 0;
+    model.head.take_health(health, 10 * S);
+    press(&mut model, "p");
+    check("stopped-80x24.txt", &picture(&model, 80, 24));
+}
+
+/// The topics in the order of the screen.
+fn topics(model: &Model) -> Vec<String> {
+    model.shown().iter().map(|row| row.name.clone()).collect()
+}
+
+#[test]
+fn what_loses_samples_stands_first_and_is_marked() {
+    let mut model = driving();
+    assert_eq!(topics(&model)[..2], ["weather/now", "sensor/line"]);
+    let text = picture(&model, 80, 24);
+    assert!(text.contains("1 topic IN TROUBLE"), "{text}");
+    let marked: Vec<&str> = text.lines().filter(|line| line.starts_with('!')).collect();
+    assert!(
+        marked.len() == 1 && marked[0].contains("weather/now"),
+        "{text}"
+    );
+    // Frozen rows keep their places, whatever happens to them.
+    press(&mut model, "f");
+    model.row("truth/pose").lose(3, 10 * S);
+    model.end_window(11 * S);
+    assert_eq!(topics(&model)[1], "sensor/line");
+    press(&mut model, "f");
+    assert_eq!(topics(&model)[..2], ["truth/pose", "weather/now"]);
+}
+
+#[test]
+fn rows_are_sorted_by_what_one_asks_for() {
+    let mut model = driving();
+    press(&mut model, ">");
+    assert_eq!(topics(&model)[0], "latency/path");
+    press(&mut model, ">");
+    assert_eq!(topics(&model)[0], "steering/state");
+    press(&mut model, "I");
+    assert_eq!(
+        topics(&model).last().map(String::as_str),
+        Some("steering/state")
+    );
+    press(&mut model, "I<<<");
+    assert_eq!(model.view.sort.name(), "delay");
+}
+
+#[test]
+fn only_rows_that_are_shown_and_open_are_read() {
+    let mut model = driving();
+    let wanted = |model: &Model| -> Vec<String> { model.wanted().map(str::to_owned).collect() };
+    assert_eq!(wanted(&model).len(), TOPICS.len() + 1);
+    press(&mut model, "/sensor");
+    assert_eq!(wanted(&model), ["sensor/distance", "sensor/line"]);
+    assert_eq!(model.press(Key::Enter), Pressed::Taken);
+    // The first row is closed, and then the one that is chosen.
+    press(&mut model, " ");
+    assert_eq!(wanted(&model), ["sensor/distance"]);
+    let text = picture(&model, 80, 24);
+    assert!(
+        text.lines().any(|line| line.starts_with("-sensor/line")),
+        "{text}"
+    );
+    assert!(text.contains("filter sensor"), "{text}");
+    model.press(Key::Down);
+    model.press(Key::Down);
+    press(&mut model, " ");
+    assert!(wanted(&model).is_empty());
+    press(&mut model, "+");
+    assert_eq!(wanted(&model).len(), 2);
+    press(&mut model, "/");
+    model.press(Key::Escape);
+    assert_eq!(wanted(&model).len(), TOPICS.len() + 1);
+    press(&mut model, "-");
+    assert!(wanted(&model).is_empty());
+    assert_eq!(model.press(Key::Char('q')), Pressed::Quit);
+}
+
+#[test]
+fn the_chosen_row_is_always_in_sight() {
+    let mut model = driving();
+    for _ in 0..3 {
+        model.press(Key::End);
+        let chosen = model.view.chosen.clone().expect("a row");
+        assert_eq!(topics(&model).last(), Some(&chosen));
+        assert!(picture(&model, 80, 16).contains(&chosen));
+    }
+    model.press(Key::Home);
+    assert!(picture(&model, 80, 16).contains("weather/now"));
+}
