@@ -270,7 +270,11 @@ impl Follow {
         let travelled = helm.senses.odometer.travelled_mm;
         let without = travelled - *self.lost_at.get_or_insert(travelled);
         let most = helm.config.line_lost_mm;
-        (without > most).then_some(Outcome::Failed(FailureKind::LineLost, most, without))
+        let kind = match helm.senses.tape_seen {
+            true => FailureKind::LineLost,
+            false => FailureKind::LineUnseen,
+        };
+        (without > most).then_some(Outcome::Failed(kind, most, without))
     }
 
     /// Whether the line has ended at the node where it should, and the node's mark may have passed
