@@ -135,6 +135,7 @@ class FailureKind(enum.IntEnum):
     Unreachable = 28
     MarkUnseen = 29
     CornerUnseen = 30
+    LineUnseen = 31
 
 
 class Remedy(enum.IntEnum):
@@ -151,6 +152,7 @@ class Remedy(enum.IntEnum):
     Resume = 10
     Mode = 11
     Link = 12
+    Calibrate = 13
 
 
 class Phase(enum.IntEnum):
@@ -309,6 +311,7 @@ class ThoughtKind(enum.IntEnum):
     CornerMissed = 55
     PicksByHand = 56
     PicksByItself = 57
+    OrderKept = 58
 
 
 class Joint(enum.IntEnum):

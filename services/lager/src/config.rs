@@ -189,19 +189,29 @@ pub struct LogicSection {
     pub ranger_cm: u8,
     /// After how many seconds ways that were found blocked are tried again.
     pub try_again_s: u32,
-    /// Who picks the goods up.
-    pub pick: PickBy,
+    /// Who picks the goods up; none = as usual with the body ([`Config::pick`]).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pick: Option<PickBy>,
 }
 
 /// Who picks the goods up: `lager_topics::Pick` as a word of the configuration and of a command.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PickBy {
     /// A person moves the arm and says when it is done.
-    #[default]
     Manual,
     /// The robot, by itself.
     Auto,
+}
+
+impl PickBy {
+    /// As it stands in the file.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Manual => "manual",
+            Self::Auto => "auto",
+        }
+    }
 }
 
 impl From<PickBy> for lager_topics::Pick {
@@ -280,7 +290,7 @@ impl Default for LogicSection {
             low_battery_decivolts: config.low_battery_decivolts,
             ranger_cm: 80,
             try_again_s: config.try_again.as_secs() as u32,
-            pick: PickBy::default(),
+            pick: None,
         }
     }
 }
@@ -409,6 +419,14 @@ impl Config {
         warehouse(&self.warehouse)
     }
 
+    /// Who picks the goods up: as told, or else as it is usual with the body.
+    pub fn pick(&self) -> PickBy {
+        self.logic.pick.unwrap_or(match self.body {
+            Body::Serial => PickBy::Manual,
+            Body::Sim | Body::Chip => PickBy::Auto,
+        })
+    }
+
     /// What the navigator is told.
     pub fn navigator(&self) -> lager_logic::LogicConfig {
         lager_logic::LogicConfig {
@@ -417,7 +435,7 @@ impl Config {
             low_battery_decivolts: self.logic.low_battery_decivolts,
             ranger_cm: self.logic.ranger_cm,
             try_again: Duration::from_secs(self.logic.try_again_s.into()),
-            pick: self.logic.pick.into(),
+            pick: self.pick().into(),
             arm: self.arm,
             waiting: self.bus.policy(),
             ..lager_logic::LogicConfig::default()
@@ -539,6 +557,20 @@ mod tests {
         for text in rates.iter().chain(&rangers) {
             let config: Config = toml::from_str(text).expect("valid TOML");
             config.validate().expect("a robot that there is");
+        }
+    }
+
+    #[test]
+    fn who_picks_is_as_told_and_else_as_usual_with_the_body() {
+        for (text, pick) in [
+            ("", PickBy::Auto),
+            ("body = \"chip\"", PickBy::Auto),
+            ("body = \"serial\"", PickBy::Manual),
+            ("[logic]\npick = \"manual\"", PickBy::Manual),
+            ("body = \"serial\"\n[logic]\npick = \"auto\"", PickBy::Auto),
+        ] {
+            let config: Config = toml::from_str(text).expect("valid TOML");
+            assert_eq!(config.navigator().pick, pick.into(), "{text}");
         }
     }
 

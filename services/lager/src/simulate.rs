@@ -8,7 +8,7 @@
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use lager_bridge::listener::{Heard, Listener};
 use lager_bridge::machine::{Action, BridgeCore, CoreOptions};
 use lager_bridge::{Counts, Moment, PortEvent};
@@ -22,7 +22,7 @@ use lager_topics::{
 use serde::Serialize;
 
 use crate::cli::SimulateArgs;
-use crate::config::{self, Config};
+use crate::config::{self, Config, PickBy};
 use crate::exit;
 use crate::map::bus_map;
 use crate::mission::{Act, Mission, Seen, Watch};
@@ -68,6 +68,13 @@ struct Line<'a> {
 
 /// Runs every seed in every warehouse; fails when a mission is not delivered.
 pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
+    if config.logic.pick == Some(PickBy::Manual) {
+        bail!(exit::Usage(
+            "[logic] pick is \"manual\", and in virtual time nobody is there who would move the arm; \
+             leave the key out"
+                .into()
+        ));
+    }
     let names = if args.warehouse.is_empty() {
         vec![config.warehouse.clone()]
     } else {

@@ -33,9 +33,9 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     apply(&mut config, args)?;
     config.validate()?;
     let products = products(&config, args)?;
-    if products.is_some() {
-        // Nobody is there who would move the arm.
-        config.logic.pick = PickBy::Auto;
+    if args.script {
+        // Nobody is to be in its way, so nobody is there who would move the arm.
+        config.logic.pick.get_or_insert(PickBy::Auto);
     }
     rehearse(&config)?;
 

@@ -24,8 +24,10 @@ pub(crate) struct Standing {
 /// What a report says of the order in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum News {
-    /// It is at work, or the report is too early to tell.
+    /// The report is too early to tell.
     None,
+    /// It is at work.
+    AtWork,
     /// It has ended.
     Ended(Finish),
     /// The bridge has not reported it for too long.
@@ -115,6 +117,7 @@ impl Standing {
         let operator_has_the_arm = self.arm_granted && report.current_origin == Origin::Operator;
         if at_work || operator_has_the_arm {
             self.heard = now;
+            return News::AtWork;
         }
         if now.saturating_sub(self.heard) > patience {
             News::Unheard
@@ -205,7 +208,7 @@ mod tests {
             standing.news(Duration::ZERO, &report(current, finished, finish), PATIENCE)
         };
         assert_eq!(news(4, 3, Finish::Done), News::None);
-        assert_eq!(news(5, 4, Finish::Aborted), News::None);
+        assert_eq!(news(5, 4, Finish::Aborted), News::AtWork);
         assert_eq!(news(5, 5, Finish::None), News::None);
         assert_eq!(news(5, 5, Finish::Done), News::Ended(Finish::Done));
     }
@@ -219,7 +222,7 @@ mod tests {
             standing.news(Duration::from_millis(ms), &report, PATIENCE)
         };
         assert_eq!(at(1250, 4), News::None);
-        assert_eq!(at(1260, 5), News::None);
+        assert_eq!(at(1260, 5), News::AtWork);
         assert_eq!(at(1550, 4), News::None);
         assert_eq!(at(1561, 4), News::Unheard);
     }

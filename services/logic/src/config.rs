@@ -96,7 +96,8 @@ pub struct LogicConfig {
     /// What the robot still moved, on average, between the last status of a killed navigator and
     /// the end of its order's lease.
     pub outage: Duration,
-    /// How often a turn or a drop is begun anew before the robot gives up.
+    /// How often an order is given anew that the board does not carry out, before the robot gives
+    /// up.
     pub tries: u8,
     /// How often the pick station may be passed without being found.
     pub misses: u8,

@@ -78,6 +78,9 @@ coded! {
         MarkUnseen = 29,
         /// The delivery corner's mark has not come on the way back, and the way on is blocked.
         CornerUnseen = 30,
+        /// No tape has been seen since the robot was put down, in `seen` mm; `expected` is the most
+        /// that is borne.
+        LineUnseen = 31,
     }
 }
 
@@ -110,6 +113,8 @@ coded! {
         Mode = 11,
         /// The external computer is there again.
         Link = 12,
+        /// The line sensors are calibrated, and the robot is put on a node as for a reset.
+        Calibrate = 13,
     }
 }
 
@@ -147,6 +152,7 @@ impl FailureKind {
             | Self::OffTheMap
             | Self::StateLost
             | Self::NeedsReset => Remedy::Reset,
+            Self::LineUnseen => Remedy::Calibrate,
             Self::NoWay | Self::Unreachable => Remedy::Way,
             Self::NoMap
             | Self::UnknownProduct
@@ -203,8 +209,11 @@ impl fmt::Display for Failure {
             FailureKind::None => write!(formatter, "nothing is wrong"),
             FailureKind::LineLost => write!(
                 formatter,
-                "I have lost the line behind ({x}, {y}): {seen} mm without it; \
-                 where it is there, calibrate the line sensors"
+                "I have lost the line behind ({x}, {y}): {seen} mm without it"
+            ),
+            FailureKind::LineUnseen => write!(
+                formatter,
+                "I see no tape behind ({x}, {y}), in {seen} mm: calibrate the line sensors"
             ),
             FailureKind::NodeMissing => write!(
                 formatter,
@@ -325,6 +334,9 @@ impl fmt::Display for Remedy {
             Self::Resume => "Release the stop.",
             Self::Mode => "Give me the autonomous mode.",
             Self::Link => "I go on when the external computer is there again.",
+            Self::Calibrate => {
+                "Put me on the delivery node, looking into the warehouse, calibrate and press reset."
+            }
         })
     }
 }

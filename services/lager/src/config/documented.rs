@@ -130,8 +130,9 @@ ranger_cm = {ranger}
 # unreachable.
 try_again_s = {try_again}
 # Who picks the goods up: \"manual\" (a person moves the arm and says when it is done) or \"auto\" (the
-# robot by itself). With a mission from the start the robot picks by itself.
-pick = {pick}
+# robot by itself). Unset, a person does on real boards, unless `--script` has it drive by itself, and
+# simulated and emulated robots do it by themselves.
+{pick}
 
 [simulator]
 # Seed of all noise: the same seed is the same robot.
@@ -224,10 +225,7 @@ debounce_ms = {debounce}
             low_battery = self.logic.low_battery_decivolts,
             ranger = self.logic.ranger_cm,
             try_again = self.logic.try_again_s,
-            pick = match self.logic.pick {
-                PickBy::Manual => "\"manual\"",
-                PickBy::Auto => "\"auto\"",
-            },
+            pick = unset("pick", self.logic.pick.map(PickBy::key)),
             seed = self.simulator.seed,
             obstacles = self.simulator.obstacles,
             emulator = unset_path("emulator", &self.chip.emulator),

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use lager_plant::{Floor, Warehouse};
-use lager_topics::Hold;
+use lager_topics::{FailureKind, Hold, Remedy};
 
 use super::Whole;
 use crate::config::Config;
@@ -29,11 +29,11 @@ fn robot(floor: Floor, seed: u64) -> Whole {
 #[test]
 fn worn_tape_asks_for_calibration_and_is_followed_after_it() {
     for seed in 1..=5 {
-        let why = robot(WORN, seed).run(LIMIT).expect("it sees no tape");
-        assert!(
-            why.contains("calibrate the line sensors"),
-            "seed {seed}: {why}"
-        );
+        let mut blind = robot(WORN, seed);
+        let why = blind.run(LIMIT).expect("it sees no tape");
+        let failure = blind.navigator.status().failure;
+        assert_eq!(failure.kind, FailureKind::LineUnseen, "seed {seed}: {why}");
+        assert_eq!(failure.remedy, Remedy::Calibrate);
         let mut whole = robot(WORN, seed);
         assert_eq!(whole.calibrate(), Ok(()), "seed {seed}");
         assert_eq!(whole.run(LIMIT), None, "seed {seed}");

@@ -18,7 +18,7 @@ use core::time::Duration;
 use lager_topics::{FailureKind, Step, Thought, ThoughtKind};
 use lager_wire::{Command, LineState, WheelCommand};
 
-use super::helm::{Helm, Senses, turning_place};
+use super::helm::{Helm, Senses, is_no_line, turning_place};
 use super::outcome::Outcome;
 use crate::config::LogicConfig;
 use crate::judge::{Edge, Verdict, judge};
@@ -270,7 +270,11 @@ impl Follow {
         let travelled = helm.senses.odometer.travelled_mm;
         let without = travelled - *self.lost_at.get_or_insert(travelled);
         let most = helm.config.line_lost_mm;
-        (without > most).then_some(Outcome::Failed(FailureKind::LineLost, most, without))
+        let kind = match helm.senses.tape_seen {
+            true => FailureKind::LineLost,
+            false => FailureKind::LineUnseen,
+        };
+        (without > most).then_some(Outcome::Failed(kind, most, without))
     }
 
     /// Whether the line has ended at the node where it should, and the node's mark may have passed
@@ -359,8 +363,4 @@ impl Follow {
 /// robot turns round, on a way out of this length.
 fn is_near(exit_mm: f32, config: &LogicConfig) -> bool {
     turning_place(exit_mm, config) - config.sensor_ahead_mm < config.run_up_mm
-}
-
-fn is_no_line(state: LineState) -> bool {
-    matches!(state, LineState::NotOnLine | LineState::DropStation)
 }

@@ -27,6 +27,8 @@ pub(crate) struct Senses {
     pub(crate) sight: Option<(Duration, LineState)>,
     /// The line state that two frames in a row have shown, which one frame of noise cannot be.
     pub(crate) sure_sight: Option<LineState>,
+    /// Tape has been seen since the robot was put down, or since this navigator began.
+    pub(crate) tape_seen: bool,
     /// From the delivery corner to the cross bar, as measured on the way out; 0 = never driven.
     pub(crate) exit_mm: f32,
     pub(crate) arm: ArmSeen,
@@ -44,6 +46,7 @@ impl Senses {
         let before = self.sight.replace((now, state)).map(|(_, before)| before);
         if before == Some(state) {
             self.sure_sight = before;
+            self.tape_seen |= !is_no_line(state);
         }
     }
 
@@ -57,6 +60,11 @@ impl Senses {
         let missing_mm = at_mm - self.mark_at(config);
         self.odometer.correct(missing_mm);
     }
+}
+
+/// Whether the sensors see no tape.
+pub(crate) fn is_no_line(state: LineState) -> bool {
+    matches!(state, LineState::NotOnLine | LineState::DropStation)
 }
 
 /// A standstill before what runs once is judged or begun.

@@ -3,12 +3,12 @@
 
 use core::time::Duration;
 
-use lager_topics::{Goal, Mode, Phase, SteeringReport, Thought, ThoughtKind};
+use lager_topics::{FailureKind, Goal, Mode, Phase, SteeringReport, Thought, ThoughtKind};
 
 use super::Navigator;
 use crate::battery::Limits;
 use crate::command::News;
-use crate::manoeuvre::STANDBY;
+use crate::manoeuvre::{Outcome, STANDBY};
 use crate::output::Output;
 
 impl Navigator {
@@ -29,6 +29,7 @@ impl Navigator {
         };
         match self.command.news(now, report, patience) {
             News::None => {}
+            News::AtWork => self.in_vain = 0,
             News::Ended(finish) if one_shot => {
                 let outcome = self.steer(now, out, |manoeuvre, helm| manoeuvre.ended(finish, helm));
                 if let Some(outcome) = outcome {
@@ -39,14 +40,28 @@ impl Navigator {
             // A setpoint ends by a stop, a lapsed lease or a restarted board. It is given again,
             // but not faster than the bridge can answer.
             News::Ended(_) | News::Unheard => {
-                if self.active
-                    && self
-                        .command
-                        .is_older_than(now, self.config.unheard_setpoint)
-                {
-                    self.command.give_anew();
+                let patience = self.config.unheard_setpoint;
+                if self.active && self.command.is_older_than(now, patience) {
+                    self.give_setpoint_anew(now, out);
                 }
             }
+        }
+    }
+
+    /// Gives the setpoint again, unless it has been given in vain too often. To stand, which may be
+    /// refused as well, needs nobody's consent.
+    fn give_setpoint_anew(&mut self, now: Duration, out: &mut Output) {
+        self.command.give_anew();
+        if self.command.command() == STANDBY {
+            return;
+        }
+        self.in_vain = self.in_vain.saturating_add(1);
+        let (most, in_vain) = (self.config.tries, self.in_vain);
+        if in_vain > most {
+            self.in_vain = 0;
+            let (most, in_vain) = (f32::from(most), f32::from(in_vain));
+            let refused = Outcome::Failed(FailureKind::BoardRefuses, most, in_vain);
+            self.conclude(now, refused, out);
         }
     }
 

@@ -58,6 +58,8 @@ pub struct Navigator {
     holding: Holding,
     by_hand: ByHand,
     command: Standing,
+    /// How often the setpoint at hand has been given without being seen at work.
+    in_vain: u8,
 
     frames: u64,
     /// When the last input came.
@@ -90,6 +92,7 @@ impl Navigator {
             holding: Holding::default(),
             by_hand: ByHand::default(),
             command: Standing::after(0),
+            in_vain: 0,
             frames: 0,
             now: Duration::ZERO,
             steady: Steady {
@@ -331,10 +334,13 @@ impl Navigator {
             Command::Wheel(_) if hold != Hold::None => STANDBY,
             command => command,
         };
-        let waits =
-            self.mission.phase == Phase::Picking && matches!(self.manoeuvre, Manoeuvre::Stand);
-        let arm_granted = waits || hold == Hold::Arm;
+        let arm_granted = self.waits_for_hand() || hold == Hold::Arm;
         (command, arm_granted)
+    }
+
+    /// It stands at the goods, and a person is to pick them up.
+    fn waits_for_hand(&self) -> bool {
+        self.mission.phase == Phase::Picking && matches!(self.manoeuvre, Manoeuvre::Stand)
     }
 
     /// It has to look ahead, and no distances come.
@@ -364,6 +370,7 @@ impl Navigator {
     /// from before is given again only when the bridge has reported how it ended.
     fn begin_to_speak(&mut self, now: Duration) {
         self.command.listen_from(now);
+        self.in_vain = 0;
         if !self.command.command().is_one_shot() {
             self.command.give_anew();
         }

@@ -5,7 +5,9 @@
 //! successor has its map is judged when the map is there. The blocked ways and the waiting orders
 //! are published beside the status.
 
-use lager_topics::{BlockedWays, Hold, Joint, Mode, NavigatorStatus, Order, OrderQueue, Remedy};
+use lager_topics::{
+    BlockedWays, Hold, Joint, Mode, NavigatorStatus, Order, OrderQueue, Phase, Remedy,
+};
 use lager_wire::{Command, WheelCommand};
 
 use super::Navigator;
@@ -71,6 +73,8 @@ impl Navigator {
             _ if hold != Hold::None => hold.remedy(),
             _ if self.stopped => Remedy::Resume,
             _ if self.mode != Some(Mode::Autonomous) => Remedy::Mode,
+            _ if self.mission.phase == Phase::WaitingForMap => Remedy::Map,
+            _ if self.waits_for_hand() => Remedy::Hand,
             _ => Remedy::None,
         }
     }

@@ -178,6 +178,7 @@ impl Navigator {
         self.senses.odometer.travelled_mm = 0.0;
         self.senses.odometer.forget_way();
         self.senses.marks.clear();
+        self.senses.tape_seen = false;
         self.by_hand.stand_here();
     }
 

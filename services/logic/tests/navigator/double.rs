@@ -94,6 +94,8 @@ pub(crate) struct Body {
     pub(crate) stopped: bool,
     /// The next one-shot orders to refuse.
     pub(crate) refuse: u32,
+    /// Setpoints that turn the wheels are not carried out: the bridge says so, or nothing.
+    pub(crate) refuses_to_drive: Option<Finish>,
     /// The board's reports do not reach the bridge.
     pub(crate) silent: bool,
     /// Positions of the servos, and the load of the claw.
@@ -138,6 +140,7 @@ impl Body {
             autonomous: true,
             stopped: false,
             refuse: 0,
+            refuses_to_drive: None,
             silent: false,
             servos: CARRYING,
             claw_load: -311,
@@ -191,6 +194,13 @@ impl Body {
                 self.finished = (order.id, Finish::Refused);
                 return;
             }
+        }
+        let drives = !command.is_one_shot() && command != Command::Wheel(WheelCommand::Standby);
+        if let Some(finish) = self.refuses_to_drive.filter(|_| drives) {
+            if finish != Finish::None {
+                self.finished = (order.id, finish);
+            }
+            return;
         }
         self.work = Some(Work {
             id: order.id,

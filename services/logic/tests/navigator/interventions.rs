@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lager_logic::node::Node;
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{EventKind, FailureKind, Phase, Side, WarehouseMap};
+use lager_topics::{EventKind, FailureKind, Finish, Mode, Phase, Remedy, Side, WarehouseMap};
 
 use crate::double::{Body, Trouble};
 use crate::floor::{Exit, Floor};
@@ -177,6 +177,47 @@ fn a_board_that_refuses_for_ever_is_reported() {
     let tries = trial.body.begun.len();
     trial.run_for(SECOND * 10);
     assert_eq!(trial.body.begun.len(), tries, "it has given up");
+}
+
+#[test]
+fn a_drive_that_is_refused_or_ignored_for_ever_is_reported_and_one_that_is_so_for_a_while_is_not() {
+    for finish in [Finish::Refused, Finish::Aborted, Finish::None] {
+        let mut trial = mission();
+        trial.body.refuses_to_drive = Some(finish);
+        trial.run_for(SECOND);
+        let mut for_a_while = trial.clone();
+        let gives_up = |trial: &Trial| trial.phase() == Phase::Stuck;
+        assert!(
+            trial.run_until(SECOND * 20, gives_up),
+            "{finish:?}: {}",
+            trial.story()
+        );
+        let failure = trial.navigator.status().failure;
+        assert_eq!(
+            (failure.kind.get(), failure.seen),
+            (Some(FailureKind::BoardRefuses), 9)
+        );
+        trial.run_for(SECOND * 5);
+        assert_eq!(trial.count(EventKind::Failed), 1, "{}", trial.story());
+
+        for_a_while.body.refuses_to_drive = None;
+        for_a_while.deliver(1);
+    }
+}
+
+#[test]
+fn who_needs_a_map_or_a_hand_says_so() {
+    let remedy = |navigator: &Navigator| navigator.status().remedy.get();
+    let mut navigator = Navigator::new(LogicConfig::default());
+    let (mode, stopped) = (Mode::Autonomous, false);
+    navigator.handle(SECOND, Input::Mode { mode, stopped });
+    assert_eq!(remedy(&navigator), Some(Remedy::Map));
+    let mut trial = run_to(Phase::Approaching);
+    assert_eq!(remedy(&trial.navigator), Some(Remedy::None));
+    assert!(trial.run_until(SECOND * 90, |trial| trial.phase() == Phase::Picking));
+    assert_eq!(remedy(&trial.navigator), Some(Remedy::Hand));
+    assert!(trial.run_until(SECOND * 90, |trial| trial.phase() == Phase::Leaving));
+    assert_eq!(remedy(&trial.navigator), Some(Remedy::None));
 }
 
 #[test]

@@ -1,0 +1,110 @@
+//! Looking for the short mark of a station that a disturbed turn may have missed.
+//!
+//! Turns towards the mark, as far as dead reckoning knows where that is, and on until tape is in
+//! sight. If that tape is the edge's own, it turns back from there. If it meets the edge's tape
+//! once more, it has missed the mark, and ends looking along the edge.
+//!
+//! The sensors may reach no more than the mark's end, and come to rest beside it. So a turn that
+//! begins and ends near where the mark must be has met it: only tape ends a turn so early.
+
+use lager_topics::{FailureKind, Finish};
+use lager_wire::{Command, WheelCommand};
+
+use super::helm::{Helm, Pause, is_no_line};
+use super::outcome::Outcome;
+use crate::heading::{Compass, Spin};
+
+/// A search; it begins with a robot that looks to about where the mark is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Search {
+    /// Which way it turns; none before the first turn.
+    spin: Option<Spin>,
+    /// It has begun a turn on the edge's tape.
+    from_edge: bool,
+    /// It has begun the turn at hand near where the mark must be.
+    from_beside: bool,
+    /// How often it has turned.
+    pub(crate) turns: u8,
+    pub(crate) pause: Pause,
+}
+
+impl Search {
+    /// How far from the mark tape is that of the edge, in degrees.
+    const BESIDE_DEG: f32 = 45.0;
+    /// How often it turns before it gives up.
+    const TURNS: u8 = 8;
+
+    /// One that begins when the robot has come to rest.
+    pub(crate) const NEW: Self = Self {
+        spin: None,
+        from_edge: false,
+        from_beside: false,
+        turns: 0,
+        pause: Pause::Wanted,
+    };
+
+    /// As a predecessor left it, with `ordered` in force.
+    pub(crate) fn restore(&mut self, turns: u8, ordered: Command) {
+        self.turns = turns;
+        // After that many it has met the edge's tape, or will on its way from there.
+        self.from_edge = turns > 1;
+        self.spin = match ordered {
+            Command::Wheel(WheelCommand::LeftPerp) => Some(Spin::Left),
+            Command::Wheel(WheelCommand::RightPerp) => Some(Spin::Right),
+            _ => return,
+        };
+        self.pause = Pause::None;
+    }
+
+    pub(crate) fn wanted(&self) -> Command {
+        Command::Wheel(match self.spin {
+            Some(Spin::Left) if self.pause == Pause::None => WheelCommand::LeftPerp,
+            Some(Spin::Right) if self.pause == Pause::None => WheelCommand::RightPerp,
+            _ => WheelCommand::Standby,
+        })
+    }
+
+    /// The order for a turn has ended: the robot stands before it looks.
+    pub(crate) fn ended(&mut self, finish: Finish, helm: &Helm<'_>) -> Option<Outcome> {
+        if finish == Finish::None {
+            return None;
+        }
+        self.pause = Pause::Wanted;
+        let is_beside = helm.senses.odometer.turned_deg.abs() <= Self::BESIDE_DEG;
+        (finish == Finish::Done && self.from_beside && is_beside).then_some(Outcome::Done)
+    }
+
+    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+        let settle = helm.config.settle;
+        if !self.pause.is_over(helm.now, settle, helm.active) {
+            return None;
+        }
+        let off_deg = helm.senses.odometer.turned_deg;
+        let sees_tape = helm.senses.sure_sight.is_some_and(|seen| !is_no_line(seen));
+        let is_beside = off_deg.abs() <= Self::BESIDE_DEG;
+        if sees_tape && is_beside {
+            return Some(Outcome::Done);
+        }
+        let (beside, back) = match off_deg > 0.0 {
+            true => (Spin::Right, Spin::Left),
+            false => (Spin::Left, Spin::Right),
+        };
+        if sees_tape && self.from_edge {
+            *helm.heading = helm.heading.turned(beside, 1);
+            return Some(Outcome::Missed);
+        }
+        if self.turns == Self::TURNS {
+            let turns = f32::from(self.turns);
+            return Some(Outcome::Failed(FailureKind::MarkUnseen, turns, turns));
+        }
+        self.turns += 1;
+        self.from_edge |= sees_tape;
+        self.from_beside = is_beside;
+        self.spin = match sees_tape {
+            true => Some(back),
+            false => self.spin.or(Some(back)),
+        };
+        helm.order.give_anew();
+        None
+    }
+}
