@@ -354,10 +354,11 @@ fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhil
     let mut scene = Scene::new(1.0, &[]);
     let mut page = scene.page();
     scene.arm(&mut page);
+    // A nudge is no drive.
     scene.hold(&mut page, "ArrowLeft");
+    page.wait_for("#map-text", "not known where");
     page.key_up("ArrowLeft");
     scene.wait_to_stand();
-    page.wait_for("#map-text", "not known where");
     page.click("#autonomous");
     page.wait_until("document.querySelector('#where').open");
     assert_eq!(page.text("#mode"), "BY HAND");

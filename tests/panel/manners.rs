@@ -124,8 +124,8 @@ fn the_display_on_the_robot_stops_it() {
     page.key_down(" ");
     page.key_up(" ");
     page.wait_until(
-        "document.querySelector('#stop-said').textContent.includes('stands') || \
-                     document.querySelector('#stop-said').textContent.includes('står')",
+        "document.querySelector('#stop-said').textContent.includes('stand,') || \
+                     document.querySelector('#stop-said').textContent.includes('står,')",
     );
     scene.assert_stands();
     scene.resume();

@@ -118,7 +118,11 @@ fn of_what_is_rare() {
 
     let stage = Stage::new(Some(SMALL), true);
     let viewer = stage.viewer.clone().expect("a viewer's address");
-    let lists = ["route 3 1 2 0 2 0 3", "blocked 1 1 1 right 40", "queue 2 5 1 6 2"];
+    let lists = [
+        "route 3 1 2 0 2 0 3",
+        "blocked 1 1 1 right 40",
+        "queue 2 5 1 6 2",
+    ];
     let robot = |more: &str| {
         let state = state(more);
         let mut lines = vec![state.as_str()];
@@ -140,19 +144,25 @@ fn of_what_is_rare() {
         lines.extend(lists);
         drives.says(&lines);
     };
-    now("x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=unheard remedy=report \
-         mode=autonomous pick=auto stopped=0 order=4 product=2 sensor_up=1 steering_up=0");
-    page.wait_for("#doing", "the steering board is not heard");
+    now(
+        "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=unheard remedy=report \
+         mode=autonomous pick=auto stopped=0 order=4 product=2 sensor_up=1 steering_up=0",
+    );
+    page.wait_for("#doing", "the steering board does not report");
     view(&mut page, "board-lost");
-    now("x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=battery remedy=charge \
+    now(
+        "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=battery remedy=charge \
          mode=autonomous pick=auto stopped=0 order=4 product=2 left_duty=0 right_duty=0 \
-         code=00000001 battery_dv=98 sensor_up=1 steering_up=1");
+         code=00000001 battery_dv=98 sensor_up=1 steering_up=1",
+    );
     page.wait_for("#doing", "the battery is low");
     view(&mut page, "battery-low");
-    now("x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=waiting_for_order hold=none \
+    now(
+        "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=waiting_for_order hold=none \
          failure=no_way failure_expected=0 failure_seen=0 remedy=way mode=autonomous pick=auto \
          stopped=0 order=4 product=2 left_duty=0 right_duty=0 code=00000001 battery_dv=114 \
-         sensor_up=1 steering_up=1");
+         sensor_up=1 steering_up=1",
+    );
     page.wait_until("document.querySelector('#map .out-of-reach .why')?.textContent.length > 0");
     view(&mut page, "unreachable");
     drop((page, drives));

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::Scene;
 use crate::browser::Page;
+use crate::played::Stage;
 
 /// Changes a field as a person does, who then leaves it.
 fn fill(page: &mut Page, selector: &str, value: &str) {
@@ -164,7 +165,7 @@ fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back() {
 }
 
 #[test]
-fn goods_behind_what_blocks_every_way_are_marked_and_a_person_may_pick() {
+fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     let scene = Scene::new(4.0, &["--mission", "3"]);
     let mut page = scene.page();
     page.click("#picks");
@@ -181,6 +182,33 @@ fn goods_behind_what_blocks_every_way_are_marked_and_a_person_may_pick() {
     assert!(texts(&mut page, "#history li").contains('3'));
     drop(page);
     scene.end();
+}
+
+const SMALL: &str = "size = [2, 3]\nside_length_cm = 50\ndelivery = [0, 0]\n\
+    [[product]]\nid = 2\nname = \"nails\"\nsquare = [0, 2]\nside = \"right\"\n";
+
+#[test]
+fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
+    let stage = Stage::new(Some(SMALL), false);
+    let robot = stage.robot("r1", &["state sensor_up=1 steering_up=1"]);
+    let mut page = stage.page(&stage.url);
+    let now = |more: &str| {
+        robot.says(&[&format!(
+            "state x_mm=500 y_mm=500 heading_deg=0 node=1,1 looks=up hold=none mode=autonomous \
+             order=4 product=2 {more}"
+        )]);
+    };
+    now("phase=waiting_for_order failure=no_way failure_expected=0 failure_seen=0 remedy=way");
+    page.wait_for("#map .good.out-of-reach .why", "no way there");
+    page.wait_for("#doing", "There is no way from (1, 1) to where I must go");
+    page.wait_for("#queue li", "2 nails  under way");
+    now("phase=driving sensor_up=0 steering_up=1");
+    page.wait_for("#doing", "the sensor board is not heard");
+    page.click("#language");
+    page.wait_for("#doing", "sensorkortet hörs inte");
+    page.wait_until("document.querySelector('#map .out-of-reach') === null");
+    drop((page, robot));
+    stage.end();
 }
 
 #[test]

@@ -51,8 +51,10 @@ export class Bar {
     const mode = robot?.state.mode;
     put(parts.mode, mode ? say(`mode_${mode}`) : "");
     put(parts.driver, this.driverWords(robot));
-    const volts = robot?.state.battery_dv;
-    put(parts.battery, volts === undefined ? "" : `${(Number(volts) / 10).toFixed(1)} V`);
+    const { battery_dv: decivolts, hold } = robot?.state ?? {};
+    const volts = decivolts === undefined ? "" : (Number(decivolts) / 10).toFixed(1);
+    parts.battery.classList.toggle("low", hold === "battery");
+    put(parts.battery, volts && say(hold === "battery" ? "battery_low" : "volts", volts));
     put(parts.doing, doing(robot));
     this.drawStop(robot);
   }
@@ -96,15 +98,19 @@ export class Bar {
   }
 }
 
+/** By the names of the robot: what holds it when it does not hear a board. */
+const HELD_BY = { sensor: "blind", steering: "unheard" };
+
 /** What a robot does, in words. */
 export function doing(robot) {
   const { phase, next, product, hold, remedy } = robot?.state ?? {};
   if (!phase) return "";
-  const words = [sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase];
+  const words = [phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase];
   if (product !== undefined) words.push(say("fetches", product));
   if (hold !== "none") words.push(sentence(`hold_${hold}`));
   for (const board of ["sensor", "steering"]) {
-    if (robot.state[`${board}_up`] === "0") words.push(say("board_lost", say(`board_${board}`)));
+    // The reason why it stands may have said it.
+    if (robot.state[`${board}_up`] === "0" && hold !== HELD_BY[board]) words.push(say("board_lost", say(`board_${board}`)));
   }
   const why = failure({ ...robot.state, failure_node: robot.state.node });
   // Stop and mode stand beside it.

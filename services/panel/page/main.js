@@ -133,6 +133,7 @@ link.addEventListener("robots", () => {
   if (link.robots.has(chosen)) list.value = chosen;
 });
 link.addEventListener("warehouse", () => {
+  at("map-zone").classList.toggle("empty", !link.warehouse);
   map.setWarehouse(link.warehouse);
   missions.setWarehouse(link.warehouse);
   setup.setWarehouse(link.warehouse);

@@ -38,7 +38,7 @@ const TABLE = {
     move_up: "fetch {0} earlier", move_down: "fetch {0} later", cancel_order: "do not fetch {0}", no_way_here: "there is no way; click on one between two crossings",
     real_floor: "put obstacles on a real floor by hand", text_size: "A warehouse of {0} by {1} squares. Goods: {2}.", text_robot: "The robot is at {0} and looks {1}.",
     text_lost: "It is not known where the robot is.", text_next: "It goes to {0}.", text_blocked: "Blocked ways: {0}.", column: "column", row: "row", looks: "looks",
-    where_asked: "Where does the robot stand?", on_crossing: "On this crossing:", stands_there: "It stands there", later: "Later", ghost: "where it really is",
+    where_asked: "Where does the robot stand?", on_crossing: "On this crossing:", stands_there: "It stands there", later: "Later", ghost: "where it really is", drives: "drives", volts: "{0} V", battery_low: "{0} V, low",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -78,7 +78,7 @@ const TABLE = {
     real_floor: "ställ ut hinder för hand på ett riktigt golv", text_size: "Ett lager med {0} gånger {1} rutor. Varor: {2}.",
     text_robot: "Roboten är vid {0} och tittar {1}.", text_lost: "Det är okänt var roboten är.", text_next: "Den kör till {0}.", text_blocked: "Spärrade vägar: {0}.",
     column: "kolumn", row: "rad", looks: "tittar", where_asked: "Var står roboten?", on_crossing: "I den här korsningen:", stands_there: "Där står den", later: "Senare",
-    ghost: "där den verkligen är",
+    ghost: "där den verkligen är", drives: "kör", volts: "{0} V", battery_low: "{0} V, lågt",
   },
 };
 
