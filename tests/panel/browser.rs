@@ -334,6 +334,35 @@ impl Page {
         self.call("Input.dispatchKeyEvent", &params);
     }
 
+    /// Presses and lets go of the Tab key, or whatever else has a place in the tab order.
+    pub(crate) fn tab(&mut self) {
+        let params = json!({ "type": "rawKeyDown", "key": "Tab", "code": "Tab", "windowsVirtualKeyCode": 9 });
+        self.call("Input.dispatchKeyEvent", &params);
+        self.key_up("Tab");
+    }
+
+    /// Keeps what the page says to the panel, as `sent`, and its socket, as `line`.
+    pub(crate) fn listen_in(&mut self) {
+        self.value(
+            "window.sent = []; (() => { const send = WebSocket.prototype.send; \
+             WebSocket.prototype.send = function (text) { \
+               window.line = this; sent.push(text); return send.call(this, text); \
+             }; })()",
+        );
+        self.wait_until("window.line !== undefined");
+    }
+
+    /// What the page has told wheels and arm since this was asked last, without numbers and times.
+    pub(crate) fn moves(&mut self) -> Vec<String> {
+        let sent = self.value(
+            "sent.splice(0).map((line) => line.split(' ')).filter(([verb, , , , what]) => \
+             verb === 'do' && ['drive', 'arm'].includes(what)).map((words) => words.slice(4).join(' '))",
+        );
+        let sent = sent.as_array().expect("a list").iter();
+        sent.map(|line| line.as_str().expect("a line").to_owned())
+            .collect()
+    }
+
     /// For things that need a moment and show nothing.
     pub(crate) fn pause(&mut self) {
         std::thread::sleep(Duration::from_millis(300));

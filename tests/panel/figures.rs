@@ -1,7 +1,8 @@
 //! What the panel costs, and how long it takes from a key to the motors, from STOP to motors at 0, and
 //! from a pose to the picture: with a browser, the station, comm and the simulated boards between.
 //!
-//! The times of motors are those of the first report of the steering board that shows it, which it
+//! A pose is that of the simulator's truth, whose outline is drawn where it is told; the robot itself
+//! glides there within 100 ms. The times of motors are those of the first report of the steering board that shows it, which it
 //! sends every few ms. A pose is told twenty times a second, so up to 50 ms of its time are waiting.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -94,7 +95,12 @@ fn from_the_key_and_to_the_picture() {
     scene.take_over(&mut page);
     page.click("#armed");
     page.value("document.activeElement.blur()");
-    let (mut starts, mut stops) = (Vec::new(), Vec::new());
+    let (mut starts, mut stops, mut told) = (Vec::new(), Vec::new(), Vec::new());
+    page.value(
+        "window.stands = []; const said = document.querySelector('#stop-said'); \
+         new MutationObserver(() => said.textContent.includes('both boards stand') && \
+           stands.push(performance.timeOrigin + performance.now())).observe(said, { childList: true })",
+    );
     for round in 0..ROUNDS {
         // To and fro, so that it stays where there is room.
         let key = ["ArrowLeft", "ArrowRight"][round % 2];
@@ -108,11 +114,14 @@ fn from_the_key_and_to_the_picture() {
         page.key_up("Escape");
         page.key_up(key);
         page.wait_for("#stop-said", "both boards stand");
+        let at = page.value("stands.at(-1)").as_f64().expect("a time");
+        told.push(at - origin_ms - from as f64 / 1e6);
         scene.resume();
         page.wait_until("document.querySelector('#resume').hidden");
     }
     row("key -> motors turn", starts);
     row("STOP -> motors at 0", stops);
+    row("STOP -> page says so", told);
     drop((page, reports));
     scene.end();
 }

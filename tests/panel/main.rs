@@ -2,162 +2,22 @@
 //! the robot stands; a stop is confirmed; goods are fetched; two people do not drive at once.
 
 mod browser;
+mod driving;
 mod figures;
+mod manners;
 mod pictures;
+mod played;
+mod scene;
+mod setting_up;
 mod watched;
 
-use browser::{Browser, Page};
-use lager_ports::{Bus, Clock, Subscriber};
-use lager_tests::{Domain, Running, pid, wait_for};
+use browser::Page;
+use lager_tests::{pid, wait_for};
 use lager_topics::{
     Coded, FailureKind, Hold, Joint, LinkHealth, NavStatus, Phase, Remedy, StopCause, ThoughtKind,
-    TruthPose,
 };
 use rustix::process::{Signal, kill_process};
-
-/// A robot that is up with its panel, and what really happens.
-struct Scene {
-    truth: Subscriber<TruthPose>,
-    bus: Bus,
-    up: Running,
-    browser: Browser,
-    url: String,
-    domain: Domain,
-}
-
-impl Scene {
-    fn new(speed: f64, more: &[&str]) -> Self {
-        let domain = Domain::new();
-        let speed_word = speed.to_string();
-        let mut args = vec!["up", "--panel", "127.0.0.1:0", "--speed", &speed_word];
-        args.extend(more);
-        let up = domain.start(&args);
-        let bus = domain.observe("r1", speed);
-        let url = wait_for("the panel's address", || {
-            let told = up.output();
-            let (_, rest) = told.split_once("the panel is at ")?;
-            rest.split_whitespace().next().map(str::to_owned)
-        });
-        Self {
-            truth: bus.subscriber().expect("a topic"),
-            bus,
-            up,
-            browser: Browser::new(),
-            url,
-            domain,
-        }
-    }
-
-    fn page(&self) -> Page {
-        let mut page = self.browser.page(&self.url);
-        // It speaks English, whatever this machine does.
-        page.wait_until("document.readyState === 'complete'");
-        page.value("localStorage.setItem('language', 'en')");
-        page.call("Page.reload", &serde_json::json!({}));
-        page.wait_for("#link", " ms");
-        page
-    }
-
-    fn moves(&mut self) -> Option<bool> {
-        let truth = self.truth.latest().expect("readable")?;
-        Some(truth.left_duty != 0 || truth.right_duty != 0)
-    }
-
-    fn wait_to_move(&mut self) {
-        wait_for("the robot to move", || self.moves().filter(|moves| *moves));
-    }
-
-    fn wait_to_stand(&mut self) {
-        wait_for("the robot to stand", || self.moves().filter(|moves| !moves));
-    }
-
-    /// It stands in all that the world shows from now on, for a while.
-    fn assert_stands(&mut self) {
-        let from = Clock::monotonic_ns();
-        let mut seen = 0;
-        while seen < 15 {
-            let truth = wait_for("the world", || self.truth.latest().expect("readable"));
-            if truth.stamp().publish_time_ns > from {
-                assert_eq!((truth.left_duty, truth.right_duty), (0, 0));
-                seen += 1;
-            }
-            drop(truth);
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-    }
-
-    /// Takes the wheel and turns the robot over to the hand.
-    fn take_over(&mut self, page: &mut Page) {
-        page.click("#tab-drive");
-        page.click("#control");
-        page.wait_for("#control", "You drive");
-        page.click("#manual");
-        page.wait_for("#mode", "BY HAND");
-        self.wait_to_stand();
-    }
-
-    /// Presses a key until the robot moves by it: a person whose order was held up presses anew.
-    fn hold(&mut self, page: &mut Page, key: &str) {
-        wait_for("the robot to be driven", || {
-            page.key_down(key);
-            for _ in 0..100 {
-                if self.moves() == Some(true) {
-                    return Some(());
-                }
-                std::thread::sleep(std::time::Duration::from_millis(10));
-            }
-            page.key_up(key);
-            None
-        });
-    }
-
-    /// What the page has seen can be had as a table and as a recording, which others can read.
-    fn saves(&self, page: &mut Page) {
-        let folder = self.domain.folder();
-        page.wait_for("#link", " ms");
-        page.save_into(folder);
-        page.click("#tab-log");
-        page.click("#save-csv");
-        let table = wait_for("the table", || {
-            std::fs::read_to_string(folder.join("r1.csv")).ok()
-        });
-        assert!(table.starts_with("time,x,y,line_error,"), "{table}");
-        page.click("#save-mcap");
-        let file = folder.join("r1.mcap");
-        wait_for("the recording", || file.exists().then_some(()));
-        let file = file.to_str().expect("a name");
-        self.domain.done(&["bag", "check", file]);
-        let told = self.domain.run(&["bag", "info", "--json", file]);
-        let told: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
-        let topics = told["topics"].as_array().expect("topics");
-        let names: Vec<_> = topics.iter().map(|topic| &topic["topic"]).collect();
-        assert_eq!(names, ["events", "state"]);
-        assert!(
-            topics
-                .iter()
-                .all(|topic| topic["messages"].as_u64() > Some(0)),
-            "{told}"
-        );
-    }
-
-    /// Nothing is left of a stop.
-    fn resume(&self) {
-        self.domain.done(&["resume"]);
-    }
-
-    fn end(self) {
-        let Self {
-            truth,
-            bus,
-            up,
-            browser,
-            domain,
-            ..
-        } = self;
-        drop((truth, bus, browser, up));
-        domain.assert_clean();
-    }
-}
+use scene::Scene;
 
 /// What the robot may tell is what the page has sentences for.
 #[test]
@@ -325,8 +185,13 @@ fn two_people_do_not_drive_at_once_and_either_may_stop() {
     scene.take_over(&mut anna);
     bo.click("#tab-drive");
     bo.wait_for("#control", "drives");
+    // Bo asks, and Anna keeps it.
     bo.click("#control");
-    bo.wait_for("#drive-said", "drives the robot");
+    bo.wait_for("#drive-said", "has been asked for the wheel");
+    anna.wait_for("#asked", "asks for the wheel");
+    anna.click("#keep");
+    bo.wait_for("#drive-said", "keeps the wheel");
+    anna.wait_until("document.querySelector('#asked').hidden");
     bo.click("#armed");
     bo.value("document.activeElement.blur()");
     bo.key_down("ArrowUp");
@@ -342,11 +207,18 @@ fn two_people_do_not_drive_at_once_and_either_may_stop() {
     anna.key_up("ArrowUp");
     scene.resume();
 
-    anna.click("#control");
-    bo.wait_for("#control", "Nobody drives");
+    // He asks again, and she hands it over.
     bo.click("#control");
+    anna.wait_for("#asked", "asks for the wheel");
+    anna.click("#hand-over");
     bo.wait_for("#control", "You drive");
     anna.wait_for("#control", "drives");
+
+    // Whoever leaves it leaves it to anybody.
+    bo.click("#control");
+    anna.wait_for("#control", "Nobody drives");
+    anna.click("#control");
+    anna.wait_for("#control", "You drive");
     drop((anna, bo));
     scene.end();
 }

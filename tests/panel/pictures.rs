@@ -1,9 +1,15 @@
-//! Pictures of the panel's views: each in both themes, on a laptop and in the hand.
+//! Pictures of the panel's views: each in both themes, on a laptop and in the hand, one on a large
+//! screen. What a simulated robot is hard to bring to is told by one that is played.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
+
+use lager_tests::pid;
+use rustix::process::{Signal, kill_process};
 
 use crate::Scene;
 use crate::browser::Page;
+use crate::played::Stage;
 
 /// Name, width and height in pixels, whether it is in the hand.
 const SCREENS: [(&str, u32, u32, bool); 2] =
@@ -11,16 +17,21 @@ const SCREENS: [(&str, u32, u32, bool); 2] =
 
 /// Takes one view as it is now.
 fn view(page: &mut Page, name: &str) {
-    let folder = PathBuf::from(std::env::var_os("LAGER_PICTURES").expect("LAGER_PICTURES"));
     for (screen, width, height, in_hand) in SCREENS {
         for theme in ["light", "dark"] {
             page.dress(theme, width, height, in_hand);
-            page.pause();
-            let file = folder.join(format!("{name}-{screen}-{theme}.png"));
-            std::fs::write(&file, page.picture()).expect("a folder that can be written to");
+            take(page, &format!("{name}-{screen}-{theme}"));
         }
     }
     page.dress("light", 1280, 720, false);
+}
+
+fn take(page: &mut Page, name: &str) {
+    let folder = PathBuf::from(std::env::var_os("LAGER_PICTURES").expect("LAGER_PICTURES"));
+    page.value("document.activeElement?.blur()");
+    page.pause();
+    let file = folder.join(format!("{name}.png"));
+    std::fs::write(&file, page.picture()).expect("a folder that can be written to");
 }
 
 #[test]
@@ -34,6 +45,9 @@ fn of_every_view() {
     page.value("document.querySelector('#goods').value = '2'");
     page.click("#fetch button");
     view(&mut page, "under-way");
+    page.dress("light", 3840, 2160, false);
+    take(&mut page, "under-way-4k-light");
+    page.dress("light", 1280, 720, false);
     for tab in ["setup", "log"] {
         page.click(&format!("#tab-{tab}"));
         view(&mut page, tab);
@@ -48,14 +62,126 @@ fn of_every_view() {
     scene.resume();
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
     view(&mut page, "blocked");
+    let comm = pid(scene.up.service("comm").expect("it runs"));
+    kill_process(comm, Signal::STOP).expect("it runs");
+    page.wait_for("#link", "nothing new for");
+    view(&mut page, "link-lost");
+    kill_process(comm, Signal::CONT).expect("it runs");
+    page.wait_for("#link", "link ");
     scene.take_over(&mut page);
     view(&mut page, "by-hand");
     let mut other = scene.page();
     other.click("#tab-drive");
     view(&mut other, "another-drives");
+    other.click("#control");
+    page.wait_for("#asked", "asks for the wheel");
+    view(&mut page, "asked-for-the-wheel");
+    page.click("#keep");
+    page.click("#where-ask");
+    view(&mut page, "where-it-stands");
+    page.click("#where-later");
     page.value("location.href = '/screen'");
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
     view(&mut page, "screen");
     drop((page, other));
     scene.end();
+}
+
+const SMALL: &str = "size = [2, 3]\nside_length_cm = 50\ndelivery = [0, 0]\n\
+    [[product]]\nid = 1\nname = \"matches\"\nsquare = [1, 1]\nside = \"left\"\n\
+    [[product]]\nid = 2\nname = \"nails\"\nsquare = [0, 2]\nside = \"right\"\n";
+
+/// A robot at a place that does something, with boards that are heard unless `more` says otherwise.
+fn state(more: &str) -> String {
+    format!(
+        "state time_ms=81250 node=1,1 looks=up delivered=3 line_bits=00001110000 line_error=0 \
+         distance_cm=42 servos=512,400,623,600,423,512,512,230 loads=0,120,-120,80,-80,10,0,210 \
+         servo_errors=00000000 sensor_lost=0 steering_lost=1 bus_lost=0 gain_p=2 gain_d=2 {more}"
+    )
+}
+
+const DRIVES: &str = "x_mm=500 y_mm=760 heading_deg=0 unsure_mm=24 next=1,2 phase=driving hold=none \
+    mode=autonomous pick=auto stopped=0 order=4 product=2 left_duty=104 right_duty=98 \
+    code=00000011 battery_dv=114 sensor_up=1 steering_up=1";
+
+#[test]
+#[ignore = "it makes pictures: tests/screenshots"]
+fn of_what_is_rare() {
+    let stage = Stage::new(None, false);
+    let mut page = stage.page(&stage.url);
+    page.wait_for("#link", "No robot has connected yet");
+    view(&mut page, "first-start");
+    page.click("#tab-setup");
+    view(&mut page, "empty-warehouse");
+    drop(page);
+    stage.end();
+
+    let stage = Stage::new(Some(SMALL), true);
+    let viewer = stage.viewer.clone().expect("a viewer's address");
+    let lists = [
+        "route 3 1 2 0 2 0 3",
+        "blocked 1 1 1 right 40",
+        "queue 2 5 1 6 2",
+    ];
+    let robot = |more: &str| {
+        let state = state(more);
+        let mut lines = vec![state.as_str()];
+        lines.extend(lists);
+        stage.robot("r1", &lines)
+    };
+    let drives = robot(DRIVES);
+    let mut page = stage.page(&viewer);
+    page.wait_for("#driver", "you may look and stop");
+    page.wait_for("#link", "link ");
+    view(&mut page, "viewer");
+    let second = stage.robot("r2", &[&state(&DRIVES.replace("x_mm=500", "x_mm=0"))]);
+    page.wait_until("document.querySelectorAll('#robot option').length === 2");
+    view(&mut page, "two-robots");
+    drop(second);
+    let now = |more: &str| {
+        let state = state(more);
+        let mut lines = vec![state.as_str()];
+        lines.extend(lists);
+        drives.says(&lines);
+    };
+    now(
+        "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=unheard remedy=report \
+         mode=autonomous pick=auto stopped=0 order=4 product=2 sensor_up=1 steering_up=0",
+    );
+    page.wait_for("#doing", "the steering board does not report");
+    view(&mut page, "board-lost");
+    now(
+        "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=driving hold=battery remedy=charge \
+         mode=autonomous pick=auto stopped=0 order=4 product=2 left_duty=0 right_duty=0 \
+         code=00000001 battery_dv=98 sensor_up=1 steering_up=1",
+    );
+    page.wait_for("#doing", "the battery is low");
+    view(&mut page, "battery-low");
+    now(
+        "x_mm=500 y_mm=500 heading_deg=0 unsure_mm=10 phase=waiting_for_order hold=none \
+         failure=no_way failure_expected=0 failure_seen=0 remedy=way mode=autonomous pick=auto \
+         stopped=0 order=4 product=2 left_duty=0 right_duty=0 code=00000001 battery_dv=114 \
+         sensor_up=1 steering_up=1",
+    );
+    page.wait_until("document.querySelector('#map .out-of-reach .why')?.textContent.length > 0");
+    view(&mut page, "unreachable");
+    drop((page, drives));
+    stage.end();
+
+    let mut large = "size = [20, 20]\nside_length_cm = 50\ndelivery = [20, 0]\n".to_owned();
+    for id in 1..=24 {
+        let (x, y) = (id * 7 % 20, id * 11 % 20);
+        let side = ["left", "up", "right", "down"][id % 4];
+        let product = format!("[[product]]\nid = {id}\nsquare = [{x}, {y}]\nside = \"{side}\"\n");
+        let _ = large.write_str(&product);
+    }
+    let stage = Stage::new(Some(&large), false);
+    let state = state(&DRIVES.replace("x_mm=500 y_mm=760", "x_mm=7000 y_mm=6120"));
+    let far = "route 12 14 13 14 14 13 14 12 14 11 14 10 14 9 14 8 14 7 14 7 15 7 16 6 16";
+    let robot = stage.robot("r1", &[&state.replace("next=1,2", "next=14,13"), far]);
+    let mut page = stage.page(&stage.url);
+    page.wait_for("#link", "link ");
+    view(&mut page, "large");
+    drop((page, robot));
+    stage.end();
 }

@@ -62,6 +62,11 @@ pub enum CommandError {
 pub struct Wheels(OperatorCommand);
 
 impl Wheels {
+    /// Whether it is the command to stand.
+    pub const fn is_stop(self) -> bool {
+        matches!(self.0, OperatorCommand::Stop)
+    }
+
     /// The command, unless it is one to the arm.
     pub const fn new(command: OperatorCommand) -> Option<Self> {
         match command {

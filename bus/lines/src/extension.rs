@@ -27,6 +27,7 @@
 //! <action> ::= order <order> <prodid>  fetch a product after those that wait
 //!            | cancel <order>          fetch it no more; refused once its goods are held
 //!            | first <order>           fetch it before those that wait
+//!            | up <order>              fetch it before the one that is now before it
 //!            | clear                   fetch none of those that wait
 //!            | mode <mode>             who drives
 //!            | resume                  end a stop

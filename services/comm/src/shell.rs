@@ -298,7 +298,8 @@ impl Shell {
                 }
                 Action::AskWorld { id, ask } => {
                     if !self.world.ask(id, ask) {
-                        self.conversation.answered_by_world(self.now(), id, &Err(BUSY.into()));
+                        self.conversation
+                            .answered_by_world(self.now(), id, &Err(BUSY.into()));
                     }
                 }
                 Action::HangUp(why) => {

@@ -56,6 +56,8 @@ enum Task {
     Cancel,
     /// It is the next one; `before` were before it when this was last asked for.
     First { before: usize },
+    /// Fewer than these are before it.
+    Up { before: usize },
     /// No order waits.
     Clear,
     /// Logic has left the goods.
@@ -118,6 +120,12 @@ impl Tasks {
     pub(crate) fn first(&mut self, now: Moment, asker: Asker, id: u32, order: u32, before: usize) {
         let input = press(InputKind::OrderMovedUp, id, order);
         self.press(now, asker, Task::First { before }, input);
+    }
+
+    /// `before` wait before it.
+    pub(crate) fn up(&mut self, now: Moment, asker: Asker, id: u32, order: u32, before: usize) {
+        let input = press(InputKind::OrderMovedUp, id, order);
+        self.press(now, asker, Task::Up { before }, input);
     }
 
     pub(crate) fn clear(&mut self, now: Moment, asker: Asker, id: u32) {
@@ -294,6 +302,8 @@ impl Tasks {
             let is_done = match &mut one.task {
                 Task::Order(order) => queue.has(order.id),
                 Task::Cancel => !queue.has(order),
+                // It is under way by now, or further up.
+                Task::Up { before } => queue.before(order).map_or(true, |left| left < *before),
                 Task::Clear => queue.orders().is_empty(),
                 Task::First { before } => match queue.before(order) {
                     // It is under way by now.

@@ -1,53 +1,19 @@
 // The first row: which robot, how fresh, who drives, what it does; and STOP, which never waits.
 
 import { crossing, failure, sentence } from "./sentences.js";
-import { say, span } from "./words.js";
+import { Stop } from "./stop.js";
+import { put, say, span } from "./words.js";
 
 /** How long Resume is held, in ms. */
 const HOLD_MS = 1_000;
-/** After this time a stop that nobody has confirmed is said to be none, in ms. */
-const CONFIRM_MS = 1_000;
 
 export class Bar {
   constructor(link, parts, robot) {
     this.link = link;
     this.parts = parts;
     this.robot = robot;
-    this.said = null;
-    parts.stop.addEventListener("pointerdown", () => this.stop());
-    parts.stop.addEventListener("click", (event) => event.detail === 0 && this.stop());
-    // Ahead of whatever has the focus, dialogs included.
-    addEventListener("keydown", (event) => this.key(event), { capture: true });
+    this.stop = new Stop(link, { button: parts.stop, said: parts.stopSaid, resume: parts.resume }, robot);
     this.resume();
-  }
-
-  key(event) {
-    const inText = event.target instanceof HTMLElement && event.target.matches("input, textarea, select");
-    if (event.key !== "Escape" && !(event.key === " " && !inText)) return;
-    // The button of Resume is held by this key.
-    if (event.key === " " && event.target === this.parts.resume) return;
-    event.preventDefault();
-    event.stopImmediatePropagation();
-    if (!event.repeat) this.stop();
-  }
-
-  /** Stops the robot that is shown; every other one has its own page. */
-  async stop() {
-    const robot = this.robot();
-    if (!robot || !this.link.open) return this.say("stop_lost");
-    this.say("sent");
-    const unconfirmed = setTimeout(() => this.say("stop_unconfirmed"), CONFIRM_MS);
-    const answer = await this.link.ask("stop", robot.name);
-    clearTimeout(unconfirmed);
-    if (answer.stopped !== undefined) this.say("stands", answer.stopped);
-    else if (answer.done) this.say("sent");
-    else if (answer.refused === "lost") this.say("stop_unconfirmed");
-    else this.say("refused", answer.refused);
-  }
-
-  say(key, ...values) {
-    this.said = [key, values];
-    this.parts.stopSaid.textContent = say(key, ...values);
   }
 
   /** Resume is held, so that nobody does it in passing. */
@@ -62,8 +28,7 @@ export class Bar {
         const robot = this.robot();
         if (!robot) return;
         const answer = await this.link.act(robot, "resume");
-        if (answer.refused) this.say("refused", answer.refused);
-        else this.parts.stopSaid.textContent = "";
+        this.stop.say(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
       }, HOLD_MS);
     };
     const end = () => {
@@ -86,8 +51,10 @@ export class Bar {
     const mode = robot?.state.mode;
     put(parts.mode, mode ? say(`mode_${mode}`) : "");
     put(parts.driver, this.driverWords(robot));
-    const volts = robot?.state.battery_dv;
-    put(parts.battery, volts === undefined ? "" : `${(Number(volts) / 10).toFixed(1)} V`);
+    const { battery_dv: decivolts, hold } = robot?.state ?? {};
+    const volts = decivolts === undefined ? "" : (Number(decivolts) / 10).toFixed(1);
+    parts.battery.classList.toggle("low", hold === "battery");
+    put(parts.battery, volts && say(hold === "battery" ? "battery_low" : "volts", volts));
     put(parts.doing, doing(robot));
     this.drawStop(robot);
   }
@@ -120,30 +87,33 @@ export class Bar {
       put(resume, `${say("resume")} · ${say("stopped", age, cause ? `: ${cause}` : "")}`);
       const moves = Number(robot.state.left_duty) || Number(robot.state.right_duty);
       resume.disabled = !this.link.mayDrive || Boolean(moves);
+      // Whoever has not stopped it himself is told once, by voice as well.
+      const isNew = this.wasStopped === false && this.stopOf === robot;
+      if (isNew && !stopSaid.textContent) this.stop.say("stopped_elsewhere", cause);
     } else if (this.wasStopped) {
-      stopSaid.textContent = "";
+      this.stop.say(null);
     }
     this.wasStopped = stopped;
+    this.stopOf = robot;
   }
 }
+
+/** By the names of the robot: what holds it when it does not hear a board. */
+const HELD_BY = { sensor: "blind", steering: "unheard" };
 
 /** What a robot does, in words. */
 export function doing(robot) {
   const { phase, next, product, hold, remedy } = robot?.state ?? {};
   if (!phase) return "";
-  const words = [sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase];
+  const words = [phase === "driving" && !next ? say("drives") : sentence(`phase_${phase}`, { node: crossing(next) }) ?? phase];
   if (product !== undefined) words.push(say("fetches", product));
   if (hold !== "none") words.push(sentence(`hold_${hold}`));
   for (const board of ["sensor", "steering"]) {
-    if (robot.state[`${board}_up`] === "0") words.push(say("board_lost", board));
+    // The reason why it stands may have said it.
+    if (robot.state[`${board}_up`] === "0" && hold !== HELD_BY[board]) words.push(say("board_lost", say(`board_${board}`)));
   }
   const why = failure({ ...robot.state, failure_node: robot.state.node });
   // Stop and mode stand beside it.
   const end = ["resume", "mode"].includes(remedy) ? null : sentence(`remedy_${remedy}`);
   return [words.filter(Boolean).join(", "), why, end].filter(Boolean).join(". ");
-}
-
-/** Changes a text only where it is another one: a live region would say it again. */
-export function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }

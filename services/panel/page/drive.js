@@ -4,7 +4,8 @@
 //   up, blur, hidden, cancel, lost link, stale state ----------> "drive 1" once, then silence
 //
 // A command lives 200 ms by its lease, so a page that dies lets the robot stand. Steps of the arm and
-// the quarter turns are given once a press and are never cut short by letting go.
+// the eighth turns are given once a press. Nothing cuts one of them short but the command to stand:
+// what is held ends before one, and nothing is held or begun while one is under way.
 
 import { say } from "./words.js";
 
@@ -46,6 +47,9 @@ const STEPS = [
   ["FA", "release", [".", "\u00f7", "/"]],
 ];
 
+/** Keys whose names are long, as they are printed on keyboards. */
+const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", ArrowRight: "\u2192", PageUp: "PgUp", PageDown: "PgDn" };
+
 export class Driving {
   constructor(link, parts, robot, now) {
     this.link = link;
@@ -54,7 +58,8 @@ export class Driving {
     this.now = now;
     this.held = null;
     this.timer = null;
-    this.stepping = false;
+    /** The robot that a step or a turn is under way on. */
+    this.step = null;
     this.buttons();
     this.keys();
     this.releases();
@@ -80,17 +85,22 @@ export class Driving {
     return null;
   }
 
-  hold(code, source) {
+  /** `source` is the key, pointer or stick that holds it; a button's hold ends with its focus, too. */
+  hold(code, source, button = null) {
     if (this.held) return;
     const why = this.objection();
     if (why) return this.tell(...why);
+    if (this.step === this.robot()) return this.tell("wait");
     this.tell(null);
-    this.held = { code, source, robot: this.robot() };
+    this.held = { code, source, button, robot: this.robot() };
+    button?.classList.add("down");
     this.timer = setInterval(() => this.renew(), RENEW_MS);
     this.renew();
   }
 
   async renew() {
+    if (this.held.source === "pad") this.pads();
+    if (!this.held) return;
     const { code, robot } = this.held;
     if (this.objection() || robot !== this.robot()) return this.letGo();
     if (this.link.backlog > BACKLOG) return this.letGo("full");
@@ -117,19 +127,23 @@ export class Driving {
   async once(action) {
     const why = this.objection();
     if (why) return this.tell(...why);
-    // What is held ends for it, so the robot is not driven on while something else runs.
-    if (action === `drive ${STAND} 1000`) this.letGo();
-    if (this.stepping) return this.tell("wait");
     const robot = this.robot();
-    if (action.startsWith("arm") && this.held) {
-      this.letGo();
-      return this.tell("arm_waits");
-    }
+    const isStand = action === `drive ${STAND} 1000`;
+    if (!isStand && this.step === robot) return this.tell("wait");
+    const wasHeld = this.held !== null;
+    // What is held ends for it, so the robot is not driven on while something else runs.
+    this.letGo();
+    if (action.startsWith("arm") && wasHeld) return this.tell("arm_waits");
     this.tell(null);
-    this.stepping = true;
+    if (isStand) return this.hear(await this.link.act(robot, action));
+    this.step = robot;
     const answer = await this.link.act(robot, action);
-    this.stepping = false;
-    if (answer.refused) this.tell("refused", answer.refused === "lost" ? say("lost") : answer.refused);
+    if (this.step === robot) this.step = null;
+    this.hear(answer);
+  }
+
+  hear({ refused }) {
+    if (refused) this.tell("refused", refused === "lost" ? say("lost") : refused);
   }
 
   buttons() {
@@ -149,17 +163,17 @@ export class Driving {
     const button = addButton(pad, word, keys);
     button.addEventListener("pointerdown", (event) => {
       button.setPointerCapture(event.pointerId);
-      button.classList.add("down");
-      this.hold(code, button);
+      this.hold(code, button, button);
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
       button.addEventListener(end, () => this.release(button));
     }
     button.addEventListener("contextmenu", (event) => event.preventDefault());
     button.addEventListener("keydown", (event) => {
-      if (event.key === "Enter" && !event.repeat) this.hold(code, button);
+      if (event.key === "Enter" && !event.repeat) this.hold(code, event.key, button);
     });
-    button.addEventListener("keyup", () => this.release(button));
+    // Wherever the key comes up: the focus may be elsewhere by then.
+    button.addEventListener("blur", () => this.held?.button === button && this.letGo());
   }
 
   release(source) {
@@ -169,7 +183,9 @@ export class Driving {
   keys() {
     const find = (table, key) => table.find(([, , keys]) => keys.includes(key));
     addEventListener("keydown", (event) => {
-      if (isText(event.target) || event.ctrlKey || event.altKey || event.metaKey) return;
+      // Another window may have the key's end.
+      if (event.ctrlKey || event.altKey || event.metaKey) return this.letGo();
+      if (isText(event.target)) return;
       const held = find(HELD, event.key);
       const once = find(ONCE, event.key);
       const step = find(STEPS, event.key.toLowerCase());
@@ -214,7 +230,7 @@ export class Driving {
 
 /** Whether keys belong to a field. */
 export function isText(element) {
-  return element instanceof HTMLElement && (element.matches("input:not([type=checkbox]), textarea, select") || element.isContentEditable);
+  return element instanceof HTMLElement && (element.matches("input:not([type=checkbox], [type=radio]), textarea, select") || element.isContentEditable);
 }
 
 function addButton(parent, word, keys) {
@@ -223,7 +239,12 @@ function addButton(parent, word, keys) {
   button.dataset.word = word;
   button.id = `${parent.id}-${word}`;
   button.textContent = say(word);
-  if (keys.length) button.setAttribute("aria-keyshortcuts", keys[0]);
+  if (keys.length) {
+    button.setAttribute("aria-keyshortcuts", keys[0]);
+    button.dataset.key = SIGNS[keys[0]] ?? keys[0];
+  }
+  // A key that repeats is one press.
+  button.addEventListener("keydown", (event) => event.repeat && event.key === "Enter" && event.preventDefault());
   parent.append(button);
   return button;
 }

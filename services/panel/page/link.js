@@ -4,17 +4,21 @@
 //
 //   you <name> driver|viewer
 //   warehouse <json>
-//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [age_ms=<n>]
+//   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
 //   past <robot> <ms> <an event or a thought of so long ago>
 //   answer <number> done | refused <reason> | stopped <ms>
 //
 // What the page says:
 //
-//   do <robot> <number> <action>      the extension's action; answered once
+//   do <robot> <number> <ms> <action> the extension's action; answered once
 //   stop <robot> <number>             ahead of all else
-//   take <robot> <number>             the driver's seat; free <robot> <number> leaves it
+//   take <robot> <number>             the driver's seat, or asks whoever has it for it
+//   free | keep <robot> <number>      leaves it; does not leave it for whoever asks
 //   warehouse <number> <json>
+//   here <ms>                         once a second
+//
+// <ms> is this page's clock: what was held up on the way moves nothing.
 //
 // Nothing here draws, and nothing here is kept when the page is closed. After a lost connection the
 // station tells again what has happened.
@@ -24,6 +28,8 @@ export const STALE_MS = 500;
 /** How long trail and strips look back, in ms. */
 export const SPAN_MS = 60_000;
 
+/** How often the page says that it is there, in ms. */
+const HERE_MS = 1_000;
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
 /** What is known of one robot. */
@@ -33,6 +39,8 @@ class Robot {
     this.connected = false;
     this.speaks = false;
     this.driver = null;
+    /** Who asks the driver for the wheel. */
+    this.asks = null;
     /** When the station last heard it, by this page's clock. */
     this.heard = -Infinity;
     this.state = {};
@@ -86,6 +94,7 @@ export class Link extends EventTarget {
     this.waiting = new Map();
     this.tries = 0;
     this.connect();
+    setInterval(() => this.open && this.send("here", clock()), HERE_MS);
   }
 
   connect() {
@@ -123,14 +132,18 @@ export class Link extends EventTarget {
   ask(verb, robot, rest = "") {
     const number = ++this.number;
     if (!this.open || this.socket.readyState !== WebSocket.OPEN) {
-      return Promise.resolve({ refused: "lost" });
+      return Promise.resolve({ refused: "lost", unsent: true });
     }
-    this.socket.send([verb, robot, number, rest].filter((word) => word !== "" && word !== null).join(" "));
+    this.send(verb, robot, number, rest);
     return new Promise((settle) => this.waiting.set(String(number), settle));
   }
 
   act(robot, action) {
-    return this.ask("do", robot.name, action);
+    return this.ask("do", robot.name, `${clock()} ${action}`);
+  }
+
+  send(...words) {
+    this.socket.send(words.filter((word) => word !== "" && word !== null).join(" "));
   }
 
   /** Bytes that the browser has not sent yet: a dead link shows here first. */
@@ -174,6 +187,7 @@ export class Link extends EventTarget {
     robot.connected = said.connected === "1";
     robot.speaks = said.speaks === "1";
     robot.driver = said.driver === "-" ? null : said.driver;
+    robot.asks = said.asks ?? null;
     // One that speaks only the document's language shows nothing that could be old.
     robot.heard = said.age_ms === undefined ? -Infinity : performance.now() - Number(said.age_ms);
   }
@@ -232,6 +246,9 @@ export class Link extends EventTarget {
   }
 }
 
+/** The page's clock in whole ms. */
+const clock = () => Math.round(performance.now());
+
 function fields(words) {
   return Object.fromEntries(words.map((word) => word.split("=", 2)));
 }
@@ -241,6 +258,12 @@ function pairs(list, word, index) {
   else list[list.length - 1][1] = Number(word);
   return list;
 }
+
+/** What is kept only to be saved (E11): heading, mode, next node, sensors, servos, orders. */
+const SAVED = ["heading_deg", "looks", "mode", "phase", "node", "next", "code", "stopped", "order", "product", "line_bits", "servos", "loads", "servo_errors"];
+
+/** A number where it is one; rows of digits stay what they are. */
+const plain = (text = null) => (/^-?\d{1,5}$/.test(text) ? Number(text) : text);
 
 /** Keeps what the strips and the trail show. */
 function remember(robot, now) {
@@ -259,6 +282,8 @@ function remember(robot, now) {
     battery: state.battery_dv === undefined ? null : Number(state.battery_dv) / 10,
     path_p50: robot.latency?.p50 ?? null,
     path_p99: robot.latency?.p99 ?? null,
+    // What is saved besides (E11).
+    ...Object.fromEntries(SAVED.map((key) => [key, plain(state[key])])),
     lost: ["sensor_lost", "steering_lost", "bus_lost"].reduce((sum, key) => sum + Number(state[key] ?? 0), 0),
   });
   // Ten minutes at twenty a second.

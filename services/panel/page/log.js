@@ -8,7 +8,7 @@ import { crossing, thought } from "./sentences.js";
 /** How long ago what is saved may be, in ms. */
 const KEPT_MS = 600_000;
 /** What a recording has of one moment, as strips and trail show it. */
-const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "null"] } };
+const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "string", "null"] } };
 /** What a recording has of what happened: the words of the station, and a thought's values. */
 const EVENT = {
   title: "lager.panel.Event",
@@ -50,9 +50,12 @@ export class Log {
 /** The figures of each moment as lines with commas. */
 function table({ past }) {
   const keys = Object.keys(figures(past[0]));
-  const rows = past.map((point) => [new Date(point.wall).toISOString(), ...keys.map((key) => point[key] ?? "")].join(","));
+  const rows = past.map((point) => [new Date(point.wall).toISOString(), ...keys.map((key) => cell(point[key] ?? ""))].join(","));
   return [`time,${keys.join(",")}`, ...rows, ""].join("\n");
 }
+
+/** Rows of numbers have commas of their own. */
+const cell = (value) => (String(value).includes(",") ? `"${value}"` : value);
 
 /** The same figures, and what happened meanwhile. */
 function recording({ past, events }) {

@@ -1,6 +1,7 @@
 // Puts the page together: one link, one robot in view, everything drawn once a picture.
 
 import { Arm } from "./arm.js";
+import { Asked, Where } from "./ask.js";
 import { Bar } from "./bar.js";
 import { Driving } from "./drive.js";
 import { Link } from "./link.js";
@@ -9,8 +10,7 @@ import { WarehouseMap } from "./map.js";
 import { Missions } from "./missions.js";
 import { Setup } from "./setup.js";
 import { Strips } from "./strips.js";
-import { change, current, say, translate } from "./words.js";
-import { put } from "./bar.js";
+import { change, current, put, say, translate } from "./words.js";
 
 const at = (id) => document.getElementById(id);
 const now = () => performance.now();
@@ -24,26 +24,30 @@ const bar = new Bar(link, {
   link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
   stop: at("stop"), stopSaid: at("stop-said"), resume: at("resume"),
 }, robot);
-const map = new WarehouseMap(at("map"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow") }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
+const map = new WarehouseMap(at("map"), at("map-text"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow"), isArmed: () => at("armed").checked }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
 const missions = new Missions(link, {
-  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"),
+  fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"), undo: at("queue-undo"),
   said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
 const arm = new Arm(at("arm-drawing"));
 const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm") }, robot, now);
+const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
+const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
 const setup = new Setup(link, {
   form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
   saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
-  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), calibrate: at("calibrate"), boardSaid: at("board-said"),
+  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), calibrate: at("calibrate"), calibration: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"), boardSaid: at("board-said"),
 }, robot);
 const strips = new Strips(at("strips"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), csv: at("save-csv"), mcap: at("save-mcap") }, robot);
 
 /** Puts an obstacle on an edge of a simulated world, or takes it away. */
-async function meetEdge([x, y, way]) {
+async function meetEdge([x, y, way] = []) {
   const shown = robot();
-  // Somebody else's world is real.
-  if (!shown?.truth || !link.mayDrive) return;
+  if (!shown || !link.mayDrive) return tell(shown ? "viewer" : "no_robot");
+  // A real floor has its own hands.
+  if (!shown.truth) return tell("real_floor");
+  if (x === undefined) return tell("no_way_here");
   const edge = `${x} ${y} ${way}`;
   const put = await link.act(shown, `obstacle put ${edge}`);
   const done = put.done ? "put" : (await link.act(shown, `obstacle take ${edge}`)).done ? "take" : null;
@@ -70,15 +74,22 @@ async function act(action) {
 }
 
 at("manual").onclick = () => act("mode manual");
-at("autonomous").onclick = () => act("mode autonomous");
-at("reset").onclick = () => act("reset");
+at("autonomous").onclick = () => {
+  driving.letGo();
+  // Whoever was driven by hand is lost until somebody says where it stands.
+  if (where.isOpen(robot())) where.ask(() => act("mode autonomous"));
+  else act("mode autonomous");
+};
+at("where-ask").onclick = () => link.warehouse && where.ask();
 at("control").onclick = async () => {
   const shown = robot();
   if (!shown) return;
   const mine = shown.driver === link.me;
   driving.letGo();
+  driving.tell(...(shown.driver && !mine ? ["asked_for", shown.driver] : [null]));
   const answer = await link.ask(mine ? "free" : "take", shown.name);
-  driving.tell(...(answer.refused ? ["refused", answer.refused] : [null]));
+  driving.tell(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+  if (mine && answer.done && where.isOpen(shown)) where.ask();
 };
 at("language").onclick = () => {
   change();
@@ -122,6 +133,7 @@ link.addEventListener("robots", () => {
   if (link.robots.has(chosen)) list.value = chosen;
 });
 link.addEventListener("warehouse", () => {
+  at("map-zone").classList.toggle("empty", !link.warehouse);
   map.setWarehouse(link.warehouse);
   missions.setWarehouse(link.warehouse);
   setup.setWarehouse(link.warehouse);
@@ -178,6 +190,7 @@ function drawRest(shown, time) {
   arm.draw(shown);
   strips.draw(shown);
   setup.draw(shown);
+  asked.draw(shown);
   log.draw(shown);
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];

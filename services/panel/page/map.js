@@ -1,11 +1,12 @@
 // The warehouse and the robots in it, as one drawing in mm that is panned and zoomed by its view box.
 
 import { SPAN_MS } from "./link.js";
-import { say } from "./words.js";
+import { crossing } from "./sentences.js";
+import { put, say } from "./words.js";
 
 const NS = "http://www.w3.org/2000/svg";
 /** The body in mm: track of the wheels, length before and behind the axle. */
-const BODY = { half: 90, front: 170, rear: 90 };
+const BODY = { half: 90, front: 170, rear: 110 };
 /** How long a robot takes to glide to a new pose, in ms. */
 const GLIDE_MS = 100;
 /** How far the ends of the warehouse are from the view's edge, in mm. */
@@ -29,8 +30,10 @@ const REDUCED = matchMedia("(prefers-reduced-motion: reduce)");
 
 export class WarehouseMap {
   /** `act` is told of an edge that was clicked; while `placesGoods()`, `place` of a square's side. */
-  constructor(svg, tools, act, placesGoods, place) {
+  constructor(svg, words, tools, act, placesGoods, place) {
     this.svg = svg;
+    this.words = words;
+    this.isArmed = tools.isArmed;
     this.act = act;
     this.placesGoods = placesGoods;
     this.place = place;
@@ -46,6 +49,7 @@ export class WarehouseMap {
     this.next = make("circle", { class: "next", r: 70 }, svg);
     this.unsure = make("circle", { class: "unsure" }, svg);
     this.ghost = robotShape(svg, "ghost");
+    this.cross = make("path", { class: "cross", d: "M-60 0H60M0 -60V60" }, svg);
     this.body = robotShape(svg, "robot");
     this.shown = null;
     this.pan();
@@ -151,9 +155,9 @@ export class WarehouseMap {
     const known = robot && robot.state.x_mm !== undefined;
     for (const part of [this.body, this.unsure, this.trail, this.route, this.next]) part.toggleAttribute("hidden", !known);
     this.ghost.toggleAttribute("hidden", !robot?.truth);
-    if (!known) return;
-    const stale = robot.isStale(now);
+    const stale = !robot || robot.isStale(now);
     this.svg.classList.toggle("stale", stale);
+    if (!known) return;
     const told = { x: Number(robot.state.x_mm), y: Number(robot.state.y_mm), heading: Number(robot.state.heading_deg ?? 0) };
     const pose = this.glide(this.onWayOut(told), now, stale);
     place(this.body, pose);
@@ -167,11 +171,27 @@ export class WarehouseMap {
 
   /** Draws what changes now and then: ways and goods. */
   draw(robot, now) {
-    if (robot?.state.x_mm === undefined || !this.shown) return;
-    this.drawTrail(robot, now);
-    this.drawWay(robot, this.shown);
+    put(this.words, this.describe(robot));
+    if (!robot) return;
     this.drawBlocked(robot);
     this.markGoods(robot);
+    if (robot.state.x_mm === undefined || !this.shown) return;
+    this.drawTrail(robot, now);
+    this.drawWay(robot, this.shown);
+  }
+
+  /** The picture for somebody who does not see it. */
+  describe(robot) {
+    if (!this.warehouse) return say("no_map");
+    const [width, height] = this.warehouse.size;
+    const goods = (this.warehouse.product ?? []).map(({ id, square, side }) => `${id} (${square.join(", ")}) ${say(side)}`);
+    const { node, looks, next } = robot?.state ?? {};
+    return [
+      say("text_size", width, height, goods.join("; ") || "\u2013"),
+      node && looks ? say("text_robot", crossing(node), say(looks)) : robot ? say("text_lost") : "",
+      next ? say("text_next", crossing(next)) : "",
+      robot?.blocked.size ? say("text_blocked", [...robot.blocked.keys()].map((way) => way.split(" ")).map(([x, y, side]) => `(${x}, ${y}) ${say(side)}`).join("; ")) : "",
+    ].filter(Boolean).join(" ");
   }
 
   /** Where to draw between two poses. */
@@ -272,6 +292,8 @@ export class WarehouseMap {
 
   show() {
     this.svg.setAttribute("viewBox", this.view.join(" "));
+    const [x, y, width, height] = this.view;
+    set(this.cross, "transform", `translate(${x + width / 2} ${y + height / 2}) scale(${width / 2_000})`);
   }
 
   /** A point of the screen in mm of the drawing. */
@@ -282,17 +304,31 @@ export class WarehouseMap {
     return [x, y];
   }
 
-  /** Drag to pan, wheel to zoom, arrows to pan; a click that does not move meets an edge. */
+  /** Drag or arrows to pan, wheel, two fingers or + and - to zoom; a click or Enter meets an edge. */
   pan() {
     let from = null;
     let moved = 0;
+    const fingers = new Map();
+    const apart = () => {
+      const [a, b] = [...fingers.values()];
+      return { far: Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY), clientX: (a.clientX + b.clientX) / 2, clientY: (a.clientY + b.clientY) / 2 };
+    };
     this.svg.addEventListener("pointerdown", (event) => {
+      fingers.set(event.pointerId, event);
       from = this.point(event);
-      moved = 0;
+      // A second finger zooms, so the first one meets nothing.
+      moved = fingers.size > 1 ? Infinity : 0;
       this.svg.setPointerCapture(event.pointerId);
     });
     this.svg.addEventListener("pointermove", (event) => {
       if (!from) return;
+      if (fingers.size === 2 && fingers.has(event.pointerId)) {
+        const before = apart().far;
+        fingers.set(event.pointerId, event);
+        const now = apart();
+        if (before > 0 && now.far > 0) this.zoom(before / now.far, this.point(now));
+        return;
+      }
       const [x, y] = this.point(event);
       moved += Math.hypot(event.movementX, event.movementY);
       if (moved < 5) return;
@@ -302,14 +338,36 @@ export class WarehouseMap {
       this.show();
     });
     this.svg.addEventListener("pointerup", (event) => {
+      fingers.delete(event.pointerId);
       if (from && moved < 5) this.meetEdge(this.point(event));
       from = null;
     });
-    this.svg.addEventListener("pointercancel", () => (from = null));
+    this.svg.addEventListener("pointercancel", (event) => {
+      fingers.delete(event.pointerId);
+      from = null;
+    });
+    this.svg.addEventListener("keydown", (event) => this.key(event));
     this.svg.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.zoom(event.deltaY > 0 ? 1.1 : 0.9, this.point(event));
     }, { passive: false });
+  }
+
+  /** Keys of the map itself, while the arrows do not drive. */
+  key(event) {
+    const [x, y, width, height] = this.view;
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (event.defaultPrevented || event.ctrlKey || event.altKey || event.metaKey) return;
+    if (step && this.isArmed()) return;
+    if (step) {
+      this.stopFollowing();
+      this.view = [x + (step[0] * width) / 10, y + (step[1] * height) / 10, width, height];
+      this.show();
+    } else if (event.key === "+") this.zoom(0.8);
+    else if (event.key === "-") this.zoom(1.25);
+    else if (event.key === "Enter" && !event.repeat) this.meetEdge([x + width / 2, y + height / 2]);
+    else return;
+    event.preventDefault();
   }
 
   /** The side of a square that a click is nearest to gets goods. */
@@ -331,7 +389,8 @@ export class WarehouseMap {
     let edge = null;
     if (Math.abs(gy - ny) < near && gx > 0 && gx < width) edge = [Math.floor(gx), ny, "right"];
     else if (Math.abs(gx - nx) < near && gy > 0 && gy < height) edge = [nx, Math.floor(gy), "up"];
-    if (edge && edge[0] >= 0 && edge[1] >= 0 && edge[0] <= width && edge[1] <= height) this.act(edge);
+    const isThere = edge && edge[0] >= 0 && edge[1] >= 0 && edge[0] <= width && edge[1] <= height;
+    this.act(isThere ? edge : undefined);
   }
 }
 
@@ -343,7 +402,7 @@ function nearestSide(x, y) {
 
 function robotShape(svg, name) {
   const group = make("g", { class: name, hidden: "" }, svg);
-  make("title", {}, group, say(name === "robot" ? "robot" : "screen"));
+  make("title", {}, group, say(name === "robot" ? "robot" : "ghost"));
   const { half, front, rear } = BODY;
   // It looks up at 0 degrees.
   make("path", { d: `M${-half} ${rear}V${-front + 50}L${-half + 50} ${-front}H${half - 50}L${half} ${-front + 50}V${rear}Z` }, group);

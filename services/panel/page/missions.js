@@ -1,8 +1,7 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
 import { crossing, sentence } from "./sentences.js";
-import { say, span } from "./words.js";
-import { put } from "./bar.js";
+import { put, say, span } from "./words.js";
 
 export class Missions {
   constructor(link, parts, robot) {
@@ -10,7 +9,11 @@ export class Missions {
     this.parts = parts;
     this.robot = robot;
     this.shown = null;
+    /** Number and name of goods, by number. */
+    this.names = new Map();
     this.order = Date.now() % 1_000_000_000;
+    /** What was taken out of the queue last: its products, and how many waited behind. */
+    this.taken = null;
     parts.fetch.addEventListener("submit", (event) => {
       event.preventDefault();
       this.act(`order ${++this.order} ${parts.goods.value}`);
@@ -23,7 +26,8 @@ export class Missions {
     };
     parts.picked.onclick = () => this.act("picked");
     parts.pickedForce.onclick = () => this.act("picked force");
-    parts.clear.onclick = () => this.act("clear");
+    parts.clear.onclick = () => this.takeBack("clear", this.robot()?.queue ?? []);
+    parts.undo.onclick = () => this.undo();
     link.addEventListener("event", ({ detail }) => this.remember(detail));
   }
 
@@ -33,10 +37,31 @@ export class Missions {
     const answer = await this.link.act(robot, action);
     const why = answer.refused === "lost" ? say("lost") : answer.refused;
     put(this.parts.said, answer.refused ? say("refused", why) : "");
+    return !answer.refused;
+  }
+
+  /** Takes orders out of the queue; `gone` are those, `behind` those that wait behind them. */
+  async takeBack(action, gone, behind = 0) {
+    const orders = gone.filter(({ order }) => order !== this.robot()?.state.order);
+    if (!(await this.act(action)) || !orders.length) return;
+    this.taken = { products: orders.map(({ product }) => product), behind };
+    this.parts.undo.hidden = false;
+  }
+
+  /** Orders anew what was taken out, and moves it to where it was. */
+  async undo() {
+    const { products, behind } = this.taken;
+    this.parts.undo.hidden = true;
+    for (const product of products) {
+      const order = ++this.order;
+      if (!(await this.act(`order ${order} ${product}`))) return;
+      for (let step = 0; step < behind; step++) await this.act(`up ${order}`);
+    }
   }
 
   setWarehouse(warehouse) {
     const { goods } = this.parts;
+    this.names = new Map((warehouse?.product ?? []).map(({ id, name = "" }) => [String(id), `${id} ${name}`.trim()]));
     goods.replaceChildren(...(warehouse?.product ?? []).map(({ id, name }) => new Option(name ? `${id} ${name}` : id, id)));
   }
 
@@ -72,19 +97,23 @@ export class Missions {
     const { queue } = this.parts;
     const current = robot?.state.product;
     const orders = (robot?.queue ?? []).filter(({ order }) => order !== robot.state.order);
-    const shown = JSON.stringify([current, orders, document.documentElement.lang]);
+    const shown = JSON.stringify([current, orders, [...this.names], document.documentElement.lang]);
     if (this.shown === shown) return;
     this.shown = shown;
     queue.replaceChildren();
-    if (current !== undefined) queue.append(item(`${current}  ${say("under_way")}`));
-    for (const { order, product } of orders) {
-      const line = item(product);
-      line.append(
-        button(say("first"), () => this.act(`first ${order}`)),
-        button(say("cancel"), () => this.act(`cancel ${order}`)),
-      );
+    if (current !== undefined) queue.append(item(`${this.names.get(current) ?? current}  ${say("under_way")}`));
+    orders.forEach(({ order, product }, index) => {
+      const line = item(this.names.get(product) ?? product);
+      const after = orders[index + 1];
+      const [up, down] = [
+        button("\u2191", say("move_up", product), () => this.act(`up ${order}`)),
+        button("\u2193", say("move_down", product), () => this.act(`up ${after.order}`)),
+      ];
+      [up.disabled, down.disabled] = [index === 0, !after];
+      const cancel = () => this.takeBack(`cancel ${order}`, [{ order, product }], orders.length - 1 - index);
+      line.append(up, down, button(say("cancel"), say("cancel_order", product), cancel));
       queue.append(line);
-    }
+    });
     if (!queue.children.length) queue.append(item(say("queue_empty")));
   }
 }
@@ -112,10 +141,12 @@ export function fill(list, lines, make) {
   list.replaceChildren(...lines.map(make));
 }
 
-function button(text, act) {
+function button(text, label, act) {
   const element = document.createElement("button");
   element.type = "button";
   element.textContent = text;
+  element.title = label;
+  element.setAttribute("aria-label", label);
   element.onclick = act;
   return element;
 }

@@ -1,8 +1,9 @@
 // Setting up: the warehouse with checks as one types, the line control's gains, the calibration.
 
-import { say } from "./words.js";
-import { put } from "./bar.js";
+import { put, say } from "./words.js";
 
+/** Line sensors of a robot. */
+const SENSORS = 11;
 const SIDES = ["left", "up", "right", "down"];
 
 export class Setup {
@@ -45,10 +46,11 @@ export class Setup {
     });
     parts.gains.addEventListener("input", () => (this.gainsTyped = true));
     parts.gainsBack.onclick = () => this.setGains(this.gainsBefore);
-    parts.calibrate.onclick = () => {
-      put(parts.boardSaid, say("calibrating"));
-      this.act("calibrate", "calibrated");
-    };
+    /** What each line sensor has seen since the calibration began; null while there is none. */
+    this.seen = null;
+    this.sensors = Array.from({ length: SENSORS }, () => document.createElement("span"));
+    parts.sensors.append(...this.sensors);
+    parts.calibrate.onclick = () => this.calibrate();
   }
 
   /** Puts goods at the side of a square, with the next number. */
@@ -98,8 +100,40 @@ export class Setup {
     this.save({ ...this.read(), product });
   }
 
+  /** Step by step: put it over tape, press and move it, read what came of it. */
+  async calibrate() {
+    const { calibrate, calibration, calibrationSaid } = this.parts;
+    const steps = [...calibration.children];
+    const at = (step) => steps.forEach((line, index) => line.toggleAttribute("aria-current", index === step));
+    this.seen = Array.from({ length: SENSORS }, () => new Set());
+    calibrate.disabled = true;
+    at(1);
+    put(calibrationSaid, say("calibrating"));
+    const robot = this.robot();
+    const { refused } = robot ? await this.link.act(robot, "calibrate") : { refused: say("no_robot") };
+    at(2);
+    put(calibrationSaid, refused ? say("refused", refused === "lost" ? say("lost") : refused) : say("calibrated"));
+    calibrate.disabled = false;
+  }
+
+  /** What the sensors see now, and which have seen both tape and floor. */
+  drawSensors(bits) {
+    let both = 0;
+    this.sensors.forEach((bar, index) => {
+      const bit = bits?.[index];
+      if (this.parts.calibrate.disabled && bit) this.seen[index].add(bit);
+      const isBoth = this.seen?.[index].size === 2;
+      both += Number(isBoth);
+      bar.classList.toggle("on", bit === "1");
+      bar.classList.toggle("both", isBoth);
+    });
+    const words = bits ? say("sensors_seen", bits, both) : say("sensors_unheard");
+    if (this.parts.sensors.getAttribute("aria-label") !== words) this.parts.sensors.setAttribute("aria-label", words);
+  }
+
   /** The gains in force stand in the fields, unless somebody types there. */
   draw(robot) {
+    this.drawSensors(robot?.state.line_bits);
     const { gain_p: p, gain_d: d } = robot?.state ?? {};
     this.gainsNow = p === undefined || d === undefined ? null : [p, d];
     put(this.parts.gainsNow, this.gainsNow ? say("gains_now", p, d) : say("gains_unset"));

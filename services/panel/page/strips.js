@@ -8,8 +8,8 @@ import { say } from "./words.js";
 
 /** Word, unit, least and most value, keys of the past. */
 const STRIPS = [
-  ["line_error", "½", -10, 10, ["line_error"]],
-  ["duty", "/255", 0, 255, ["left_duty", "right_duty"]],
+  ["line_error", "", -10, 10, ["line_error"]],
+  ["duty", "%", 0, 255, ["left_duty", "right_duty"]],
   ["distance", "cm", 0, 80, ["distance_cm"]],
   ["path", "µs", 0, null, ["path_p50", "path_p99"]],
   ["battery", "V", 9, 13, ["battery"]],
@@ -56,7 +56,9 @@ export class Strips {
 /** Figures with their unit, short enough for a caption. */
 function told(figures, unit) {
   if (unit === "µs" && Math.max(...figures) >= 1000) return `${figures.map((us) => (us / 1000).toFixed(1)).join(" / ")} ms`;
-  return `${figures.join(" / ")} ${unit}`;
+  // A duty is told in parts of 255.
+  if (unit === "%") return `${figures.map((duty) => Math.round(duty / 2.55)).join(" / ")} %`;
+  return `${figures.join(" / ")} ${unit}`.trim();
 }
 
 class Strip {

@@ -3,17 +3,17 @@
 const TABLE = {
   en: {
     add_product: "Add goods", age: "last heard {0} ago", arm: "Arm", arm_waits: "The robot drives: stop it first, then move the arm.",
-    armed: "keys and buttons drive", autonomous: "Autonomous", backward: "back", battery: "battery",
-    blocked: "not possible: {0}", board_lost: "{0} board is not heard", calibrate: "Calibrate (5 s)", calibrated: "calibrated",
-    calibrating: "move the robot over tape and floor", calibration: "Line sensor",
-    calibration_how: "Press, then move the robot slowly over tape and floor for five seconds. The strip of sensors below shows what it sees.",
+    armed: "Armed to drive", autonomous: "Autonomous", backward: "back", battery: "battery",
+    blocked: "not possible: {0}", board_lost: "{0} is not heard", calibrate: "Calibrate (5 s)", calibrated: "Calibrated: all eleven sensors saw tape and floor.",
+    calibrating: "Calibrating: each sensor that has seen both turns full.", calibration: "Line sensor",
+    calibration_how: "Press Calibrate, then move it slowly to and fro over tape and floor for five seconds.", calibration_put: "Put the robot over the tape.", sensors_seen: "line sensors {0}, of which {1} have seen tape and floor", sensors_unheard: "the line sensors are not heard",
     cancel: "cancel", clear: "Clear queue", clockwise: "claw cw", control_free: "Nobody drives. Take the wheel",
-    control_mine: "You drive. Let go", control_other: "{0} drives", counterclockwise: "claw ccw", delivery: "Delivery corner", detours: "round what was blocked: {0}",
+    control_mine: "You drive. Let go", control_other: "{0} drives. Ask for the wheel", counterclockwise: "claw ccw", delivery: "Delivery corner", detours: "round what was blocked: {0}",
     distance: "distance", down: "down", drive: "Drive", duty: "duty",
     duplicate: "two goods have the number {0}", event_failed: "cannot go on at {1}", event_getting_item: "fetches {0}",
     event_in_position: "stands at goods {0}", event_item_delivered: "has delivered {0}", event_next_node: "goes to {1}",
     event_pickup_refused: "does not feel the goods {0}", event_refused: "does not fetch {0}", event_way_blocked: "finds the way from {1} blocked",
-    fetch: "Fetch", fetches: "fetches {0}", filter: "filter", first: "first", fit: "Fit", follow: "Follow", follow_back: "follow line back",
+    fetch: "Fetch", fetches: "fetches {0}", filter: "filter", fit: "Fit", follow: "Follow", follow_back: "follow line back",
     follow_forward: "follow line", forward: "forward", full: "wait: the link does not keep up", gains: "Line control", gains_now: "now {0} and {1}", gains_unset: "as the board has them", put_back: "Put back {0} and {1}", goods: "goods", goods_string: "Goods as a string", goods_string_how: "write number,x,y,side with semicolons between, side 0 left, 1 up, 2 right, 3 down; this is not: {0}",
     history: "Delivered", in: "in", language: "Svenska", left: "left", left_diag: "45° left",
     load_file: "Load a file", map_string: "Map as a string", map_string_how: "write four numbers: squares in x and y, then the delivery corner, such as 4,3,0,3", no_warehouse: "this is no warehouse", no_way: "no way there", line_error: "line error", link: "link {0} ms", log: "Log", lost: "there is no connection to the station",
@@ -25,27 +25,34 @@ const TABLE = {
     picked_force: "Pick-up done, not felt", picks: "The robot picks goods up by itself", plain: "speaks only the document's language: no live picture",
     queue_empty: "Nothing waits.", reached_from: "from", refused: "{0}", release: "release", remove: "remove", reset: "It stands at the delivery, looking in",
     resume: "Hold to resume", right: "right", right_diag: "45° right", robot: "robot",
-    route: "way", save: "Save", save_csv: "Save CSV", save_file: "Save as a file", save_mcap: "Save MCAP", saved: "saved", screen: "screen", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
+    route: "way", save: "Save", save_csv: "Save CSV", save_file: "Save as a file", save_mcap: "Save MCAP", saved: "saved", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
     servo_voltage: "input voltage", servo_angle: "angle limit", servo_heat: "too hot", servo_range: "value out of range", servo_checksum: "checksum", servo_overload: "overload", servo_instruction: "unknown instruction",
     set: "Set", setup: "Set up",
     side: "Side of a square", size: "Squares", square: "square", squeeze: "squeeze", stale: "nothing new for {0}", stand: "stand", stands: "both boards stand, {0} ms",
     stop: "STOP", stop_lost: "NOT SENT: there is no connection to the station", stop_unconfirmed: "sent, not confirmed: the robot may still be moving",
     stopped: "STOPPED {0} ago{1}", stopped_short: "STOPPED", strips: "the last minute", station_drives: "the robot drives itself", under_way: "under way", undo: "Undo", unheard: "never heard",
-    up: "up", viewer: "you may look and stop", wait: "one at a time: a step is under way", where: "After driving by hand", zoom_in: "zoom in", zoom_out: "zoom out",
+    up: "up", viewer: "you may look and stop", wait: "one at a time: a step is under way", where: "Say where it stands", zoom_in: "zoom in", zoom_out: "zoom out",
+    asks: "{0} asks for the wheel.", asked_for: "{0} has been asked for the wheel", hand_over: "Hand over", keep: "Keep it", board_sensor: "the sensor board",
+    board_steering: "the steering board", stop_refused: "NOT SENT: {0}", stopped_elsewhere: "STOPPED: {0}",
+    map_how: "Arrows move the map, plus and minus zoom. Enter puts an obstacle on the way in the middle, or takes it away; while the warehouse is set up it puts goods there.",
+    move_up: "fetch {0} earlier", move_down: "fetch {0} later", cancel_order: "do not fetch {0}", no_way_here: "there is no way; click on one between two crossings",
+    real_floor: "put obstacles on a real floor by hand", text_size: "A warehouse of {0} by {1} squares. Goods: {2}.", text_robot: "The robot is at {0} and looks {1}.",
+    text_lost: "It is not known where the robot is.", text_next: "It goes to {0}.", text_blocked: "Blocked ways: {0}.", column: "column", row: "row", looks: "looks",
+    where_asked: "Where does the robot stand?", on_crossing: "On this crossing:", stands_there: "It stands there", later: "Later", ghost: "where it really is", drives: "drives", volts: "{0} V", battery_low: "{0} V, low",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
-    armed: "tangenter och knappar kör", autonomous: "Autonom", backward: "bakåt", battery: "batteri",
-    blocked: "går inte: {0}", board_lost: "{0} hörs inte", calibrate: "Kalibrera (5 s)", calibrated: "kalibrerad",
-    calibrating: "för roboten över tejp och golv", calibration: "Linjesensor",
-    calibration_how: "Tryck och för sedan roboten långsamt över tejp och golv i fem sekunder. Sensorremsan nedan visar vad den ser.",
+    armed: "Klar att köra", autonomous: "Autonom", backward: "bakåt", battery: "batteri",
+    blocked: "går inte: {0}", board_lost: "{0} hörs inte", calibrate: "Kalibrera (5 s)", calibrated: "Kalibrerad: alla elva sensorer såg tejp och golv.",
+    calibrating: "Kalibrerar: varje sensor som har sett båda blir full.", calibration: "Linjesensor",
+    calibration_how: "Tryck på Kalibrera och för den sedan långsamt fram och tillbaka över tejp och golv i fem sekunder.", calibration_put: "Ställ roboten över tejpen.", sensors_seen: "linjesensorer {0}, varav {1} har sett tejp och golv", sensors_unheard: "linjesensorerna hörs inte",
     cancel: "ta bort", clear: "Töm kön", clockwise: "klo medurs", control_free: "Ingen kör. Ta ratten",
-    control_mine: "Du kör. Släpp ratten", control_other: "{0} kör", counterclockwise: "klo moturs", delivery: "Leveranshörn", detours: "runt det som var spärrat: {0}",
+    control_mine: "Du kör. Släpp ratten", control_other: "{0} kör. Be om ratten", counterclockwise: "klo moturs", delivery: "Leveranshörn", detours: "runt det som var spärrat: {0}",
     distance: "avstånd", down: "ner", drive: "Kör", duty: "pådrag",
     duplicate: "två varor har numret {0}", event_failed: "kommer inte vidare vid {1}", event_getting_item: "hämtar {0}",
     event_in_position: "står vid vara {0}", event_item_delivered: "har levererat {0}", event_next_node: "kör till {1}",
     event_pickup_refused: "känner inte vara {0}", event_refused: "hämtar inte {0}", event_way_blocked: "finner vägen från {1} spärrad",
-    fetch: "Hämta", fetches: "hämtar {0}", filter: "filter", first: "först", fit: "Allt", follow: "Följ", follow_back: "följ linje bakåt",
+    fetch: "Hämta", fetches: "hämtar {0}", filter: "filter", fit: "Allt", follow: "Följ", follow_back: "följ linje bakåt",
     follow_forward: "följ linje", forward: "framåt", full: "vänta: länken hinner inte med", gains: "Linjereglering", gains_now: "nu {0} och {1}", gains_unset: "som kortet har dem", put_back: "Återställ {0} och {1}", goods: "varor", goods_string: "Varor som sträng", goods_string_how: "skriv nummer,x,y,sida med semikolon emellan, sida 0 vänster, 1 upp, 2 höger, 3 ner; detta är det inte: {0}",
     history: "Levererat", in: "in", language: "English", left: "vänster", left_diag: "45° vänster",
     load_file: "Läs in fil", map_string: "Karta som sträng", map_string_how: "skriv fyra tal: rutor i x och y, sedan leveranshörnet, som 4,3,0,3", no_warehouse: "detta är inget lager", no_way: "ingen väg dit", line_error: "linjefel", link: "länk {0} ms", log: "Logg", lost: "ingen förbindelse med stationen",
@@ -57,13 +64,21 @@ const TABLE = {
     picked_force: "Upplockning klar, känns ej", picks: "Roboten plockar upp varorna själv", plain: "talar bara dokumentets språk: ingen levande bild",
     queue_empty: "Inget väntar.", reached_from: "från", refused: "{0}", release: "släpp", remove: "ta bort", reset: "Den står vid leveransen och ser in i lagret",
     resume: "Håll för att fortsätta", right: "höger", right_diag: "45° höger", robot: "robot",
-    route: "väg", save: "Spara", save_csv: "Spara CSV", save_file: "Spara som fil", save_mcap: "Spara MCAP", saved: "sparat", screen: "skärm", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
+    route: "väg", save: "Spara", save_csv: "Spara CSV", save_file: "Spara som fil", save_mcap: "Spara MCAP", saved: "sparat", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
     servo_voltage: "matningsspänning", servo_angle: "vinkelgräns", servo_heat: "för varm", servo_range: "värde utanför området", servo_checksum: "kontrollsumma", servo_overload: "överlast", servo_instruction: "okänd instruktion",
     set: "Sätt", setup: "Ställ in",
     side: "Rutans sida", size: "Rutor", square: "ruta", squeeze: "kläm", stale: "inget nytt på {0}", stand: "stå", stands: "båda korten står, {0} ms",
     stop: "STOPP", stop_lost: "EJ SKICKAT: ingen förbindelse med stationen", stop_unconfirmed: "skickat, ej bekräftat: roboten kan röra sig",
     stopped: "STOPPAD för {0} sedan{1}", stopped_short: "STOPPAD", strips: "senaste minuten", station_drives: "roboten kör själv", under_way: "på väg", undo: "Ångra", unheard: "aldrig hörd",
-    up: "upp", viewer: "du får titta och stoppa", wait: "en i taget: ett steg pågår", where: "Efter körning för hand", zoom_in: "närmare", zoom_out: "längre bort",
+    up: "upp", viewer: "du får titta och stoppa", wait: "en i taget: ett steg pågår", where: "Säg var den står", zoom_in: "närmare", zoom_out: "längre bort",
+    asks: "{0} ber om ratten.", asked_for: "{0} har fått frågan om ratten", hand_over: "Lämna över", keep: "Behåll den", board_sensor: "sensorkortet",
+    board_steering: "styrkortet", stop_refused: "EJ SKICKAT: {0}", stopped_elsewhere: "STOPPAD: {0}",
+    map_how: "Pilarna flyttar kartan, plus och minus zoomar. Enter ställer ett hinder på vägen i mitten eller tar bort det; när lagret ställs in lägger det en vara där.",
+    move_up: "hämta {0} tidigare", move_down: "hämta {0} senare", cancel_order: "hämta inte {0}", no_way_here: "där finns ingen väg; klicka på en mellan två korsningar",
+    real_floor: "ställ ut hinder för hand på ett riktigt golv", text_size: "Ett lager med {0} gånger {1} rutor. Varor: {2}.",
+    text_robot: "Roboten är vid {0} och tittar {1}.", text_lost: "Det är okänt var roboten är.", text_next: "Den kör till {0}.", text_blocked: "Spärrade vägar: {0}.",
+    column: "kolumn", row: "rad", looks: "tittar", where_asked: "Var står roboten?", on_crossing: "I den här korsningen:", stands_there: "Där står den", later: "Senare",
+    ghost: "där den verkligen är", drives: "kör", volts: "{0} V", battery_low: "{0} V, lågt",
   },
 };
 
@@ -103,9 +118,17 @@ export function span(ms) {
 /** Fills in the words that stand in the page itself. */
 export function translate(root = document) {
   for (const element of root.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
-  for (const element of root.querySelectorAll("[data-label]")) element.setAttribute("aria-label", say(element.dataset.label));
+  for (const element of root.querySelectorAll("[data-label]")) {
+    element.setAttribute("aria-label", say(element.dataset.label));
+    if (element.type === "search") element.placeholder = say(element.dataset.label);
+  }
   for (const element of root.querySelectorAll("[data-title]")) {
     element.title = say(element.dataset.title);
     element.setAttribute("aria-label", say(element.dataset.title));
   }
+}
+
+/** Changes a text only where it is another one: a live region would say it again. */
+export function put(element, text) {
+  if (element.textContent !== text) element.textContent = text;
 }

@@ -8,9 +8,10 @@
 //!
 //! - [`Panel`]: the server, in one thread with tasks of its own.
 //! - `page`: the files, embedded.
-//! - `access`: who may open them.
+//! - `door`: how many connections there may be, and `access`: who may open the files.
 //! - `speech`: the lines that page and panel say to each other.
 //! - `socket`: one page's conversation, and `visit`: what it may do, has asked and has been told.
+//! - `late`: how late what a page says comes, and `handover`: who asks whom for the wheel.
 //!
 //! It knows of a robot what the station knows, joins no bus, and has no right that the station has
 //! not. What a page orders counts as long as its socket lives: the driver's seat is left with it.
@@ -18,6 +19,9 @@
 #![forbid(unsafe_code)]
 
 mod access;
+mod door;
+mod handover;
+mod late;
 mod page;
 mod socket;
 mod speech;
@@ -25,12 +29,12 @@ mod visit;
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::{Request, State, WebSocketUpgrade};
+use axum::extract::{ConnectInfo, Request, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
@@ -40,6 +44,8 @@ use tokio::sync::watch;
 
 pub use access::Tokens;
 use access::{Access, Rank};
+use door::{Door, Stays};
+use handover::Handover;
 
 /// Pages that may look at once.
 const MOST_PAGES: usize = 32;
@@ -82,6 +88,8 @@ pub(crate) struct Shared {
     pub(crate) handle: Handle,
     /// What the station knows, as its revision; whoever tells a page waits for it.
     pub(crate) changes: watch::Sender<u64>,
+    /// Who asks for which robot's wheel.
+    pub(crate) handover: Mutex<Handover>,
     access: Access,
     /// Numbers for the names of pages.
     pages: AtomicU32,
@@ -124,6 +132,7 @@ impl Panel {
             shared: Arc::new(Shared {
                 handle,
                 changes: watch::Sender::new(0),
+                handover: Mutex::default(),
                 access: Access::new(address, tokens),
                 pages: AtomicU32::new(0),
                 open: AtomicUsize::new(0),
@@ -174,14 +183,15 @@ impl Panel {
             let router = Router::new()
                 .route("/live", any(live))
                 .fallback(get(file))
-                .with_state(self.shared);
+                .with_state(self.shared)
+                .into_make_service_with_connect_info::<Stays>();
             let ended = async {
                 while !end.load(Ordering::Relaxed) {
                     tokio::time::sleep(LOOK).await;
                 }
             };
             tokio::select! {
-                served = axum::serve(listener, router) => served,
+                served = axum::serve(Door::new(listener), router) => served,
                 () = ended => Ok(()),
             }
         })?;
@@ -240,6 +250,7 @@ const WRONG_HOST: &str = "the panel answers to its address and not to this name"
 /// A page's socket.
 async fn live(
     State(shared): State<Arc<Shared>>,
+    ConnectInfo(stays): ConnectInfo<Stays>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
@@ -262,6 +273,7 @@ async fn live(
             "as many pages look as may; close one of them",
         );
     };
+    stays.allow();
     upgrade
         .max_message_size(LONGEST_MESSAGE)
         .on_upgrade(move |socket| socket::converse(socket, place, rank))

@@ -9,6 +9,7 @@ const FILES: &[(&str, &str, &str)] = &[
         include_str!("../page/style.css"),
     ),
     ("/arm.js", SCRIPT, include_str!("../page/arm.js")),
+    ("/ask.js", SCRIPT, include_str!("../page/ask.js")),
     ("/bar.js", SCRIPT, include_str!("../page/bar.js")),
     ("/drive.js", SCRIPT, include_str!("../page/drive.js")),
     ("/link.js", SCRIPT, include_str!("../page/link.js")),
@@ -25,6 +26,7 @@ const FILES: &[(&str, &str, &str)] = &[
         include_str!("../page/sentences.js"),
     ),
     ("/setup.js", SCRIPT, include_str!("../page/setup.js")),
+    ("/stop.js", SCRIPT, include_str!("../page/stop.js")),
     ("/strips.js", SCRIPT, include_str!("../page/strips.js")),
     ("/words.js", SCRIPT, include_str!("../page/words.js")),
 ];
@@ -114,5 +116,43 @@ mod tests {
         assert!(english.len() > 100, "{english:?}");
         let missing: Vec<_> = english.symmetric_difference(&swedish).collect();
         assert!(missing.is_empty(), "{file}: {missing:?}");
+    }
+
+    /// What stands between each `before` and the next quotation mark.
+    fn quoted<'t>(text: &'t str, before: &str) -> Vec<&'t str> {
+        let parts = text.split(before).skip(1);
+        parts.filter_map(|part| part.split('"').next()).collect()
+    }
+
+    #[test]
+    fn each_word_that_the_page_says_is_in_the_table_and_each_of_the_table_is_said() {
+        let (_, words) = super::file("/words.js").unwrap();
+        let (english, _) = words.split_once("  sv: {").unwrap();
+        let known = keys(english.split_once("  en: {").unwrap().1);
+        let mut said = BTreeSet::new();
+        for (_, _, content) in FILES {
+            for before in [
+                "say(\"",
+                "tell(\"",
+                "letGo(\"",
+                "data-word=\"",
+                "data-label=\"",
+                "data-title=\"",
+            ] {
+                said.extend(quoted(content, before));
+            }
+        }
+        let unknown: Vec<_> = said.difference(&known).collect();
+        assert!(unknown.is_empty(), "said and not in the table: {unknown:?}");
+        // Others stand in lists and in names that are put together.
+        let everything: String = FILES.iter().map(|(.., content)| *content).collect();
+        let put_together = ["mode_", "event_", "servo_", "board_", "side_"];
+        let unsaid: Vec<_> = known
+            .iter()
+            .filter(|key| !said.contains(*key))
+            .filter(|key| !put_together.iter().any(|prefix| key.starts_with(prefix)))
+            .filter(|key| !everything.contains(&format!("\"{key}\"")))
+            .collect();
+        assert!(unsaid.is_empty(), "in the table and never said: {unsaid:?}");
     }
 }

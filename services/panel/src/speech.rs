@@ -4,18 +4,23 @@
 //! # Page to panel, one line in a message
 //!
 //! ```text
-//! do <robot> <number> <action>      as in the extension; answered by `answer <number> ...`, once
+//! do <robot> <number> <ms> <action> as in the extension; answered by `answer <number> ...`, once
 //! stop <robot> <number>             stand at once; carried out before all that waits
-//! take <robot> <number>             the driver's seat; `free <robot> <number>` leaves it
+//! take <robot> <number>             the driver's seat; of whoever has it, it is asked for
+//! free <robot> <number>             leave it, for whoever asks first of all
+//! keep <robot> <number>             the driver does not leave it for whoever asks
 //! warehouse <number> <json>         another warehouse; the fields of the station's file
+//! here <ms>                         once a second
 //! ```
+//!
+//! `<ms>` is when it was said, by the page's own clock: an action that was held up is refused.
 //!
 //! # Panel to page, one or more lines in a message
 //!
 //! ```text
 //! you <name> driver|viewer          what this page is called and may do; the first line
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
-//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [age_ms=<int>]
+//! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, or `thought <text>`
 //! past <robot> <ms> <report>        an event or a thought of so long before this page came
 //! answer <number> done | stopped <ms> | refused <text>
@@ -34,6 +39,8 @@ pub(crate) enum Said {
     Do {
         robot: Name,
         number: u32,
+        /// When it was said, by the page's clock.
+        said_ms: u32,
         action: Action,
     },
     /// Stop a robot.
@@ -42,6 +49,13 @@ pub(crate) enum Said {
     Take { robot: Name, number: u32 },
     /// Leave it.
     Free { robot: Name, number: u32 },
+    /// Keep it, whoever asks.
+    Keep { robot: Name, number: u32 },
+    /// The page is there.
+    Here {
+        /// When it said so, by its clock.
+        said_ms: u32,
+    },
     /// Describe the warehouse.
     Warehouse {
         number: u32,
@@ -74,10 +88,13 @@ pub(crate) fn read(line: &str) -> Result<Said, Unread> {
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     match word {
         "warehouse" => read_warehouse(rest),
-        "do" | "stop" | "take" | "free" => read_for_robot(word, rest),
+        "here" => Ok(Said::Here {
+            said_ms: read_number(rest)?,
+        }),
+        "do" | "stop" | "take" | "free" | "keep" => read_for_robot(word, rest),
         _ => Err(Unread::new(
             None,
-            "a page says do, stop, take, free or warehouse",
+            "a page says do, stop, take, free, keep, warehouse or here",
         )),
     }
 }
@@ -99,10 +116,18 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
     let number = read_number(number)?;
     let robot = Name::new(robot).map_err(|error| Unread::new(Some(number), error.to_string()))?;
     if word == "do" {
+        let (said_ms, action) = action.split_once(' ').unwrap_or((action, ""));
+        let said_ms = said_ms.parse().map_err(|_| {
+            Unread::new(
+                Some(number),
+                "the page's time in ms belongs before the action",
+            )
+        })?;
         return match Order::read(&format!("do {number} {action}")) {
             Some(Ok(Order::Do { number, action })) => Ok(Said::Do {
                 robot,
                 number,
+                said_ms,
                 action,
             }),
             Some(Err(error)) => Err(Unread::new(Some(number), error.to_string())),
@@ -114,6 +139,7 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
         ("stop", _) => Ok(Said::Stop { robot, number }),
         ("take", "") => Ok(Said::Take { robot, number }),
         ("free", "") => Ok(Said::Free { robot, number }),
+        ("keep", "") => Ok(Said::Keep { robot, number }),
         _ => Err(Unread::new(
             Some(number),
             "nothing belongs behind the number",
@@ -135,8 +161,9 @@ mod tests {
         let Ok(Said::Do {
             robot,
             number: 5,
+            said_ms: 70_000,
             action,
-        }) = read("do r1 5 drive 2 200")
+        }) = read("do r1 5 70000 drive 2 200")
         else {
             panic!();
         };
@@ -147,10 +174,12 @@ mod tests {
     #[test]
     fn what_is_none_says_why_and_whose() {
         let why = |line| read(line).unwrap_err();
-        assert_eq!(why("do r1 5 fly").number, Some(5));
-        assert!(why("do r1 5 fly").why.contains("one of order"));
-        assert_eq!(why("do r1 x resume").number, None);
-        assert_eq!(why("do R! 5 resume").number, Some(5));
+        assert_eq!(why("do r1 5 0 fly").number, Some(5));
+        assert!(why("do r1 5 0 fly").why.contains("one of order"));
+        assert!(why("do r1 5 resume").why.contains("time in ms"));
+        assert_eq!(why("do r1 x 0 resume").number, None);
+        assert_eq!(why("do R! 5 0 resume").number, Some(5));
+        assert_eq!(why("here").number, None);
         assert_eq!(why("take r1 5 6").number, Some(5));
         assert!(why("hello").why.contains("warehouse"));
         assert_eq!(why("").number, None);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::sync::{MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
@@ -11,12 +12,18 @@ use tokio::sync::watch;
 
 use crate::Place;
 use crate::access::Rank;
+use crate::handover::{Handover, Request};
+use crate::late::Late;
 use crate::speech::{Said, Unread, read};
 
 /// How often a driver who drives nowhere is still there.
 const STAY: Duration = Duration::from_secs(1);
 /// How often a page is told of a robot that says nothing.
 const ABOUT: Duration = Duration::from_millis(100);
+/// How late an action may come that moves the robot or lets it move.
+const LATEST_MOVE: Duration = Duration::from_millis(200);
+/// How late any other may come.
+const LATEST: Duration = Duration::from_secs(2);
 /// Lines without a number that a page may say.
 const MOST_UNREAD: u32 = 20;
 
@@ -32,6 +39,9 @@ pub(crate) struct Visit {
     rank: Rank,
     /// The robots that this page drives.
     wheels: BTreeMap<Name, Driver>,
+    /// The robots whose drivers it has asked for the wheel, with the page's number.
+    asks: BTreeMap<Name, u32>,
+    late: Late,
     /// What robots have not answered yet, with the page's number.
     asked: Vec<(u32, Awaited)>,
     subscription: Subscription,
@@ -66,6 +76,8 @@ impl Visit {
             name,
             rank,
             wheels: BTreeMap::new(),
+            asks: BTreeMap::new(),
+            late: Late::default(),
             asked: Vec::new(),
             robots: BTreeMap::new(),
             warehouse: None,
@@ -111,36 +123,109 @@ impl Visit {
                 Err(why) => self.refuse(number, &why.to_string()),
             };
         }
+        if let Said::Here { said_ms } = said {
+            self.late.hear(said_ms, handle.now());
+            return;
+        }
         let (Said::Do { number, .. }
         | Said::Stop { number, .. }
+        | Said::Keep { number, .. }
         | Said::Take { number, .. }
         | Said::Free { number, .. }
-        | Said::Warehouse { number, .. }) = said;
+        | Said::Warehouse { number, .. }) = said
+        else {
+            return;
+        };
         if self.rank != Rank::Driver {
             return self.refuse(number, ONLY_LOOKS);
         }
         match said {
-            Said::Do { robot, action, .. } => self.act(&robot, number, action),
-            Said::Take { robot, .. } if self.wheels.contains_key(&robot) => {
-                self.answer(number, "done");
-            }
-            Said::Take { robot, .. } => match handle.take_wheel(&robot, &self.name) {
-                Ok(driver) => {
-                    self.wheels.insert(robot, driver);
-                    self.answer(number, "done");
+            Said::Do {
+                robot,
+                action,
+                said_ms,
+                ..
+            } => {
+                let late = self.late.hear(said_ms, handle.now());
+                if late > latest(action) {
+                    let late = late.as_millis();
+                    return self.refuse(number, &format!("came {late} ms late; give it anew"));
                 }
-                Err(why) => self.refuse(number, &why.to_string()),
-            },
+                self.act(&robot, number, action);
+            }
+            Said::Take { robot, .. } => self.take(robot, number),
             Said::Free { robot, .. } => {
                 self.wheels.remove(&robot);
                 self.answer(number, "done");
             }
+            Said::Keep { robot, .. } if self.wheels.contains_key(&robot) => {
+                self.handover().keep(&robot);
+                self.answer(number, "done");
+            }
+            Said::Keep { .. } => self.refuse(number, NOT_DRIVER),
             Said::Warehouse { warehouse, .. } => match handle.set_warehouse(*warehouse) {
                 Ok(()) => self.answer(number, "done"),
                 Err(why) => self.refuse(number, &why.to_string()),
             },
-            Said::Stop { .. } => {}
+            Said::Stop { .. } | Said::Here { .. } => {}
         }
+    }
+
+    /// Takes a free wheel, or asks for one that another page has.
+    fn take(&mut self, robot: Name, number: u32) {
+        if self.wheels.contains_key(&robot) {
+            return self.answer(number, "done");
+        }
+        let (page, now) = (self.place.number, Instant::now());
+        let another = self.handover().who(&robot).map(str::to_owned);
+        let another = another.filter(|another| *another != self.name);
+        if another.is_none() && self.driver_of(&robot).is_none() {
+            return self.seat(robot, number);
+        }
+        let asked = self.handover().ask(&robot, page, &self.name, now);
+        match asked {
+            Ok(()) => {
+                if let Some(before) = self.asks.insert(robot, number) {
+                    self.refuse(before, "it is asked for anew");
+                }
+            }
+            Err(who) => self.refuse(number, &format!("{who} has asked for the wheel before")),
+        }
+    }
+
+    fn seat(&mut self, robot: Name, number: u32) {
+        match self.place.shared.handle.take_wheel(&robot, &self.name) {
+            Ok(driver) => {
+                self.wheels.insert(robot, driver);
+                self.answer(number, "done");
+            }
+            Err(why) => self.refuse(number, &why.to_string()),
+        }
+    }
+
+    /// Sits down where a driver has left for this page, or says what he has said instead.
+    fn take_asked(&mut self) {
+        for (robot, number) in std::mem::take(&mut self.asks) {
+            let driver = self.driver_of(&robot);
+            let request = self
+                .handover()
+                .look(&robot, self.place.number, Instant::now());
+            if request == Request::Waits && driver.is_some() {
+                self.asks.insert(robot, number);
+                continue;
+            }
+            self.handover().withdraw(&robot, self.place.number);
+            match (driver, request) {
+                (None, _) => self.seat(robot, number),
+                (Some(by), Request::Kept) => self.refuse(number, &format!("{by} keeps the wheel")),
+                (Some(by), _) => self.refuse(number, &format!("{by} does not answer; ask again")),
+            }
+        }
+    }
+
+    fn handover(&self) -> MutexGuard<'_, Handover> {
+        let handover = self.place.shared.handover.lock();
+        handover.unwrap_or_else(PoisonError::into_inner)
     }
 
     fn act(&mut self, robot: &Name, number: u32, action: Action) {
@@ -152,9 +237,14 @@ impl Visit {
             // Its lease is the station's.
             (Action::Drive { wheels, .. }, Some(driver)) => driver.drive(wheels),
             (Action::Arm(step), Some(driver)) => driver.arm(step),
-            (Action::Resume | Action::Mode(_) | Action::Pick(_) | Action::Reset, None)
-                if self.driver_of(robot).is_some() =>
-            {
+            (
+                Action::Resume
+                | Action::Mode(_)
+                | Action::Pick(_)
+                | Action::Reset
+                | Action::Place(_),
+                None,
+            ) if self.driver_of(robot).is_some() => {
                 let by = self.driver_of(robot).unwrap_or_default();
                 return self.refuse(number, &format!("{by} drives the robot; ask him"));
             }
@@ -184,6 +274,7 @@ impl Visit {
     /// What the page has not been told yet.
     pub(crate) fn news(&mut self) -> String {
         self.take_answers();
+        self.take_asked();
         self.keep_wheels();
         self.tell_events();
         let handle = self.place.shared.handle.clone();
@@ -266,6 +357,10 @@ impl Visit {
             self.lines,
             "about {name} connected={connected} speaks={speaks} driver={driver}"
         );
+        let asks = self.handover().who(name).map(str::to_owned);
+        if let Some(who) = asks {
+            let _ = write!(self.lines, " asks={who}");
+        }
         if let Some(age) = age {
             let _ = write!(self.lines, " age_ms={}", age.as_millis());
         }
@@ -296,5 +391,26 @@ impl Visit {
         if let Some(seen) = &shown.latency {
             tell(5, seen.at, &|| Report::Latency(seen.value));
         }
+    }
+}
+
+impl Drop for Visit {
+    fn drop(&mut self) {
+        for robot in std::mem::take(&mut self.asks).into_keys() {
+            self.handover().withdraw(&robot, self.place.number);
+        }
+    }
+}
+
+/// How late an action may come. A command to stand is never too late.
+fn latest(action: Action) -> Duration {
+    match action {
+        Action::Drive { wheels, .. } if wheels.is_stop() => Duration::MAX,
+        Action::Drive { .. }
+        | Action::Arm(_)
+        | Action::Resume
+        | Action::Mode(_)
+        | Action::Place(_) => LATEST_MOVE,
+        _ => LATEST,
     }
 }

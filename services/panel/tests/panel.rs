@@ -1,15 +1,15 @@
 //! Who gets in: real sockets, a real station, and people with other addresses, names and tokens.
 
-use std::io::{Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_panel::{Panel, PanelError, Tokens};
-use lager_station::{Listen, Server, ServerConfig};
+use lager_station::{Handle, Listen, Server, ServerConfig, Warehouse};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::{Message, WebSocket};
 
@@ -19,6 +19,9 @@ const WATCHDOG: Duration = Duration::from_secs(60);
 /// A station with a panel.
 struct Running {
     address: SocketAddr,
+    /// Where robots connect.
+    station: SocketAddr,
+    handle: Handle,
     end: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -38,7 +41,8 @@ impl Running {
     fn new(tokens: Option<Tokens>) -> Self {
         let server = server();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let panel = Panel::on(listener, tokens, server.handle()).unwrap();
+        let (handle, station) = (server.handle(), server.address().unwrap());
+        let panel = Panel::on(listener, tokens, handle.clone()).unwrap();
         let address = panel.address().unwrap();
         let end = Arc::new(AtomicBool::new(false));
         let (ends, too) = (Arc::clone(&end), Arc::clone(&end));
@@ -48,6 +52,8 @@ impl Running {
         ];
         Self {
             address,
+            station,
+            handle,
             end,
             threads,
         }
@@ -90,6 +96,27 @@ impl Running {
         }
     }
 
+    /// A robot by its lines: it does what it is told, and keeps what it was told.
+    fn robot(&self, name: &str) -> Robot {
+        let stream = TcpStream::connect(self.station).unwrap();
+        stream.set_read_timeout(Some(WATCHDOG)).unwrap();
+        let (mut to, told) = (stream.try_clone().unwrap(), Arc::default());
+        writeln!(to, "lager 1 {name}").unwrap();
+        let keeps: Arc<Mutex<Vec<String>>> = Arc::clone(&told);
+        std::thread::spawn(move || {
+            for line in BufReader::new(stream).lines().map_while(Result::ok) {
+                if let Some(number) = line.strip_prefix("do ") {
+                    let number = number.split(' ').next().unwrap();
+                    if writeln!(to, "done {number}").is_err() {
+                        return;
+                    }
+                }
+                keeps.lock().unwrap().push(line);
+            }
+        });
+        Robot(told)
+    }
+
     fn own_page(&self) -> Page {
         self.page(&format!("http://{}", self.address), "").unwrap()
     }
@@ -126,6 +153,21 @@ impl Page {
                 return Some(line.to_owned());
             }
         }
+    }
+}
+
+/// A robot that is played.
+struct Robot(Arc<Mutex<Vec<String>>>);
+
+impl Robot {
+    /// The actions that it was given.
+    fn told(&self) -> Vec<String> {
+        let told = self.0.lock().unwrap();
+        let actions = told.iter().filter_map(|line| line.strip_prefix("do "));
+        actions
+            .filter_map(|action| action.split_once(' '))
+            .map(|(_, action)| action.to_owned())
+            .collect()
     }
 }
 
@@ -205,7 +247,7 @@ fn beyond_this_machine_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
     assert_eq!(panel.page(&origin, "").err(), Some(403));
     let mut viewer = panel.page(&origin, cookie).unwrap();
     assert!(viewer.line("you ").unwrap().ends_with(" viewer"));
-    for (number, line) in ["do r1 1 resume", "take r1 2", "do r1 3 drive 2 200"]
+    for (number, line) in ["do r1 1 0 resume", "take r1 2", "do r1 3 0 drive 2 200"]
         .into_iter()
         .enumerate()
     {
@@ -227,7 +269,7 @@ fn beyond_this_machine_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
 fn a_page_that_says_what_nobody_understands_is_told_and_then_closed() {
     let panel = Running::new(None);
     let mut page = panel.own_page();
-    page.say("do r1 7 fly");
+    page.say("do r1 7 0 fly");
     let answer = page.line("answer ").unwrap();
     assert!(answer.starts_with("answer 7 refused column"), "{answer}");
     for _ in 0..30 {
@@ -280,9 +322,156 @@ fn so_many_pages_look_at_once_and_one_that_goes_makes_room() {
     let origin = format!("http://{}", panel.address);
     assert_eq!(panel.page(&origin, "").err(), Some(503));
     pages.truncate(31);
-    let give_up = std::time::Instant::now() + WATCHDOG;
+    let give_up = Instant::now() + WATCHDOG;
     while panel.page(&origin, "").is_err() {
-        assert!(std::time::Instant::now() < give_up);
+        assert!(Instant::now() < give_up);
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+#[test]
+fn what_moves_a_robot_is_refused_when_it_was_held_up_on_the_way() {
+    let panel = Running::new(None);
+    let robot = panel.robot("r1");
+    let mut page = panel.own_page();
+    page.line("about r1 connected=1 speaks=1").unwrap();
+    page.say("take r1 1");
+    assert_eq!(page.line("answer 1").unwrap(), "answer 1 done");
+    // The page's clock counts from when it was opened: what it says here was never quicker.
+    page.say("here 10000");
+    page.say("do r1 2 10010 drive 2 200");
+    assert_eq!(page.line("answer 2").unwrap(), "answer 2 done");
+    // It comes at the same moment as one that was said half a second later, so it lay somewhere.
+    page.say("do r1 3 9500 drive 4 200");
+    let answer = page.line("answer 3").unwrap();
+    assert!(
+        answer.starts_with("answer 3 refused came ") && answer.contains(" ms late"),
+        "{answer}"
+    );
+    page.say("do r1 4 9500 arm F1");
+    assert!(page.line("answer 4").unwrap().contains(" ms late"));
+    // To stand it is never too late, and what moves nothing may take its time.
+    page.say("do r1 5 1 drive 1 200");
+    page.say("do r1 6 9500 gains 2 2");
+    for number in [5, 6] {
+        let beginning = format!("answer {number} ");
+        assert_eq!(page.line(&beginning).unwrap(), format!("{beginning}done"));
+    }
+    let told = robot.told();
+    assert_eq!(
+        told,
+        ["drive 00000010 150", "drive 00000001 150", "gains 2 2"]
+    );
+}
+
+#[test]
+fn the_wheel_is_handed_over_when_its_driver_says_so() {
+    let panel = Running::new(None);
+    let _robot = panel.robot("r1");
+    let (mut anna, mut bo, mut cy) = (panel.own_page(), panel.own_page(), panel.own_page());
+    anna.line("about r1 connected=1 speaks=1").unwrap();
+    anna.say("take r1 1");
+    assert_eq!(anna.line("answer 1").unwrap(), "answer 1 done");
+    let named = anna
+        .line("about r1 connected=1 speaks=1 driver=panel-")
+        .unwrap();
+    bo.say("keep r1 1");
+    assert!(
+        bo.line("answer 1")
+            .unwrap()
+            .contains("take the wheel first")
+    );
+
+    // Anna is asked and keeps it.
+    bo.say("take r1 2");
+    let asked = anna.line(&format!(
+        "{} asks=panel-",
+        named.split(" age").next().unwrap()
+    ));
+    assert!(asked.is_some());
+    cy.say("take r1 1");
+    assert!(
+        cy.line("answer 1")
+            .unwrap()
+            .contains("has asked for the wheel before")
+    );
+    anna.say("keep r1 2");
+    assert_eq!(anna.line("answer 2").unwrap(), "answer 2 done");
+    assert!(bo.line("answer 2").unwrap().ends_with("keeps the wheel"));
+
+    // She is asked again and hands it over; whoever did not ask does not come between.
+    bo.say("take r1 3");
+    anna.line(&format!(
+        "{} asks=panel-",
+        named.split(" age").next().unwrap()
+    ))
+    .unwrap();
+    anna.say("free r1 3");
+    assert_eq!(bo.line("answer 3").unwrap(), "answer 3 done");
+
+    // A driver whose page is gone has handed over, too; so has one whose asker is gone nobody to ask.
+    cy.say("take r1 2");
+    bo.line("about r1 connected=1 speaks=1 driver=panel-2 asks=panel-3")
+        .unwrap();
+    drop(bo);
+    assert_eq!(cy.line("answer 2").unwrap(), "answer 2 done");
+    anna.say("take r1 4");
+    cy.line("about r1 connected=1 speaks=1 driver=panel-3 asks=panel-1")
+        .unwrap();
+    drop(anna);
+    let alone = |line: &str| line.contains("driver=panel-3") && !line.contains("asks=");
+    while !alone(&cy.line("about r1").unwrap()) {}
+}
+
+#[test]
+fn a_page_that_takes_nothing_in_is_dropped_though_it_says_that_it_is_there() {
+    let panel = Running::new(None);
+    let mut page = panel.own_page();
+    page.line("you ").unwrap();
+    // 60 kB of news after the other, more than the system keeps for a socket.
+    let note = "a".repeat(60_000);
+    let end = Instant::now() + WATCHDOG;
+    let stream = page.0.get_mut().try_clone().unwrap();
+    stream.set_nonblocking(true).unwrap();
+    for side in (40..).map(|side| 40 + side % 100) {
+        let json = format!(r#"{{"size":[2,3],"side_length_cm":{side},"note":"{note}"}}"#);
+        let warehouse: Warehouse = serde_json::from_str(&json).unwrap();
+        panel.handle.set_warehouse(warehouse).unwrap();
+        // An empty pong, as an answer to no ping; it shows that somebody is there.
+        let said = (&stream).write_all(&[0x8A, 0x80, 0, 0, 0, 0]);
+        match said.map_err(|error| error.kind()) {
+            Ok(()) => {}
+            Err(ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) => return,
+            Err(other) => panic!("{other}"),
+        }
+        assert!(Instant::now() < end, "it is still served");
+        std::thread::sleep(Duration::from_millis(30));
+    }
+}
+
+#[test]
+fn whoever_connects_and_asks_nothing_is_sent_away() {
+    let panel = Running::new(None);
+    let mut silent = TcpStream::connect(panel.address).unwrap();
+    let mut slow = TcpStream::connect(panel.address).unwrap();
+    slow.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
+    let mut page = panel.own_page();
+    for stream in [&mut silent, &mut slow] {
+        let second = Some(Duration::from_secs(1));
+        stream.set_read_timeout(second).unwrap();
+        let end = Instant::now() + WATCHDOG;
+        loop {
+            match stream.read(&mut [0; 512]).map_err(|error| error.kind()) {
+                Ok(0) | Err(ErrorKind::ConnectionReset) => break,
+                Ok(_) => {}
+                Err(ErrorKind::WouldBlock | ErrorKind::TimedOut) => page.say("here 0"),
+                Err(other) => panic!("{other}"),
+            }
+            assert!(Instant::now() < end, "it is still there");
+        }
+    }
+    // A page stays, and others are served.
+    page.say("take r1 1");
+    assert!(page.line("answer 1").is_some());
+    assert_eq!(status(&panel.ask("/", &[("Host", &panel.host())])), 200);
 }

@@ -48,6 +48,11 @@ pub enum Action {
         /// The order.
         order: u32,
     },
+    /// `up`: fetch it before the one that is now before it.
+    Up {
+        /// The order.
+        order: u32,
+    },
     /// `clear`: fetch none of those that wait.
     Clear,
     /// `mode`: who drives.
@@ -287,6 +292,9 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
         "first" => Action::First {
             order: number(&mut reader)?,
         },
+        "up" => Action::Up {
+            order: number(&mut reader)?,
+        },
         "clear" => Action::Clear,
         "mode" => Action::Mode(reader.word().read(Mode::WANTED, Mode::from_word)?),
         "resume" => Action::Resume,
@@ -321,8 +329,8 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
             edge: Edge::read(&mut reader)?,
         },
         _ => {
-            let wanted = "one of order, cancel, first, clear, mode, resume, reset, place, picked, \
-                          pick, drive, arm, gains, calibrate and obstacle";
+            let wanted = "one of order, cancel, first, up, clear, mode, resume, reset, place, \
+                          picked, pick, drive, arm, gains, calibrate and obstacle";
             return Err(word.misread(wanted).into());
         }
     };
@@ -355,6 +363,7 @@ impl fmt::Display for Action {
             Self::Add { order, product } => write!(formatter, "order {order} {product}"),
             Self::Cancel { order } => write!(formatter, "cancel {order}"),
             Self::First { order } => write!(formatter, "first {order}"),
+            Self::Up { order } => write!(formatter, "up {order}"),
             Self::Clear => formatter.write_str("clear"),
             Self::Mode(mode) => write!(formatter, "mode {}", mode.as_str()),
             Self::Resume => formatter.write_str("resume"),

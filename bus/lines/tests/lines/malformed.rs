@@ -91,8 +91,8 @@ const REQUEST: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, a
                        thought, set_robot and set_heading";
 const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, styrcomm \
                       and pickup_done";
-const ACTION: &str = "one of order, cancel, first, clear, mode, resume, reset, place, picked, \
-                      pick, drive, arm, gains, calibrate and obstacle";
+const ACTION: &str = "one of order, cancel, first, up, clear, mode, resume, reset, place, \
+                      picked, pick, drive, arm, gains, calibrate and obstacle";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
                      pickup_refused, failed and way_blocked";
 

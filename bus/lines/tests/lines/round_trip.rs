@@ -113,6 +113,7 @@ fn action() -> impl Strategy<Value = Action> {
         (any::<u32>(), product_id()).prop_map(|(order, product)| Action::Add { order, product }),
         any::<u32>().prop_map(|order| Action::Cancel { order }),
         any::<u32>().prop_map(|order| Action::First { order }),
+        any::<u32>().prop_map(|order| Action::Up { order }),
         Just(Action::Clear),
         mode().prop_map(Action::Mode),
         Just(Action::Resume),

@@ -129,6 +129,13 @@ impl Conversation {
                     self.tasks.first(now, asker, id, order, before);
                 }
             },
+            Wanted::Up { order } => match self.before(order)? {
+                0 => return Ok(Begun::Done),
+                before => {
+                    let id = self.ids.fresh(now);
+                    self.tasks.up(now, asker, id, order, before);
+                }
+            },
             Wanted::Clear => {
                 let queue = self.known.queue.unwrap_or_default();
                 if queue.orders().is_empty() {
@@ -161,7 +168,10 @@ impl Conversation {
                 self.may_be_put_down()?;
                 let id = self.ids.fresh(now);
                 // Nobody carries a robot that is simulated, so its world does.
-                let world = self.known.is_simulated.then(|| edge_ask(WorldAskKind::Place, on));
+                let world = self
+                    .known
+                    .is_simulated
+                    .then(|| edge_ask(WorldAskKind::Place, on));
                 self.tasks.place(now, asker, id, on, world);
             }
             Wanted::Mode(mode) => self.ask_bridge(

@@ -429,6 +429,12 @@ fn orders_are_cancelled_moved_and_cleared() {
     assert_ne!(robot.pressed.expect("a press").id, first);
     assert_eq!(robot.queue(&queue(&[8, 4, 6])), ["done 4"]);
     assert_eq!(robot.hears(&["do 5 first 8"]), ["done 5"]);
+    assert_eq!(robot.hears(&["do 7 up 6"]), press);
+    assert_eq!(
+        robot.queue(&queue(&[8, 6, 4])),
+        ["done 7"],
+        "one place, not to the front"
+    );
 
     assert_eq!(robot.hears(&["do 6 clear"]), ["[presses QueueCleared]"]);
     assert_eq!(robot.queue(&queue(&[])), ["done 6"]);
@@ -555,7 +561,9 @@ fn obstacles_are_put_into_a_simulated_world() {
         refusal: WorldRefusal::RobotThere.into(),
         ..WorldAnswer::default()
     };
-    robot.conversation.answered_by_world(robot.now, id, &Ok(answer));
+    robot
+        .conversation
+        .answered_by_world(robot.now, id, &Ok(answer));
     let said = robot.done();
     assert!(
         said[0].starts_with("refused 1 the robot is there"),
@@ -592,31 +600,50 @@ fn a_robot_is_told_where_it_stands_and_a_simulated_one_is_put_there() {
         robot.status(&status);
         robot.done().contains(&line.to_owned())
     };
-    assert!(!is_done(&mut robot, waits_on(2, 1, Heading::Left), "done 1"));
+    assert!(!is_done(
+        &mut robot,
+        waits_on(2, 1, Heading::Left),
+        "done 1"
+    ));
     assert!(is_done(&mut robot, waits_on(2, 1, Heading::Up), "done 1"));
 
     robot.conversation.senses(Senses {
         truth: Some(Box::default()),
         ..Senses::default()
     });
-    assert_eq!(robot.hears(&["do 2 place 0 3 right"]), ["[asks the world Place]"]);
+    assert_eq!(
+        robot.hears(&["do 2 place 0 3 right"]),
+        ["[asks the world Place]"]
+    );
     let (id, ask) = robot.asked_world.expect("a request");
-    assert_eq!((ask.x, ask.y, ask.heading.get()), (0, 3, Some(Heading::Right)));
+    assert_eq!(
+        (ask.x, ask.y, ask.heading.get()),
+        (0, 3, Some(Heading::Right))
+    );
     let answer = WorldAnswer {
         outcome: Outcome::Done.into(),
         ..WorldAnswer::default()
     };
-    robot.conversation.answered_by_world(robot.now, id, &Ok(answer));
+    robot
+        .conversation
+        .answered_by_world(robot.now, id, &Ok(answer));
     assert_eq!(robot.done(), ["[presses Placed]"]);
     robot.pass(1);
-    assert!(is_done(&mut robot, waits_on(0, 3, Heading::Right), "done 2"));
+    assert!(is_done(
+        &mut robot,
+        waits_on(0, 3, Heading::Right),
+        "done 2"
+    ));
 
     // Nobody says that of a robot that drives.
     robot.hears(&["do 3 drive 2 200"]);
     robot.health.current_code = robot.steered.expect("an order").1;
     robot.told();
     let said = robot.hears(&["do 4 place 1 1 up"]);
-    assert!(said[0].starts_with("refused 4 the robot is moving"), "{said:?}");
+    assert!(
+        said[0].starts_with("refused 4 the robot is moving"),
+        "{said:?}"
+    );
 }
 
 #[test]

@@ -1,0 +1,403 @@
+//! Driving from the page: every way to let go, what runs once, which key is which command, a gamepad,
+//! and what is held up on the way.
+
+use lager_ports::{Clock, Subscriber};
+use lager_tests::{pid, wait_for};
+use lager_topics::SteeringState;
+use rustix::process::{Signal, kill_process};
+use serde_json::json;
+
+use crate::Scene;
+use crate::browser::Page;
+
+/// How long a robot may drive on after a release, in ms of its clock, which at this speed is that of
+/// the stamps.
+const RELEASE_MS: f64 = 200.0;
+/// How often one way is tried until it is quick enough: this machine may be held up meanwhile. A way
+/// that does not end a hold never is.
+const TRIES: usize = 3;
+
+/// Expressions that press and let go, or a step of a test for what only the browser can do.
+enum By {
+    Script(&'static str),
+    Browser(fn(&mut Page)),
+}
+
+impl By {
+    fn go(&self, page: &mut Page) {
+        match self {
+            Self::Script(script) => drop(page.value(script)),
+            Self::Browser(go) => go(page),
+        }
+    }
+}
+
+const KEY: By = By::Browser(|page| page.key_down("ArrowLeft"));
+const ENTER: By = By::Browser(|page| {
+    page.value("document.querySelector('#pad-left').focus()");
+    let params = json!({ "type": "rawKeyDown", "key": "Enter", "code": "Enter", "windowsVirtualKeyCode": 13 });
+    page.call("Input.dispatchKeyEvent", &params);
+});
+const FINGER: By = By::Browser(|page| page.touch("touchStart", "#pad-left"));
+const STICK: By = By::Script("pad.axes = [-1, 0]");
+
+/// Name, how it is held, and how it is let go.
+const WAYS: &[(&str, By, By)] = &[
+    ("key up", KEY, By::Browser(|page| page.key_up("ArrowLeft"))),
+    (
+        "another window",
+        KEY,
+        By::Script("dispatchEvent(new Event('blur'))"),
+    ),
+    (
+        "page hidden for good",
+        KEY,
+        By::Script("dispatchEvent(new Event('pagehide'))"),
+    ),
+    (
+        "another tab",
+        KEY,
+        By::Script(
+            "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); \
+             document.dispatchEvent(new Event('visibilitychange')); delete document.hidden",
+        ),
+    ),
+    (
+        "a text field",
+        KEY,
+        By::Script(
+            "document.querySelector('#filter').dispatchEvent(new FocusEvent('focusin', { bubbles: true }))",
+        ),
+    ),
+    (
+        "a key of the window",
+        KEY,
+        By::Script("dispatchEvent(new KeyboardEvent('keydown', { key: 'Tab', altKey: true }))"),
+    ),
+    (
+        "another view",
+        KEY,
+        By::Script("document.querySelector('#tab-drive').click()"),
+    ),
+    (
+        "a button's key up",
+        ENTER,
+        By::Browser(|page| page.key_up("Enter")),
+    ),
+    ("the focus leaves the button", ENTER, By::Browser(Page::tab)),
+    (
+        "the key comes up elsewhere",
+        ENTER,
+        By::Script(
+            "document.querySelector('#tab-log').dispatchEvent(new KeyboardEvent('keyup', \
+             { key: 'Enter', bubbles: true }))",
+        ),
+    ),
+    (
+        "finger up",
+        FINGER,
+        By::Browser(|page| page.touch("touchEnd", "#pad-left")),
+    ),
+    (
+        "pointer lost",
+        FINGER,
+        By::Browser(|page| page.touch("touchCancel", "#pad-left")),
+    ),
+    ("stick back", STICK, By::Script("pad.axes = [0, 0]")),
+    ("gamepad gone", STICK, By::Script("window.pad = null")),
+];
+
+/// How long after `from_ns` the board reports for the first time that the motors stand, in ms.
+fn stands(reports: &mut Subscriber<SteeringState>, from_ns: u64) -> f64 {
+    wait_for("the motors to stand", || {
+        let report = reports.receive().expect("readable")?;
+        let at = report.stamp().publish_time_ns;
+        let stand = (report.left_duty, report.right_duty) == (0, 0);
+        (at > from_ns && stand).then_some((at - from_ns) as f64 / 1e6)
+    })
+}
+
+#[test]
+fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.arm(&mut page);
+    page.listen_in();
+    let mut reports = scene.bus.subscriber::<SteeringState>().expect("a topic");
+    for (name, hold, release) in WAYS {
+        let mut times = Vec::new();
+        while times.len() < TRIES && times.iter().all(|ms| *ms > RELEASE_MS) {
+            page.value(
+                "window.pad = { mapping: 'standard', axes: [0, 0], buttons: [] }; \
+                 navigator.getGamepads = () => [window.pad]; document.activeElement.blur()",
+            );
+            page.pause();
+            hold.go(&mut page);
+            scene.wait_to_move();
+            while reports.receive().expect("readable").is_some() {}
+            assert!(!page.moves().is_empty(), "{name}");
+            let from = Clock::monotonic_ns();
+            release.go(&mut page);
+            times.push(stands(&mut reports, from));
+            page.pause();
+            // What was given before the release may stand before it.
+            let mut said = page.moves();
+            said.retain(|line| line != "drive 6 200");
+            assert_eq!(said, ["drive 1 200"], "{name}");
+            page.pause();
+            assert_eq!(page.moves(), [""; 0], "{name}: silence");
+            for key in ["ArrowLeft", "Enter"] {
+                page.key_up(key);
+            }
+        }
+        let quickest = times.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(quickest <= RELEASE_MS, "{name}: {times:.0?} ms");
+        scene.assert_stands();
+    }
+
+    // The box that arms, and the socket itself: nobody can say zero then.
+    scene.hold(&mut page, "ArrowLeft");
+    page.value("document.querySelector('#armed').click()");
+    scene.wait_to_stand();
+    page.key_up("ArrowLeft");
+    page.value("document.querySelector('#armed').click()");
+    page.moves();
+    scene.hold(&mut page, "ArrowLeft");
+    let from = Clock::monotonic_ns();
+    while reports.receive().expect("readable").is_some() {}
+    page.value("window.sent = []; line.close()");
+    stands(&mut reports, from);
+    page.wait_for("#control", "Nobody drives");
+    assert_eq!(page.moves(), [""; 0]);
+    page.key_up("ArrowLeft");
+    scene.assert_stands();
+    drop((page, reports));
+    scene.end();
+}
+
+/// Presses keys one right after the other, so that nothing can come between them.
+fn press(page: &mut Page, keys: &[&str]) {
+    for key in keys {
+        assert!(!key.contains('\''));
+    }
+    let keys = serde_json::to_string(keys).expect("JSON");
+    page.value(&format!(
+        "for (const key of {keys}) dispatchEvent(new KeyboardEvent('keydown', {{ key }}))"
+    ));
+}
+
+#[test]
+fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.arm(&mut page);
+    page.listen_in();
+    page.moves();
+
+    // An arrow while the arm makes a step is refused, in words.
+    press(&mut page, &["s", "ArrowUp"]);
+    page.wait_for("#drive-said", "one at a time");
+    assert_eq!(page.moves(), ["arm F6"]);
+    press(&mut page, &["PageUp"]);
+    let after = |page: &mut Page, key: &str, line: &str| {
+        wait_for(line, || {
+            if page.moves().iter().any(|said| said == line) {
+                return Some(());
+            }
+            press(page, &[key]);
+            None
+        });
+    };
+
+    // The command to stand comes through while a turn runs.
+    after(&mut page, "PageUp", "drive 8 1000");
+    scene.wait_to_move();
+    page.value("document.querySelector('#pad-stand').click()");
+    assert_eq!(page.moves(), ["drive 1 1000"]);
+    scene.wait_to_stand();
+    scene.assert_stands();
+
+    // What is held ends before a turn, which is then not cut by it nor by letting go of either key.
+    after(&mut page, "ArrowDown", "drive 4 200");
+    scene.wait_to_move();
+    let heading = |scene: &mut Scene| {
+        wait_for("the world", || {
+            let truth = scene.truth.latest().expect("readable")?;
+            Some(truth.heading_rad)
+        })
+    };
+    let before = heading(&mut scene);
+    page.moves();
+    press(&mut page, &["PageDown"]);
+    page.value(
+        "for (const key of ['ArrowDown', 'PageDown']) dispatchEvent(new KeyboardEvent('keyup', { key }))",
+    );
+    let mut said = page.moves();
+    said.retain(|line| line != "drive 4 200");
+    assert_eq!(said, ["drive 1 200", "drive 9 1000"]);
+    wait_for("it to have turned", || {
+        let turned = (heading(&mut scene) - before).abs().to_degrees() % 360.0;
+        (turned.min(360.0 - turned) > 25.0).then_some(())
+    });
+    scene.wait_to_stand();
+    assert_eq!(page.text("#drive-said"), "", "it has come to its end");
+    drop(page);
+    scene.end();
+}
+
+/// The keys of the document (G7, G8), and what each says.
+const KEYS: &[(&str, &str)] = &[
+    ("ArrowUp", "drive 2 200"),
+    ("ArrowDown", "drive 4 200"),
+    ("ArrowLeft", "drive 6 200"),
+    ("ArrowRight", "drive 7 200"),
+    ("PageUp", "drive 8 1000"),
+    ("PageDown", "drive 9 1000"),
+    ("1", "arm F1"),
+    ("2", "arm F2"),
+    ("q", "arm F3"),
+    ("w", "arm F4"),
+    ("a", "arm F5"),
+    ("s", "arm F6"),
+    ("z", "arm F7"),
+    ("x", "arm F8"),
+    (",", "arm F9"),
+    (".", "arm FA"),
+    ("\u{f7}", "arm FA"),
+    ("/", "arm FA"),
+    ("Q", "arm F3"),
+];
+
+#[test]
+fn each_key_says_what_the_document_says_once_and_nothing_in_text_fields() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.arm(&mut page);
+    page.listen_in();
+    page.moves();
+    for (key, line) in KEYS {
+        // One that repeats has been pressed before.
+        page.value(&format!(
+            "dispatchEvent(new KeyboardEvent('keydown', {{ key: {}, repeat: true }}))",
+            json!(key)
+        ));
+        assert_eq!(page.moves(), [""; 0], "{key}");
+        // A step before it may be under way still.
+        let said = wait_for(line, || {
+            press(&mut page, &[key]);
+            let said = page.moves();
+            (!said.is_empty()).then_some(said)
+        });
+        assert_eq!(said[0], *line, "{key}");
+        page.value(&format!(
+            "dispatchEvent(new KeyboardEvent('keyup', {{ key: {} }}))",
+            json!(key)
+        ));
+        page.moves();
+    }
+    // Held, each is given again and again; a step is not.
+    page.wait_until("document.querySelector('#drive-said').textContent === ''");
+    wait_for("a hold", || {
+        press(&mut page, &["ArrowUp"]);
+        (page.moves().len() > 2).then_some(())
+    });
+    page.value("dispatchEvent(new KeyboardEvent('keyup', { key: 'ArrowUp' }))");
+    scene.wait_to_stand();
+
+    page.click("#tab-log");
+    page.value("document.querySelector('#filter').focus()");
+    page.moves();
+    for (key, _) in KEYS {
+        page.value(&format!(
+            "document.querySelector('#filter').dispatchEvent(new KeyboardEvent('keydown', \
+             {{ key: {}, bubbles: true }}))",
+            json!(key)
+        ));
+    }
+    assert_eq!(page.moves(), [""; 0]);
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn what_is_old_is_grey_with_its_time_and_drives_nothing() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.arm(&mut page);
+    scene.hold(&mut page, "ArrowLeft");
+    let comm = pid(scene.up.service("comm").expect("it runs"));
+    kill_process(comm, Signal::STOP).expect("it runs");
+    page.wait_for("#link", "nothing new for");
+    page.wait_until("document.body.classList.contains('stale')");
+    let grey = "['.robot path', '.good rect', '.ghost path'].every((part) => { \
+                const style = getComputedStyle(document.querySelector(`#map ${part}`)); \
+                const quiet = getComputedStyle(document.querySelector('#history')).color; \
+                return [style.fill, style.stroke].includes(quiet); })";
+    page.wait_until(grey);
+    scene.wait_to_stand();
+    page.key_up("ArrowLeft");
+    page.listen_in();
+    page.key_down("ArrowLeft");
+    page.wait_for("#drive-said", "what is shown is old");
+    assert_eq!(page.moves(), [""; 0]);
+    page.key_up("ArrowLeft");
+    kill_process(comm, Signal::CONT).expect("it runs");
+    page.wait_for("#link", "link ");
+    page.wait_until("!document.body.classList.contains('stale')");
+    scene.assert_stands();
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.arm(&mut page);
+    // A nudge is no drive.
+    scene.hold(&mut page, "ArrowLeft");
+    page.wait_for("#map-text", "not known where");
+    page.key_up("ArrowLeft");
+    scene.wait_to_stand();
+    page.click("#autonomous");
+    page.wait_until("document.querySelector('#where').open");
+    assert_eq!(page.text("#mode"), "BY HAND");
+
+    // STOP in all its forms, in front of the question or not.
+    let stops: [fn(&mut Page); 3] = [
+        |page| page.key_down("Escape"),
+        |page| page.click("#stop"),
+        // With a list that is open.
+        |page| {
+            page.value("document.querySelector('#where [name=looks]').focus()");
+            page.click("#where [name=looks]");
+            page.pause();
+            page.key_down("Escape");
+        },
+    ];
+    for stop in stops {
+        stop(&mut page);
+        page.wait_for("#stop-said", "both boards stand");
+        page.key_up("Escape");
+        assert_eq!(page.value("document.querySelector('#where').open"), true);
+        scene.resume();
+        page.wait_until("document.querySelector('#resume').hidden");
+    }
+
+    // A simulated robot is put where it is said to be.
+    page.value(
+        "(() => { const { x, y, looks } = document.querySelector('#where-form').elements; \
+         [x.value, y.value, looks.value] = ['1', '1', 'up']; \
+         x.dispatchEvent(new Event('input', { bubbles: true })); })()",
+    );
+    page.click("#where [type=submit]");
+    page.wait_until("!document.querySelector('#where').open");
+    page.wait_for("#map-text", "The robot is at (1, 1) and looks up");
+    page.wait_for("#mode", "AUTONOMOUS");
+    wait_for("it to have been carried", || {
+        let truth = scene.truth.latest().expect("readable")?;
+        ((truth.x_mm - 500.0).abs() < 400.0 && (truth.y_mm - 500.0).abs() < 400.0).then_some(())
+    });
+    drop(page);
+    scene.end();
+}

@@ -1,0 +1,253 @@
+//! How the page behaves towards whoever reads, listens, has only keys or a small screen, or may not
+//! drive.
+
+use lager_tests::{Domain, wait_for};
+use lager_topics::LinkHealth;
+use serde_json::{Value, json};
+
+use crate::Scene;
+use crate::browser::{Browser, Page};
+
+const TABS: [&str; 4] = ["missions", "drive", "setup", "log"];
+
+/// Where STOP is nearer than 16 px to what can be pressed, to the screen's edge or to what it is not
+/// to be hit instead of.
+const NEAR_STOP: &str = "(() => { \
+    const stop = document.querySelector('#stop').getBoundingClientRect(); \
+    const near = [...document.querySelectorAll('button, select, input, a, [tabindex]')].filter((other) => { \
+      const box = other.getBoundingClientRect(); \
+      if (other.id === 'stop' || box.width === 0) return false; \
+      const across = Math.max(box.left - stop.right, stop.left - box.right); \
+      const down = Math.max(box.top - stop.bottom, stop.top - box.bottom); \
+      return Math.max(across, down) < 16; \
+    }).map((other) => other.id || other.outerHTML.slice(0, 60)); \
+    const edges = [stop.left, stop.top, innerWidth - stop.right, innerHeight - stop.bottom]; \
+    if (edges.some((edge) => edge < 16)) near.push(`edge ${edges}`); \
+    return near; })()";
+
+#[test]
+fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop() {
+    let scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    for (width, height) in [(1280, 720), (3840, 2160), (901, 700), (360, 740)] {
+        page.dress("light", width, height, width < 900);
+        for tab in TABS {
+            page.click(&format!("#tab-{tab}"));
+            page.value("scrollTo(0, 0)");
+            page.pause();
+            assert_eq!(
+                page.value(NEAR_STOP),
+                json!([]),
+                "{width} x {height}, {tab}"
+            );
+            let wide = page.value("document.documentElement.scrollWidth <= innerWidth");
+            assert_eq!(wide, true, "{width} x {height}, {tab} is too wide");
+        }
+    }
+    page.dress("light", 1280, 720, false);
+    for tab in ["missions", "drive"] {
+        page.click(&format!("#tab-{tab}"));
+        page.pause();
+        let fits = format!(
+            "document.documentElement.scrollHeight <= innerHeight && (() => {{ \
+             const side = document.querySelector('#{tab}'); \
+             return side.scrollHeight <= side.clientHeight; }})()"
+        );
+        assert_eq!(page.value(&fits), true, "{tab} scrolls");
+    }
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    let media = |page: &mut Page, wish: &str| {
+        let features = json!({ "features": [{ "name": "prefers-reduced-motion", "value": wish }] });
+        page.call("Emulation.setEmulatedMedia", &features);
+    };
+    media(&mut page, "reduce");
+    scene.wait_to_move();
+    scene.domain.done(&["stop"]);
+    // An alert: a screen reader says it at once.
+    page.wait_for("#stop-said[role=alert]", "STOPPED: it was ordered");
+    page.wait_for("#resume", "it was ordered");
+    let blinks = "getComputedStyle(document.querySelector('#resume')).animationName";
+    assert_eq!(page.value(blinks), "none");
+    media(&mut page, "no-preference");
+    assert_eq!(page.value(blinks), "latched");
+    scene.resume();
+    page.wait_until("document.querySelector('#resume').hidden");
+    page.wait_until("document.querySelector('#stop-said').textContent === ''");
+
+    // What is drawn jumps from pose to pose where motion is reduced, and glides otherwise.
+    let places = "(() => { window.places = new Set(); const robot = document.querySelector('#map .robot'); \
+                  new MutationObserver(() => places.add(robot.getAttribute('transform'))) \
+                    .observe(robot, { attributes: true }); })()";
+    media(&mut page, "reduce");
+    scene.wait_to_move();
+    page.value(places);
+    page.wait_until("window.places.size > 20");
+    let told = "(() => { const numbers = [...places].map((place) => place.match(/-?[\\d.]+/)[0]); \
+                return numbers.every((x) => x.endsWith('.0')); })()";
+    assert_eq!(page.value(told), true, "poses are told in whole mm");
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn the_words_are_swedish_for_who_reads_swedish() {
+    let scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    page.click("#language");
+    assert_eq!(page.text("#stop"), "STOPP");
+    page.wait_for("#link", "länk ");
+    assert_eq!(page.value("document.documentElement.lang"), "sv");
+    page.wait_for("#map-text", "Ett lager med 2 gånger 3 rutor");
+    page.call("Page.reload", &json!({}));
+    page.wait_for("#link", "länk ");
+    assert_eq!(page.text("#tab-missions"), "Uppdrag");
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn the_display_on_the_robot_stops_it() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene
+        .browser
+        .page(&format!("{}/screen", scene.url.trim_end_matches('/')));
+    scene.wait_to_move();
+    page.wait_until("document.querySelector('.screen #figures')?.textContent.length > 0");
+    assert_eq!(page.value(NEAR_STOP), json!([]));
+    page.key_down(" ");
+    page.key_up(" ");
+    page.wait_until(
+        "document.querySelector('#stop-said').textContent.includes('stand,') || \
+                     document.querySelector('#stop-said').textContent.includes('står,')",
+    );
+    scene.assert_stands();
+    scene.resume();
+    scene.wait_to_move();
+    page.click("#stop");
+    scene.wait_to_stand();
+    scene.assert_stands();
+    scene.resume();
+    drop(page);
+    scene.end();
+}
+
+/// The token behind `?token=` after these words, and the port.
+fn address(told: &str, before: &str) -> Option<String> {
+    let (_, rest) = told.split_once(before)?;
+    let (_, rest) = rest.split_once("http://0.0.0.0:")?;
+    let at = rest.split([' ', '\n']).next()?;
+    Some(format!("http://127.0.0.1:{at}"))
+}
+
+#[test]
+fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_stop() {
+    let domain = Domain::new();
+    let station = domain.start(&["station", "--listen", "127.0.0.1:0", "--panel", "0.0.0.0:0"]);
+    let (listens, driver, viewer) = wait_for("its addresses", || {
+        let told = station.output();
+        let (_, rest) = told.split_once("robots connect to ")?;
+        let listens = rest.split(',').next()?.to_owned();
+        let driver = address(&told, "the panel is at ")?;
+        let viewer = address(&told, "for who drives, and at ")?;
+        told.contains("looks and stops")
+            .then_some((listens, driver, viewer))
+    });
+    let up = domain.start(&["up", "--headless", "--station", &listens]);
+    let browser = Browser::new();
+    let stranger = driver.split('?').next().expect("an address");
+    let mut page = browser.page(stranger);
+    page.wait_until("document.body.textContent.includes('?token=')");
+
+    let open = |url: &str| {
+        let mut page = browser.page(url);
+        page.wait_until("document.readyState === 'complete' && !location.search");
+        page.value("localStorage.setItem('language', 'en')");
+        page.call("Page.reload", &json!({}));
+        page.wait_for("#link", "link ");
+        page
+    };
+    let mut looks = open(&viewer);
+    looks.wait_for("#driver", "you may look and stop");
+    looks.click("#fetch button");
+    looks.wait_for("#missions-said", "this page may look and stop");
+    looks.click("#tab-drive");
+    looks.click("#control");
+    looks.wait_for("#drive-said", "this page may look and stop");
+    looks.click("#stop");
+    looks.wait_for("#stop-said", "both boards stand");
+    looks.wait_until("document.querySelector('#resume').disabled");
+
+    // The cookie is the browser's, so whoever opens the driver's address drives from then on.
+    let mut drives = open(&driver);
+    drives.wait_until("!document.querySelector('#resume').disabled");
+    let at = drives.middle("#resume");
+    drives.mouse("mousePressed", at);
+    drives.wait_until("document.querySelector('#resume').hidden");
+    drives.mouse("mouseReleased", at);
+    let bus = domain.observe("r1", 1.0);
+    let mut health = bus.subscriber::<LinkHealth>().expect("a topic");
+    wait_for("the stop to be over", || {
+        let health = health.latest().expect("readable")?;
+        (health.stopped == 0).then_some(())
+    });
+    drop((page, looks, drives, health, bus, browser, up, station));
+    domain.assert_clean();
+}
+
+#[test]
+#[ignore = "axe-core's file is needed, in LAGER_AXE: tests/run"]
+fn an_accessibility_checker_finds_nothing_serious() {
+    let axe = std::env::var_os("LAGER_AXE").expect("LAGER_AXE");
+    let axe = std::fs::read_to_string(axe).expect("a file");
+    let scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    let mut found = Vec::new();
+    let mut check = |page: &mut Page, view: &str| {
+        for theme in ["light", "dark"] {
+            page.dress(theme, 1280, 720, false);
+            page.pause();
+            let call = "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', \
+                        'best-practice'] }).then(({ violations, passes }) => JSON.stringify({ \
+                        passes: passes.length, violations: violations.map(({ id, impact, nodes }) => \
+                        ({ id, impact, where: nodes.map(({ target }) => String(target)) })) }))";
+            let params = json!({ "expression": call, "awaitPromise": true, "returnByValue": true });
+            let said = page.call("Runtime.evaluate", &params);
+            let told = said["result"]["value"].as_str().expect("a result");
+            let told: Value = serde_json::from_str(told).expect("JSON");
+            assert!(told["passes"].as_u64() > Some(20), "{told}");
+            for violation in told["violations"].as_array().expect("a list") {
+                if ["serious", "critical"].contains(&violation["impact"].as_str().unwrap_or("")) {
+                    found.push(format!("{view}, {theme}: {violation}"));
+                }
+            }
+        }
+    };
+    page.value(&axe);
+    for tab in TABS {
+        page.click(&format!("#tab-{tab}"));
+        check(&mut page, tab);
+    }
+    page.click("#tab-drive");
+    page.click("#where-ask");
+    check(&mut page, "where it stands");
+    page.click("#where-later");
+    page.click("#stop");
+    page.wait_for("#stop-said", "both boards stand");
+    check(&mut page, "stopped");
+    scene.resume();
+    let url = format!("{}/screen", scene.url.trim_end_matches('/'));
+    page.value(&format!("location.href = '{url}'"));
+    page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
+    page.value(&axe);
+    check(&mut page, "screen");
+    assert!(found.is_empty(), "{found:#?}");
+    drop(page);
+    scene.end();
+}

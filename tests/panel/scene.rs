@@ -1,0 +1,158 @@
+//! A robot that is up with its panel, a browser at it, and what really happens.
+
+use lager_ports::{Bus, Clock, Subscriber};
+use lager_tests::{Domain, Running, wait_for};
+use lager_topics::TruthPose;
+
+use crate::browser::{Browser, Page};
+
+/// A robot that is up with its panel, and what really happens.
+pub(crate) struct Scene {
+    pub(crate) truth: Subscriber<TruthPose>,
+    pub(crate) bus: Bus,
+    pub(crate) up: Running,
+    pub(crate) browser: Browser,
+    pub(crate) url: String,
+    pub(crate) domain: Domain,
+}
+
+impl Scene {
+    pub(crate) fn new(speed: f64, more: &[&str]) -> Self {
+        let domain = Domain::new();
+        let speed_word = speed.to_string();
+        let mut args = vec!["up", "--panel", "127.0.0.1:0", "--speed", &speed_word];
+        args.extend(more);
+        let up = domain.start(&args);
+        let bus = domain.observe("r1", speed);
+        let url = wait_for("the panel's address", || {
+            let told = up.output();
+            let (_, rest) = told.split_once("the panel is at ")?;
+            rest.split_whitespace().next().map(str::to_owned)
+        });
+        Self {
+            truth: bus.subscriber().expect("a topic"),
+            bus,
+            up,
+            browser: Browser::new(),
+            url,
+            domain,
+        }
+    }
+
+    pub(crate) fn page(&self) -> Page {
+        let mut page = self.browser.page(&self.url);
+        // It speaks English, whatever this machine does.
+        page.wait_until("document.readyState === 'complete'");
+        page.value("localStorage.setItem('language', 'en')");
+        page.call("Page.reload", &serde_json::json!({}));
+        page.wait_for("#link", " ms");
+        page
+    }
+
+    pub(crate) fn moves(&mut self) -> Option<bool> {
+        let truth = self.truth.latest().expect("readable")?;
+        Some(truth.left_duty != 0 || truth.right_duty != 0)
+    }
+
+    pub(crate) fn wait_to_move(&mut self) {
+        wait_for("the robot to move", || self.moves().filter(|moves| *moves));
+    }
+
+    pub(crate) fn wait_to_stand(&mut self) {
+        wait_for("the robot to stand", || self.moves().filter(|moves| !moves));
+    }
+
+    /// It stands in all that the world shows from now on, for a while.
+    pub(crate) fn assert_stands(&mut self) {
+        let from = Clock::monotonic_ns();
+        let mut seen = 0;
+        while seen < 15 {
+            let truth = wait_for("the world", || self.truth.latest().expect("readable"));
+            if truth.stamp().publish_time_ns > from {
+                assert_eq!((truth.left_duty, truth.right_duty), (0, 0));
+                seen += 1;
+            }
+            drop(truth);
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    }
+
+    /// Takes the wheel and turns the robot over to the hand.
+    pub(crate) fn take_over(&mut self, page: &mut Page) {
+        page.click("#tab-drive");
+        page.click("#control");
+        page.wait_for("#control", "You drive");
+        page.click("#manual");
+        page.wait_for("#mode", "BY HAND");
+        self.wait_to_stand();
+    }
+
+    /// Takes the wheel, and lets keys and buttons drive.
+    pub(crate) fn arm(&mut self, page: &mut Page) {
+        self.take_over(page);
+        page.click("#armed");
+        page.value("document.activeElement.blur()");
+    }
+
+    /// Presses a key until the robot moves by it: a person whose order was held up presses anew.
+    pub(crate) fn hold(&mut self, page: &mut Page, key: &str) {
+        wait_for("the robot to be driven", || {
+            page.key_down(key);
+            for _ in 0..100 {
+                if self.moves() == Some(true) {
+                    return Some(());
+                }
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            page.key_up(key);
+            None
+        });
+    }
+
+    /// What the page has seen can be had as a table and as a recording, which others can read.
+    pub(crate) fn saves(&self, page: &mut Page) {
+        let folder = self.domain.folder();
+        page.wait_for("#link", " ms");
+        page.save_into(folder);
+        page.click("#tab-log");
+        page.click("#save-csv");
+        let table = wait_for("the table", || {
+            std::fs::read_to_string(folder.join("r1.csv")).ok()
+        });
+        assert!(table.starts_with("time,x,y,line_error,"), "{table}");
+        page.click("#save-mcap");
+        let file = folder.join("r1.mcap");
+        wait_for("the recording", || file.exists().then_some(()));
+        let file = file.to_str().expect("a name");
+        self.domain.done(&["bag", "check", file]);
+        let told = self.domain.run(&["bag", "info", "--json", file]);
+        let told: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
+        let topics = told["topics"].as_array().expect("topics");
+        let names: Vec<_> = topics.iter().map(|topic| &topic["topic"]).collect();
+        assert_eq!(names, ["events", "state"]);
+        assert!(
+            topics
+                .iter()
+                .all(|topic| topic["messages"].as_u64() > Some(0)),
+            "{told}"
+        );
+    }
+
+    /// Nothing is left of a stop.
+    pub(crate) fn resume(&self) {
+        self.domain.done(&["resume"]);
+    }
+
+    pub(crate) fn end(self) {
+        let Self {
+            truth,
+            bus,
+            up,
+            browser,
+            domain,
+            ..
+        } = self;
+        drop((truth, bus, browser, up));
+        domain.assert_clean();
+    }
+}

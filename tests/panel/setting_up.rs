@@ -1,0 +1,322 @@
+//! Setting up and ordering from the page: the warehouse by form, file and strings, the line control's
+//! gains, the calibration, the queue, the goods that cannot be reached, and the map's own controls.
+
+use lager_tests::wait_for;
+use serde_json::{Value, json};
+
+use crate::Scene;
+use crate::browser::Page;
+use crate::played::Stage;
+
+/// Changes a field as a person does, who then leaves it.
+fn fill(page: &mut Page, selector: &str, value: &str) {
+    page.value(&format!(
+        "(() => {{ const field = document.querySelector({}); field.value = {}; \
+         for (const name of ['input', 'change']) field.dispatchEvent(new Event(name, {{ bubbles: true }})); }})()",
+        json!(selector),
+        json!(value)
+    ));
+}
+
+/// The texts of all elements that fit, with commas.
+fn texts(page: &mut Page, selector: &str) -> String {
+    let all = page.value(&format!(
+        "[...document.querySelectorAll({})].map(({{ textContent }}) => textContent).join()",
+        json!(selector)
+    ));
+    all.as_str().expect("texts").to_owned()
+}
+
+#[test]
+fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
+    // A robot that waits, so that another warehouse disturbs nobody.
+    let scene = Scene::new(1.0, &["--mission", "3"]);
+    let mut page = scene.page();
+    let folder = scene.domain.folder().to_owned();
+    page.save_into(&folder);
+    page.click("#tab-setup");
+    page.click("#save-file");
+    let before = wait_for("the file", || {
+        let text = std::fs::read_to_string(folder.join("warehouse.json")).ok()?;
+        serde_json::from_str::<Value>(&text).ok()
+    });
+    assert_eq!(before["size"], json!([2, 3]));
+
+    // Size, corner and side by the form: what is typed is drawn once it is saved.
+    fill(&mut page, "#warehouse [name=width]", "4");
+    fill(&mut page, "#warehouse [name=height]", "5");
+    fill(&mut page, "#warehouse [name=side]", "60");
+    fill(&mut page, "#warehouse [name=delivery]", "4,5");
+    page.click("#warehouse [type=submit]");
+    page.wait_for("#setup-said", "saved");
+    page.wait_for("#map-text", "A warehouse of 4 by 5 squares");
+    page.wait_until("document.querySelectorAll('#map .node').length === 30");
+    page.wait_until(
+        "document.querySelector('#map .tape').x2.baseVal.value === 0 && \
+                     Math.abs(document.querySelector('#map .tape').y2.baseVal.value) === 3000",
+    );
+
+    // The strings of the document (M1, M3).
+    fill(&mut page, "#map-string", "3,2,0,2");
+    page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
+    fill(&mut page, "#goods-string", "7,1,0,3;8,2,1,0");
+    page.wait_for("#map-text", "Goods: 7 (1, 0) down; 8 (2, 1) left.");
+    fill(&mut page, "#map-string", "3,2,1,1");
+    page.wait_until("document.querySelector('#setup-said').textContent.length > 5");
+    assert!(page.text("#map-text").contains("3 by 2 squares"));
+
+    // The file that was saved makes it what it was.
+    let document = page.call("DOM.getDocument", &json!({}));
+    let query = json!({ "nodeId": document["root"]["nodeId"], "selector": "#load-file" });
+    let node = page.call("DOM.querySelector", &query)["nodeId"].clone();
+    let file = folder.join("warehouse.json");
+    page.call(
+        "DOM.setFileInputFiles",
+        &json!({ "files": [file], "nodeId": node }),
+    );
+    page.wait_for("#map-text", "A warehouse of 2 by 3 squares");
+    page.wait_until("document.querySelectorAll('#map .good').length === 3");
+    std::fs::remove_file(file).expect("it is there");
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    page.wait_until("document.querySelector('#sensors .on') !== null");
+    scene.take_over(&mut page);
+    page.click("#tab-setup");
+    for (p, d) in [("3", "4"), ("5", "6")] {
+        fill(&mut page, "#gains [name=p]", p);
+        fill(&mut page, "#gains [name=d]", d);
+        page.click("#gains [type=submit]");
+        page.wait_for("#gains-now", &format!("now {p} and {d}"));
+    }
+    page.wait_for("#gains-back", "Put back 3 and 4");
+    page.click("#gains-back");
+    page.wait_for("#gains-now", "now 3 and 4");
+
+    // It stands still on its tape, so no sensor sees both: the board says so, sensor by sensor.
+    page.click("#calibrate");
+    page.wait_for("#calibration [aria-current]", "move it slowly");
+    page.wait_for("#calibration-said", "Calibrating");
+    page.wait_until("document.querySelectorAll('#calibration-sensors span.on').length > 0");
+    page.wait_for("#calibration-said", "of the 11");
+    page.wait_until("!document.querySelector('#calibrate').disabled");
+    let seen =
+        page.value("document.querySelector('#calibration-sensors').getAttribute('aria-label')");
+    assert!(
+        seen.as_str()
+            .expect("words")
+            .contains("have seen tape and floor"),
+        "{seen}"
+    );
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    scene.wait_to_move();
+    // It stays where it is, with product 1 under way.
+    page.key_down("Escape");
+    page.key_up("Escape");
+    page.wait_for("#stop-said", "both boards stand");
+    let order = |page: &mut Page, product: &str| {
+        fill(page, "#goods", product);
+        page.click("#fetch button");
+    };
+    // The number of each waiting order is all of its text but the buttons.
+    let waiting = "[...document.querySelectorAll('#queue li:has(button)')].map((line) => \
+                   line.firstChild.textContent).join()";
+    for (product, queue) in [("2", "2"), ("3", "2,3"), ("1", "2,3,1")] {
+        order(&mut page, product);
+        page.wait_until(&format!("{waiting} === '{queue}'"));
+    }
+    let button = |line: usize, which: usize| {
+        format!(
+            "#queue li:has(button):nth-of-type({}) button:nth-of-type({which})",
+            line + 2
+        )
+    };
+    page.click(&button(1, 1));
+    page.wait_until(&format!("{waiting} === '3,2,1'"));
+    page.click(&button(0, 2));
+    page.wait_until(&format!("{waiting} === '2,3,1'"));
+    page.click(&button(0, 3));
+    page.wait_until(&format!("{waiting} === '3,1'"));
+    page.click("#queue-undo");
+    page.wait_until(&format!("{waiting} === '2,3,1'"));
+    page.click("#clear");
+    page.wait_until(&format!("{waiting} === ''"));
+    page.click("#queue-undo");
+    page.wait_until(&format!("{waiting} === '2,3,1'"));
+    assert_eq!(
+        page.value("document.querySelector('#queue-undo').hidden"),
+        true
+    );
+    scene.resume();
+    drop(page);
+    scene.end();
+}
+
+#[test]
+fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
+    let scene = Scene::new(4.0, &["--mission", "3"]);
+    let mut page = scene.page();
+    page.click("#picks");
+    page.wait_until("!document.querySelector('#picks').checked");
+    // A person says that he has picked: refused while the claw is empty, unless he insists.
+    page.wait_for("#doing", "stands at the goods");
+    page.click("#picked");
+    page.wait_until("document.querySelector('#missions-said').textContent.length > 5");
+    page.click("#picked-force");
+    wait_for("it to leave", || {
+        (!page.text("#doing").contains("stands at the goods")).then_some(())
+    });
+    page.wait_until("document.querySelectorAll('#history li').length === 1");
+    assert!(texts(&mut page, "#history li").contains('3'));
+    drop(page);
+    scene.end();
+}
+
+const SMALL: &str = "size = [2, 3]\nside_length_cm = 50\ndelivery = [0, 0]\n\
+    [[product]]\nid = 2\nname = \"nails\"\nsquare = [0, 2]\nside = \"right\"\n";
+
+#[test]
+fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
+    let stage = Stage::new(Some(SMALL), false);
+    let robot = stage.robot("r1", &["state sensor_up=1 steering_up=1"]);
+    let mut page = stage.page(&stage.url);
+    let now = |more: &str| {
+        robot.says(&[&format!(
+            "state x_mm=500 y_mm=500 heading_deg=0 node=1,1 looks=up hold=none mode=autonomous \
+             order=4 product=2 {more}"
+        )]);
+    };
+    now("phase=waiting_for_order failure=no_way failure_expected=0 failure_seen=0 remedy=way");
+    page.wait_for("#map .good.out-of-reach .why", "no way there");
+    page.wait_for("#doing", "There is no way from (1, 1) to where I must go");
+    page.wait_for("#queue li", "2 nails  under way");
+    now("phase=driving sensor_up=0 steering_up=1");
+    page.wait_for("#doing", "the sensor board is not heard");
+    page.click("#language");
+    page.wait_for("#doing", "sensorkortet hörs inte");
+    page.wait_until("document.querySelector('#map .out-of-reach') === null");
+    drop((page, robot));
+    stage.end();
+}
+
+#[test]
+fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() {
+    let mut scene = Scene::new(1.0, &[]);
+    let mut page = scene.page();
+    let view = |page: &mut Page| -> Vec<f64> {
+        let view = page
+            .value("document.querySelector('#map').getAttribute('viewBox').split(' ').map(Number)");
+        let view = view.as_array().expect("a view").iter();
+        view.map(|number| number.as_f64().expect("a number"))
+            .collect()
+    };
+    let fitted = view(&mut page);
+    page.click("#zoom-in");
+    let near = view(&mut page);
+    assert!(near[2] < fitted[2]);
+    page.click("#zoom-out");
+    assert!(view(&mut page)[2] > near[2]);
+    page.click("#fit");
+    assert_eq!(view(&mut page), fitted);
+
+    let press = |page: &mut Page, key: &str| {
+        page.value(&format!(
+            "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', \
+             {{ key: '{key}', bubbles: true, cancelable: true }}))"
+        ));
+    };
+    press(&mut page, "ArrowRight");
+    let right = view(&mut page);
+    assert!(right[0] > fitted[0] && (right[1] - fitted[1]).abs() < 0.01);
+    press(&mut page, "+");
+    assert!(view(&mut page)[2] < right[2]);
+    page.click("#fit");
+
+    // Two fingers that part.
+    let (x, y) = page.middle("#map");
+    let fingers = |page: &mut Page, kind: &str, apart: f64| {
+        let points = match kind {
+            "touchEnd" => json!([]),
+            _ => json!([{ "x": x - apart, "y": y, "id": 1 }, { "x": x + apart, "y": y, "id": 2 }]),
+        };
+        page.call(
+            "Input.dispatchTouchEvent",
+            &json!({ "type": kind, "touchPoints": points }),
+        );
+    };
+    fingers(&mut page, "touchStart", 40.0);
+    for apart in [60.0, 80.0, 100.0] {
+        fingers(&mut page, "touchMove", apart);
+    }
+    fingers(&mut page, "touchEnd", 0.0);
+    let zoomed = view(&mut page);
+    assert!(zoomed[2] < fitted[2] * 0.7, "{zoomed:?} {fitted:?}");
+    assert_eq!(page.text("#map-said"), "", "nothing was put by it");
+
+    // It follows the robot until somebody moves it.
+    scene.wait_to_move();
+    page.click("#follow");
+    let before = view(&mut page);
+    wait_for("it to follow", || (view(&mut page) != before).then_some(()));
+    press(&mut page, "ArrowLeft");
+    assert_eq!(
+        page.value("document.querySelector('#follow').getAttribute('aria-pressed')"),
+        "false"
+    );
+
+    // Beside every way there is nothing to put, and it says so; a way in the middle takes it by Enter.
+    page.click("#fit");
+    page.click_at_mm(250.0, 250.0);
+    page.wait_for("#map-said", "there is no way");
+    page.value(
+        "(() => { const map = document.querySelector('#map'); \
+         const at = new DOMPoint(500, -1250).matrixTransform(map.getScreenCTM()); \
+         map.dispatchEvent(new WheelEvent('wheel', { deltaY: -1, clientX: at.x, clientY: at.y, cancelable: true })); })()",
+    );
+    page.click("#fit");
+    // The middle of the fitted view is moved onto the way from (1, 2) upwards, key by key.
+    for _ in 0..40 {
+        let [left, top, width, height] = view(&mut page)[..] else {
+            panic!()
+        };
+        let (off_x, off_y) = (
+            500.0 - (left + width / 2.0),
+            -1_250.0 - (top + height / 2.0),
+        );
+        if off_x.abs() < 60.0 && off_y.abs() < 180.0 {
+            break;
+        }
+        if off_x.abs() >= 60.0 && off_x.abs() < width / 20.0 {
+            press(&mut page, "+");
+        } else if off_x.abs() >= 60.0 {
+            press(
+                &mut page,
+                if off_x > 0.0 {
+                    "ArrowRight"
+                } else {
+                    "ArrowLeft"
+                },
+            );
+        } else {
+            press(&mut page, if off_y > 0.0 { "ArrowDown" } else { "ArrowUp" });
+        }
+    }
+    press(&mut page, "Enter");
+    page.wait_for("#map-said", "obstacle put");
+    press(&mut page, "Enter");
+    page.wait_for("#map-said", "obstacle taken away");
+    drop(page);
+    scene.end();
+}
