@@ -151,7 +151,7 @@ pub fn play(
         let writer = watchdog.over("opening the topic", open);
         writers.insert(name, writer.expect("a topic of the table")?);
     }
-    let here = |topic: &&TopicOverview| !wanted.contains(&topic.name);
+    let here = |topic: &&TopicOverview| !topic.is_derived && !wanted.contains(&topic.name);
     let others: Vec<_> = overview.topics.iter().filter(here).collect();
     let asked =
         |topic: &&&TopicOverview| config.topics.is_empty() || config.topics.contains(&topic.name);

@@ -38,6 +38,8 @@ pub struct External {
     pub told: String,
     /// What is told of the panel.
     pub panel: Option<String>,
+    /// What is told of the gateway.
+    pub gateway: Option<String>,
 }
 
 /// Chooses, and puts into `config` what comm is to know.
@@ -79,6 +81,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: None,
+            gateway: None,
             told: "there is no external computer; the warehouse is told here".into(),
         });
     }
@@ -86,6 +89,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: None,
+            gateway: None,
             told: format!("the external computer is the one at {address}"),
         });
     }
@@ -115,6 +119,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: panel.map(|panel| format!("the panel is at http://{panel}")),
+            gateway: None,
             told,
         });
     }
@@ -131,6 +136,7 @@ fn none(config: &mut Config, why: &anyhow::Error) -> External {
     External {
         listener: None,
         panel: None,
+        gateway: None,
         told: format!("there is no external computer: {why:#}; the warehouse is told here"),
     }
 }
@@ -143,6 +149,7 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     External {
         listener: Some(listener),
         panel: None,
+        gateway: None,
         told,
     }
 }
