@@ -41,6 +41,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["lager-ports", "lager-topics", "lager-wire"],
     ),
     ("lager-monitor", &["lager-ports", "lager-topics"]),
+    ("lager-gateway", &["lager-ports", "lager-topics"]),
     (
         "lager-recorder",
         &["lager-journal", "lager-ports", "lager-topics"],
@@ -92,6 +93,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "lager-plant",
             "lager-bridge",
             "lager-logic",
+            "lager-gateway",
             "lager-monitor",
             "lager-recorder",
             "lager-simulator",

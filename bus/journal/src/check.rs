@@ -201,7 +201,7 @@ impl Visit for Check {
         topic.messages += 1;
         let channel = self.channels.entry(message.channel);
         channel.or_insert_with(|| (name.clone(), 0)).1 += 1;
-        if !self.report.is_ours {
+        if !self.report.is_ours || message.topic.derived_from.is_some() {
             return;
         }
         let fault = match serde_json::from_slice::<Envelope<IgnoredAny>>(message.data) {

@@ -66,12 +66,24 @@ fn as_value(description: &Description) -> serde_json::Value {
     serde_json::to_value(description.json_schema()).expect("a schema is JSON")
 }
 
-/// The channel's metadata: what a stranger wants to know of the times in it.
-pub(crate) fn channel_notes() -> BTreeMap<String, String> {
-    [(
-        "times",
-        "stamp: ns of CLOCK_MONOTONIC; log and publish time: ns since 1970",
-    )]
-    .map(|(name, text)| (name.to_owned(), text.to_owned()))
-    .into()
+/// What the metadata of a channel of derived messages has; the text says of what they are made.
+const DERIVED: &str = "lager.derived";
+
+/// The channel's metadata: what a stranger wants to know of the times in it, or that it is derived.
+pub(crate) fn channel_notes(derived_from: Option<&str>) -> BTreeMap<String, String> {
+    let note = match derived_from {
+        None => (
+            "times",
+            "stamp: ns of CLOCK_MONOTONIC; log and publish time: ns since 1970",
+        ),
+        Some(from) => (DERIVED, from),
+    };
+    [note]
+        .map(|(name, text)| (name.to_owned(), text.to_owned()))
+        .into()
+}
+
+/// Of what a channel with such metadata is derived.
+pub(crate) fn derived_from(notes: &BTreeMap<String, String>) -> Option<&str> {
+    notes.get(DERIVED).map(String::as_str)
 }

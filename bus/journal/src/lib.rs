@@ -23,6 +23,10 @@
 //! was cut off still says what it lacks. The metadata record `lager.counts` has them for the file,
 //! and `lager.recording` says of which robot it is ([`Start`]).
 //!
+//! Beside the topics stand channels with the exact `foxglove.*` schemas ([`View`]), derived from
+//! what the topics say ([`Scene`]) so that viewers show map and robot without set-up. Their channel's
+//! metadata has the key `lager.derived`. They are no samples: nobody counts, plays or exports them.
+//!
 //! A message's publish time is its stamp's and its log time the same, but never before the recording
 //! began nor after the sample was received; both are ns since 1970, so that tools show a date.
 //!
@@ -40,6 +44,7 @@ mod ordered;
 mod overview;
 mod read;
 mod recover;
+mod scene;
 mod walk;
 mod write;
 
@@ -51,5 +56,6 @@ pub use ordered::{Ordered, Selection, Step};
 pub use overview::{Overview, OverviewReader, TopicOverview};
 pub use read::{Part, ReadError};
 pub use recover::{Recovered, Recovery};
+pub use scene::{Kind, Scene, Shown, View};
 pub use walk::{Damage, Learnt, Message, Topic, Visit, Walk};
 pub use write::{Channel, Journal, Start, Times, WriteError};

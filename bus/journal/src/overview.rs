@@ -8,6 +8,7 @@ use mcap::records::Record;
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
 use crate::counts::{self, Count, Counts};
+use crate::envelope::derived_from;
 use crate::read::{Part, ReadError};
 use crate::write::{RECORDING, Start};
 
@@ -23,6 +24,8 @@ pub struct TopicOverview {
     pub schema: String,
     /// The schema; empty if the file has none.
     pub schema_text: Vec<u8>,
+    /// Whether its messages are made of another topic's, and are no samples.
+    pub is_derived: bool,
     /// Messages in the file.
     pub messages: u64,
     /// What the file says of its losses; `None` if another program wrote it.
@@ -156,6 +159,7 @@ impl OverviewReader {
                     schema_text: schema
                         .map(|schema| schema.data.to_vec())
                         .unwrap_or_default(),
+                    is_derived: derived_from(&channel.metadata).is_some(),
                     messages: 0,
                     count: self.counts.get(&channel.topic).copied(),
                 });

@@ -93,7 +93,11 @@ impl Recovery {
                     name: message.topic.schema.clone(),
                     text: message.topic.schema_text.clone(),
                 };
-                let channel = journal.topic(&message.topic.name, &schema)?;
+                let name = &message.topic.name;
+                let channel = match &message.topic.derived_from {
+                    None => journal.topic(name, &schema)?,
+                    Some(from) => journal.derived(name, &schema, from)?,
+                };
                 self.channels.insert(message.channel, channel);
                 channel
             }

@@ -14,6 +14,7 @@ use mcap::records::{ChunkIndex, MessageHeader, Record, Statistics, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{MAGIC, McapError};
 
+use crate::envelope::derived_from;
 use crate::write::Times;
 
 /// Longer records are taken for damage.
@@ -85,6 +86,8 @@ pub struct Topic {
     pub schema: String,
     /// The schema.
     pub schema_text: Vec<u8>,
+    /// The topic of which its messages are made; `None` for the samples of a topic.
+    pub derived_from: Option<String>,
 }
 
 /// A message as it stands in a file.
@@ -285,6 +288,7 @@ impl Learnt {
                     name: channel.topic.clone(),
                     schema,
                     schema_text,
+                    derived_from: derived_from(&channel.metadata).map(str::to_owned),
                 };
                 self.topics.insert(channel.id, topic);
             }

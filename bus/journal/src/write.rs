@@ -147,10 +147,32 @@ impl Journal {
     /// # Errors
     /// There are too many.
     pub fn topic(&mut self, name: &str, schema: &EnvelopeSchema) -> Result<Channel, WriteError> {
+        self.channel(name, schema, None)
+    }
+
+    /// Adds a channel whose messages are made of those of the topic `from`, and are no samples.
+    ///
+    /// # Errors
+    /// There are too many.
+    pub fn derived(
+        &mut self,
+        name: &str,
+        schema: &EnvelopeSchema,
+        from: &str,
+    ) -> Result<Channel, WriteError> {
+        self.channel(name, schema, Some(from))
+    }
+
+    fn channel(
+        &mut self,
+        name: &str,
+        schema: &EnvelopeSchema,
+        derived_from: Option<&str>,
+    ) -> Result<Channel, WriteError> {
         let id = self
             .writer
             .add_schema(&schema.name, SCHEMA_ENCODING, &schema.text)?;
-        let notes = channel_notes();
+        let notes = channel_notes(derived_from);
         let channel = self
             .writer
             .add_channel(id, name, MESSAGE_ENCODING, &notes)?;

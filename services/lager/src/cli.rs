@@ -12,6 +12,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use lager_benches::{Mode, Regime};
+use lager_gateway::USUAL_METRICS;
 use lager_wire::OperatorCommand;
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
@@ -273,6 +274,16 @@ that has been connected for longest; what it says of the warehouse is saved. Rob
 GaG are not asked who they are: let only those reach --listen who may drive. A panel that
 others than this machine can reach asks for a token, which is printed once.")]
     Station(StationArgs),
+    /// Show the robot to programs outside: figures for Prometheus
+    #[command(after_help = "Examples:
+  lager gateway                                  figures at http://127.0.0.1:7430/metrics
+  lager gateway --metrics 192.168.1.4:7430       for a Prometheus on another machine
+  lager up --metrics                             the same, started with the robot
+
+It only reads. Whoever reaches the address may read, too, and is not asked who he is. Ask by number,
+not by a name: a name could be one that somebody else has pointed here. services/gateway/grafana.json
+is a dashboard for Grafana.")]
+    Gateway(GatewayArgs),
     /// Be the GaG of a station in this terminal: describe the warehouse, choose goods, drive
     #[command(after_help = "Examples:
   lager gag                                  at the station of the robot that is up, or of `lager station`
@@ -338,6 +349,7 @@ pub enum ModeName {
                                                           the boards, driving by themselves
   lager up --body chip                                    their images in an emulator
   lager up --station 192.168.1.5:7420                     another machine is the external computer
+  lager up --metrics                                      figures for Prometheus
   lager up --realtime 20 --lock-memory --core bridge=2 --core logic=3
 
 Real time is for bridge and logic, the services between sensor and steering, and
@@ -396,6 +408,9 @@ pub struct UpArgs {
     /// Do without a panel
     #[arg(long, help_heading = "Mission")]
     pub headless: bool,
+    /// Show the robot's figures to Prometheus, there or at 127.0.0.1:7430
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, help_heading = "Outside")]
+    pub metrics: Option<std::net::SocketAddr>,
     /// Let real boards carry out --mission by themselves, with nobody in their way; a simulated or
     /// emulated robot does so anyway
     #[arg(long, help_heading = "Mission")]
@@ -421,6 +436,17 @@ pub struct CommArgs {
     /// Where the external computer listens [default: as configured, or 127.0.0.1:7420]
     #[arg(long, value_name = "HOST:PORT", value_parser = values::address, help_heading = "Station")]
     pub station: Option<String>,
+    /// What every service is told
+    #[command(flatten)]
+    pub service: ServiceArgs,
+}
+
+/// `lager gateway`.
+#[derive(Debug, Args)]
+pub struct GatewayArgs {
+    /// Where Prometheus reads figures [default: as configured, or 127.0.0.1:7430]
+    #[arg(long, value_name = "HOST:PORT", help_heading = "Outside")]
+    pub metrics: Option<std::net::SocketAddr>,
     /// What every service is told
     #[command(flatten)]
     pub service: ServiceArgs,

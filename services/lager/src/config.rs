@@ -7,6 +7,7 @@
 mod buttons;
 mod chip;
 mod documented;
+mod gateway;
 mod realtime;
 mod station;
 
@@ -23,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 pub use buttons::ButtonsSection;
 pub use chip::ChipSection;
+pub use gateway::GatewaySection;
 pub use realtime::RealtimeSection;
 pub use station::{CommSection, StationSection, WithoutLink};
 
@@ -83,6 +85,8 @@ pub struct Config {
     pub comm: CommSection,
     /// The robot's own buttons.
     pub buttons: ButtonsSection,
+    /// What programs outside are shown.
+    pub gateway: GatewaySection,
 }
 
 /// What stands at the other end of the two UARTs.
@@ -251,6 +255,7 @@ impl Default for Config {
             station: StationSection::default(),
             comm: CommSection::default(),
             buttons: ButtonsSection::default(),
+            gateway: GatewaySection::default(),
         }
     }
 }

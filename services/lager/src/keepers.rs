@@ -72,7 +72,7 @@ impl Keepers {
                 }
                 Service::Simulator | Service::Emulator => hand_over(&mut self.body),
                 Service::Comm => hand_over(&mut self.map),
-                Service::Attendant | Service::Station => Ok(()),
+                Service::Attendant | Service::Station | Service::Gateway => Ok(()),
             };
             if served.is_err() {
                 self.owed.push(service);

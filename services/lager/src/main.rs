@@ -18,6 +18,7 @@ mod doctor;
 mod emulator;
 mod exit;
 mod gag;
+mod gateway;
 mod hands;
 mod keepers;
 mod map;
@@ -105,6 +106,7 @@ fn own_voice(command: &Command, config: &Config) -> Speaker {
         Command::Emulator(args) => ("emulator", args.parent),
         Command::Comm(args) => ("comm", args.service.parent),
         Command::Station(args) => ("station", args.parent),
+        Command::Gateway(args) => ("gateway", args.service.parent),
         _ => return Speaker::Tool,
     };
     Speaker::service(who, parent, config)
@@ -207,6 +209,17 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Station(args) => {
             station::run(&config, &args, &shutdown)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Command::Gateway(args) => {
+            let (running, wanted) = gateway::prepare(&config, &args)?;
+            service(
+                &running,
+                Role::Gateway,
+                &args.service,
+                &shutdown,
+                |bus, _| gateway::run(bus, &running, wanted, &shutdown),
+            )?;
             return Ok(ExitCode::SUCCESS);
         }
         Command::Gag { socket } => {

@@ -22,6 +22,8 @@ pub enum Service {
     Comm,
     /// The external computer, which is on no bus.
     Station,
+    /// Figures and live views for programs outside.
+    Gateway,
 }
 
 impl Service {
@@ -35,13 +37,14 @@ impl Service {
             Self::Logic => "logic",
             Self::Comm => "comm",
             Self::Station => "station",
+            Self::Gateway => "gateway",
         }
     }
 
     /// Whether it says something on the bus again and again as long as it lives. Comm does not, and
     /// watches over its calls into the bus itself.
     pub fn is_heard(self) -> bool {
-        !matches!(self, Self::Comm | Self::Station)
+        !matches!(self, Self::Comm | Self::Station | Self::Gateway)
     }
 }
 

@@ -17,6 +17,7 @@ use lager_topics::Role;
 use crate::cli::UpArgs;
 use crate::config::{Body, ChipSection, Config, PickBy, StationSection};
 use crate::exit;
+use crate::gateway;
 use crate::hands::Hands;
 use crate::mission::Mission;
 use crate::runtime::RuntimeFolder;
@@ -51,7 +52,8 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         // The ports may be those of an emulator that somebody else runs.
         Body::Serial => {}
     }
-    let external = external::choose(&mut config, args.headless)?;
+    let mut external = external::choose(&mut config, args.headless)?;
+    external.gateway = gateway::promise(&config)?;
     folder.write_config(&config)?;
     let mission = ordered(&config, &external, products)?;
 
@@ -230,6 +232,7 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     if let Some(panel) = args.panel {
         config.station.panel = Some(panel);
     }
+    config.gateway.metrics = args.metrics.or(config.gateway.metrics);
     args.realtime.apply(&mut config.realtime);
     Ok(())
 }

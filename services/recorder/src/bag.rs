@@ -185,7 +185,8 @@ impl Bag {
             let path = self.path.clone();
             return Err(BagError::Foreign { path });
         }
-        let there = || overview.topics.iter().map(|topic| topic.name.as_str());
+        let samples = || overview.topics.iter().filter(|topic| !topic.is_derived);
+        let there = || samples().map(|topic| topic.name.as_str());
         for topic in topics {
             if !there().any(|name| name == topic) {
                 return Err(BagError::NoTopic {

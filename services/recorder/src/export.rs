@@ -30,8 +30,12 @@ pub fn export_csv(
     let bag = Bag::open(file)?;
     let overview = bag.overview()?;
     bag.must_have(&overview, topics)?;
+    // What is derived for viewers is no table of samples.
+    let samples = overview.topics.iter().filter(|topic| !topic.is_derived);
+    let wanted = |name: &String| topics.is_empty() || topics.contains(name);
+    let wanted = samples.map(|topic| topic.name.clone()).filter(wanted);
     let selection = Selection {
-        topics: (!topics.is_empty()).then(|| topics.to_vec()),
+        topics: Some(wanted.collect()),
         ..Selection::default()
     };
     let mut tables: BTreeMap<String, Table<BufWriter<File>>> = BTreeMap::new();

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use lager_journal::Start;
+use lager_journal::{Scene, Start};
 
 use crate::config::RecordConfig;
 use crate::error::RecordError;
@@ -39,6 +39,8 @@ pub(crate) struct Keeper {
     /// Bytes of the files that are ended.
     ended_bytes: u64,
     missing: HashMap<usize, Missing>,
+    /// What viewers are shown.
+    scene: Scene,
 }
 
 impl Keeper {
@@ -60,6 +62,7 @@ impl Keeper {
             ended: Vec::new(),
             ended_bytes: 0,
             missing: HashMap::new(),
+            scene: Scene::default(),
         })
     }
 
@@ -92,7 +95,7 @@ impl Keeper {
     fn write(&mut self, mut items: Vec<Item>) -> Result<(), RecordError> {
         items.sort_by_key(|item| item.times.log);
         for (place, item) in items.iter().enumerate() {
-            match self.part.write(item) {
+            match self.part.write(item, &mut self.scene) {
                 Ok(()) => {}
                 Err(Refused::Failed(error)) => return Err(error),
                 Err(Refused::Full) => {

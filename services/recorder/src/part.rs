@@ -1,10 +1,10 @@
 //! One file of a recording.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use lager_journal::{Channel, Count, Counts, Journal, Start};
+use lager_journal::{Channel, Count, Counts, Journal, Scene, Shown, Start, View};
 
 use crate::disk::{Disk, is_full};
 use crate::error::RecordError;
@@ -22,6 +22,9 @@ pub(crate) struct Part {
     disk: Disk,
     topics: Topics,
     channels: HashMap<usize, Kept>,
+    views: BTreeMap<View, Channel>,
+    /// Whether this file has what viewers were shown before it began.
+    has_lasting: bool,
     begun: Instant,
     bytes: Vec<u8>,
 }
@@ -54,6 +57,8 @@ impl Part {
             disk,
             topics: topics.clone(),
             channels: HashMap::new(),
+            views: BTreeMap::new(),
+            has_lasting: false,
             begun: Instant::now(),
             bytes: Vec::new(),
         })
@@ -73,15 +78,44 @@ impl Part {
         self.begun.elapsed()
     }
 
-    pub(crate) fn write(&mut self, item: &Item) -> Result<(), Refused> {
-        let more = item.message.len() as u64 + 2 * DESCRIBED;
+    /// Adds a sample, and what `scene` makes of it.
+    pub(crate) fn write(&mut self, item: &Item, scene: &mut Scene) -> Result<(), Refused> {
+        let mut shown = Vec::new();
+        if !self.has_lasting {
+            self.has_lasting = true;
+            shown.extend_from_slice(scene.lasting());
+        }
+        let topic = self.topics.at(item.topic);
+        shown.extend(scene.take(&topic.name, item.times.publish, &item.message));
+        let bytes = shown.iter().map(|shown| shown.message.len());
+        let bytes = bytes.sum::<usize>() + item.message.len();
+        let more = bytes as u64 + 2 * DESCRIBED;
         let room = self.journal.length() + self.journal.room(more);
         match self.disk.reserve(room) {
             Ok(()) => {}
             Err(error) if is_full(&error) => return Err(Refused::Full),
             Err(error) => return Err(Refused::Failed(self.failed(error))),
         }
-        self.keep(item).map_err(Refused::Failed)
+        let kept = self.keep(item).and_then(|()| self.show(item, &shown));
+        kept.map_err(Refused::Failed)
+    }
+
+    /// What is derived stands beside the samples and is counted as none.
+    fn show(&mut self, item: &Item, shown: &[Shown]) -> Result<(), RecordError> {
+        for Shown { view, message } in shown {
+            let channel = match self.views.get(view) {
+                Some(channel) => *channel,
+                None => {
+                    let (name, from) = (view.topic(), view.made_of());
+                    let channel = self.journal.derived(name, &view.schema(), from)?;
+                    self.views.insert(*view, channel);
+                    channel
+                }
+            };
+            let number = item.sequence;
+            self.journal.write(channel, item.times, number, message)?;
+        }
+        Ok(())
     }
 
     fn keep(&mut self, item: &Item) -> Result<(), RecordError> {

@@ -146,7 +146,9 @@ pub fn play(
     let _name = bus.place().lock_name(robot)?;
     let _bridge = bus.place().lock(robot, Role::Bridge)?;
     let is_wanted = |name: &String| config.topics.is_empty() || config.topics.contains(name);
-    let topics = overview.topics.iter().map(|topic| topic.name.clone());
+    // What viewers look at is made of the other topics.
+    let topics = overview.topics.iter().filter(|topic| !topic.is_derived);
+    let topics = topics.map(|topic| topic.name.clone());
     let wanted: Vec<String> = topics.filter(is_wanted).collect();
     watchdog.over("looking at the topics", || must_be_free(bus, &wanted))?;
     let writers = watchdog.over("opening the topics", || open(bus, &overview, &wanted))?;

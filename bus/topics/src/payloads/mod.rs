@@ -6,6 +6,7 @@ mod link;
 mod log;
 mod mission;
 mod nav;
+mod pose;
 mod request;
 mod sensor;
 mod steering;
@@ -21,6 +22,7 @@ pub use nav::{
     BlockSource, BlockedWay, BlockedWays, Goal, Heading, Hold, MapProduct, NavigatorStatus, Phase,
     Pick, Route, RouteNode, Side, Step, WarehouseMap,
 };
+pub use pose::Pose;
 pub use request::{
     Answer, Ask, AskKind, Outcome, WorldAnswer, WorldAsk, WorldAskKind, WorldRefusal,
 };

@@ -45,6 +45,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "simulator",
             "emulator",
             "station",
+            "gateway",
         ],
     ),
 ];

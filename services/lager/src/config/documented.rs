@@ -184,6 +184,11 @@ link_lost = {link_lost}
 {buttons_switch}
 # For how many ms a contact must be steady; at most 500.
 debounce_ms = {debounce}
+
+[gateway]
+# Where Prometheus reads the robot's figures, such as 127.0.0.1:7430; whoever reaches that address may
+# read them. Unset, nowhere.
+{gateway_metrics}
 ",
             name = quoted(&self.name),
             speed = self.speed,
@@ -248,6 +253,10 @@ debounce_ms = {debounce}
                 self.station.listen.map(|listen| listen.to_string()).as_deref()
             ),
             station_gag = unset_path("gag", &self.station.gag),
+            gateway_metrics = unset(
+                "metrics",
+                self.gateway.metrics.map(|metrics| metrics.to_string()).as_deref()
+            ),
             station_panel = unset(
                 "panel",
                 self.station.panel.map(|panel| panel.to_string()).as_deref()
@@ -285,8 +294,8 @@ fn pose(pose: &ArmPose) -> String {
 mod tests {
     use super::super::realtime::CoresSection;
     use super::super::{
-        BusSection, ButtonsSection, ChipSection, CommSection, LogSection, RealtimeSection,
-        StationSection,
+        BusSection, ButtonsSection, ChipSection, CommSection, GatewaySection, LogSection,
+        RealtimeSection, StationSection,
     };
     use super::*;
     use lager_wire::{ArmLimits, ArmProfile};
@@ -348,6 +357,9 @@ mod tests {
                 reset: Some(5),
                 switch: Some(6),
                 debounce_ms: 30,
+            },
+            gateway: GatewaySection {
+                metrics: Some("127.0.0.1:7431".parse().expect("an address")),
             },
             ..Config::default()
         };

@@ -39,6 +39,8 @@ pub struct External {
     pub told: String,
     /// What is told of the panel.
     pub panel: Option<String>,
+    /// What is told of the gateway.
+    pub gateway: Option<String>,
 }
 
 /// Chooses, and puts into `config` what comm is to know.
@@ -80,6 +82,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: None,
+            gateway: None,
             told: "there is no external computer; the warehouse is told here".into(),
         });
     }
@@ -87,6 +90,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: None,
+            gateway: None,
             told: format!("the external computer is the one at {address}"),
         });
     }
@@ -116,6 +120,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: panel.map(|panel| format!("the panel is at http://{panel}")),
+            gateway: None,
             told,
         });
     }
@@ -132,6 +137,7 @@ fn none(config: &mut Config, why: &anyhow::Error) -> External {
     External {
         listener: None,
         panel: None,
+        gateway: None,
         told: format!("there is no external computer: {why:#}; the warehouse is told here"),
     }
 }
@@ -144,6 +150,7 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     External {
         listener: Some(listener),
         panel: None,
+        gateway: None,
         told,
     }
 }

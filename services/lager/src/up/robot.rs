@@ -146,8 +146,9 @@ impl Robot {
     /// The robot does not start, or the bus does not hold.
     pub fn run(&mut self, exit_when_done: bool) -> Result<()> {
         self.note(&self.external.told);
-        if let Some(panel) = &self.external.panel {
-            self.note(panel);
+        let told = [&self.external.panel, &self.external.gateway];
+        for line in told.into_iter().flatten() {
+            self.note(line);
         }
         self.begin()?;
         while !self.signals.end_asked() {
@@ -344,6 +345,9 @@ impl Robot {
             }
             if self.config.station.wanted {
                 self.start(Service::Comm, resume);
+            }
+            if self.config.gateway.is_wanted() {
+                self.start(Service::Gateway, resume);
             }
             self.start(Service::Bridge, resume);
             self.start(Service::Logic, resume);

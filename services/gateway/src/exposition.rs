@@ -1,0 +1,526 @@
+//! The figures as Prometheus text, version 0.0.4.
+//!
+//! Every figure has its `HELP` and `TYPE`, whether its value is known yet or not; what is not known
+//! has no line. Units are base units and stand in the names. A moment is a Unix time, from which
+//! Prometheus makes an age (`time() - ...`) that also grows while the robot is silent.
+
+use std::fmt::{Display, Write};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use lager_ports::{Clock, Stop};
+use lager_topics::{BoardHealth, Coded, Hold, Mode, Phase, StopCause};
+
+use crate::figures::Figures;
+use crate::histogram::Histogram;
+
+/// The media type of the text.
+pub(crate) const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
+
+/// All figures. `stop` is what the stop word says, `None` if it cannot be read.
+pub(crate) fn text(figures: &Figures, stop: Option<Option<Stop>>) -> String {
+    let mut text = Text {
+        out: String::with_capacity(32 << 10),
+        robot: figures.robot.clone(),
+        unix_offset_ns: unix_offset_ns(),
+    };
+    let mut build = text.gauge("lager_build_info", "1, with the version of the gateway.");
+    build.add(&[("version", env!("CARGO_PKG_VERSION"))], 1);
+    topics(&mut text, figures);
+    path(&mut text, figures);
+    robot(&mut text, figures, stop);
+    mission(&mut text, figures);
+    links(&mut text, figures);
+    processes(&mut text, figures);
+    text.out
+}
+
+fn topics(text: &mut Text, figures: &Figures) {
+    let topics = || figures.topics.iter();
+    let mut received = text.counter(
+        "lager_topic_samples_total",
+        "Samples of the topic that have reached the gateway.",
+    );
+    for (name, topic) in topics() {
+        received.add(&[("topic", name)], topic.received);
+    }
+    let mut lost = text.counter(
+        "lager_topic_lost_samples_total",
+        "Samples of the topic that were overwritten before the gateway looked, by their numbers.",
+    );
+    for (name, topic) in topics() {
+        lost.add(&[("topic", name)], topic.lost);
+    }
+    let mut published = text.gauge(
+        "lager_topic_last_publish_timestamp_seconds",
+        "When the last sample of the topic was published, as Unix time.",
+    );
+    for (name, topic) in topics().filter(|(_, topic)| topic.published_ns > 0) {
+        published.moment(&[("topic", name)], topic.published_ns);
+    }
+    let mut writers = text.gauge("lager_topic_writers", "Publishers of the topic.");
+    for (name, topic) in topics() {
+        writers.add(&[("topic", name)], topic.writers);
+    }
+    let mut readers = text.gauge(
+        "lager_topic_readers",
+        "Subscribers of the topic, the gateway included.",
+    );
+    for (name, topic) in topics() {
+        readers.add(&[("topic", name)], topic.readers);
+    }
+}
+
+fn path(text: &mut Text, figures: &Figures) {
+    let path = &figures.path;
+    let mut stages = text.family(
+        "lager_path_seconds",
+        "histogram",
+        "From a sensor frame's bytes to the order it causes, by stage: read_publish, \
+         publish_receive, decide, and total, which is all of it.",
+    );
+    for (stage, histogram) in [
+        ("read_publish", &path.read_publish),
+        ("publish_receive", &path.publish_receive),
+        ("decide", &path.decide),
+        ("total", &path.total),
+    ] {
+        stages.histogram(stage, histogram);
+    }
+}
+
+fn robot(text: &mut Text, figures: &Figures, stop: Option<Option<Stop>>) {
+    let health = figures.health.as_ref();
+    let mut mode = text.gauge("lager_mode", "Who may drive: 1 at the mode that holds.");
+    mode.states::<Mode>("mode", health.map(|health| health.mode.get()));
+    let mut latch = text.gauge(
+        "lager_stop_latched",
+        "Whether the robot is stopped: 1 at the cause of the stop that is latched.",
+    );
+    if let Some(stop) = stop {
+        let cause = stop.map_or(StopCause::None, Stop::cause);
+        for (known, name) in StopCause::VARIANTS {
+            if *known != StopCause::None {
+                latch.add(&[("cause", &snake(name))], u8::from(*known == cause));
+            }
+        }
+    }
+    let mut set = text.gauge(
+        "lager_stop_timestamp_seconds",
+        "When the stop that is latched was set, as Unix time; nothing while none is.",
+    );
+    if let Some(Some(stop)) = stop {
+        set.moment(&[], stop.at_ns());
+    }
+    let report = figures.report.as_ref();
+    let mut battery = text.gauge("lager_battery_volts", "Voltage of the robot's battery.");
+    if let Some(report) = report.filter(|report| report.battery_decivolts > 0) {
+        battery.add(&[], f64::from(report.battery_decivolts) / 10.0);
+    }
+    let mut duty = text.gauge(
+        "lager_motor_duty_ratio",
+        "Duty of the motor, from 0 to 1, as the steering board reports it.",
+    );
+    if let Some(report) = report {
+        for (motor, value) in [("left", report.left_duty), ("right", report.right_duty)] {
+            duty.add(&[("motor", motor)], f64::from(value) / 255.0);
+        }
+    }
+    let mut refused = text.counter(
+        "lager_steering_orders_refused_total",
+        "Orders that the arbiter has refused.",
+    );
+    refused.known(&[], health.map(|health| health.orders_refused));
+    let mut expired = text.counter(
+        "lager_steering_leases_expired_total",
+        "Orders that ended because nobody renewed them.",
+    );
+    expired.known(&[], health.map(|health| health.leases_expired));
+    let mut missed = text.counter(
+        "lager_service_lost_samples_total",
+        "Samples that bridge and logic themselves have missed.",
+    );
+    missed.known(&[("role", "bridge")], health.map(|health| health.bus_lost));
+    let lost = figures.status.as_ref().map(|status| status.frames_lost);
+    missed.known(&[("role", "logic")], lost);
+}
+
+fn mission(text: &mut Text, figures: &Figures) {
+    let status = figures.status.as_ref();
+    let mut phase = text.gauge(
+        "lager_navigator_phase",
+        "What the navigator does: 1 at the phase that holds.",
+    );
+    phase.states::<Phase>("phase", status.map(|status| status.phase.get()));
+    let mut hold = text.gauge(
+        "lager_navigator_hold",
+        "Why the navigator stands although its phase would turn the wheels: 1 at the reason.",
+    );
+    hold.states::<Hold>("hold", status.map(|status| status.hold.get()));
+    let mut waiting = text.gauge(
+        "lager_mission_orders_waiting",
+        "Orders that wait for their turn.",
+    );
+    waiting.known(&[], status.map(|status| status.waiting));
+    let mut delivered = text.counter(
+        "lager_mission_delivered_total",
+        "Products that were delivered.",
+    );
+    delivered.known(&[], status.map(|status| status.delivered));
+}
+
+fn links(text: &mut Text, figures: &Figures) {
+    let boards: Vec<(&str, BoardHealth)> = figures.health.as_ref().map_or(Vec::new(), |health| {
+        vec![("sensor", health.sensor), ("steering", health.steering)]
+    });
+    let mut up = text.gauge(
+        "lager_link_up",
+        "Whether the handshake with the board is done and packets come.",
+    );
+    for (board, health) in &boards {
+        up.add(&[("board", board)], health.up);
+    }
+    let mut heard = text.gauge(
+        "lager_link_last_packet_timestamp_seconds",
+        "When the board was heard last, as Unix time.",
+    );
+    for (board, at) in ["sensor", "steering"].into_iter().zip(figures.heard_ns) {
+        if let Some(at) = at {
+            heard.moment(&[("board", board)], at);
+        }
+    }
+    type Of = fn(&BoardHealth) -> u32;
+    let counters: [(&str, &str, Of); 5] = [
+        (
+            "lager_link_packets_total",
+            "Good packets of the board; from 0 again with each handshake.",
+            |board| board.packets,
+        ),
+        (
+            "lager_link_lost_packets_total",
+            "Packets of the board that are missing by their ids, at least.",
+            |board| board.lost_total,
+        ),
+        (
+            "lager_link_crc_errors_total",
+            "Packets of the board that were refused by their CRC.",
+            |board| board.bad_crc,
+        ),
+        (
+            "lager_link_skipped_bytes_total",
+            "Bytes passed over while a packet was looked for.",
+            |board| board.skipped_bytes,
+        ),
+        (
+            "lager_board_reboots_total",
+            "How often the board has restarted.",
+            |board| board.reboots,
+        ),
+    ];
+    for (name, help, of) in counters {
+        let mut counter = text.counter(name, help);
+        for (board, health) in &boards {
+            counter.add(&[("board", board)], of(health));
+        }
+    }
+    let mut load = text.gauge(
+        "lager_board_load_ratio",
+        "Processor load of the board, from 0 to 1.",
+    );
+    for (board, health) in &boards {
+        load.add(
+            &[("board", board)],
+            f64::from(health.board_load_percent) / 100.0,
+        );
+    }
+}
+
+fn processes(text: &mut Text, figures: &Figures) {
+    let mut cpu = text.counter(
+        "lager_process_cpu_seconds_total",
+        "Time of a core that the process has taken.",
+    );
+    for process in &figures.processes {
+        let pid = process.pid.to_string();
+        let labels = [("role", process.role.as_str()), ("pid", &pid)];
+        cpu.add(&labels, process.cpu_seconds);
+    }
+    let mut memory = text.gauge(
+        "lager_process_resident_bytes",
+        "Memory that the process has in use.",
+    );
+    for process in &figures.processes {
+        let pid = process.pid.to_string();
+        let labels = [("role", process.role.as_str()), ("pid", &pid)];
+        memory.add(&labels, process.resident_bytes);
+    }
+}
+
+/// What is added to a time of CLOCK_MONOTONIC to get ns since 1970, now.
+fn unix_offset_ns() -> i64 {
+    let unix = SystemTime::now().duration_since(UNIX_EPOCH);
+    let unix = unix.map_or(0, |since| since.as_nanos() as i64);
+    unix - Clock::monotonic_ns() as i64
+}
+
+/// The text as far as it is written.
+struct Text {
+    out: String,
+    robot: String,
+    unix_offset_ns: i64,
+}
+
+impl Text {
+    fn gauge(&mut self, name: &'static str, help: &str) -> Family<'_> {
+        self.family(name, "gauge", help)
+    }
+
+    fn counter(&mut self, name: &'static str, help: &str) -> Family<'_> {
+        self.family(name, "counter", help)
+    }
+
+    fn family(&mut self, name: &'static str, kind: &str, help: &str) -> Family<'_> {
+        let _ = writeln!(self.out, "# HELP {name} {help}\n# TYPE {name} {kind}");
+        Family { text: self, name }
+    }
+}
+
+/// One figure, to which values are added.
+struct Family<'a> {
+    text: &'a mut Text,
+    name: &'static str,
+}
+
+impl Family<'_> {
+    fn add(&mut self, labels: &[(&str, &str)], value: impl Display) {
+        self.line("", labels, value);
+    }
+
+    fn known(&mut self, labels: &[(&str, &str)], value: Option<impl Display>) {
+        if let Some(value) = value {
+            self.add(labels, value);
+        }
+    }
+
+    /// A time of CLOCK_MONOTONIC, in ns.
+    fn moment(&mut self, labels: &[(&str, &str)], monotonic_ns: u64) {
+        let unix = monotonic_ns.saturating_add_signed(self.text.unix_offset_ns);
+        let (seconds, ns) = (unix / 1_000_000_000, unix % 1_000_000_000);
+        self.add(labels, format_args!("{seconds}.{ns:09}"));
+    }
+
+    /// A line for each variant: 1 for the one that holds. Nothing is said of a state that is not
+    /// known, and a byte that means no variant is none of them.
+    fn states<E: Coded>(&mut self, label: &str, state: Option<Option<E>>) {
+        let Some(state) = state else {
+            return;
+        };
+        for (variant, name) in E::VARIANTS {
+            self.add(&[(label, &snake(name))], u8::from(state == Some(*variant)));
+        }
+    }
+
+    fn histogram(&mut self, stage: &str, histogram: &Histogram) {
+        for (end, count) in histogram.cumulative() {
+            let end = end.to_string();
+            self.line("_bucket", &[("stage", stage), ("le", &end)], count);
+        }
+        let count = histogram.count();
+        self.line("_bucket", &[("stage", stage), ("le", "+Inf")], count);
+        self.line("_sum", &[("stage", stage)], histogram.sum_seconds());
+        self.line("_count", &[("stage", stage)], count);
+    }
+
+    fn line(&mut self, suffix: &str, labels: &[(&str, &str)], value: impl Display) {
+        let Text { out, robot, .. } = self.text;
+        let _ = write!(out, "{}{suffix}{{robot=\"{}\"", self.name, escaped(robot));
+        for (name, text) in labels {
+            let _ = write!(out, ",{name}=\"{}\"", escaped(text));
+        }
+        let _ = writeln!(out, "}} {value}");
+    }
+}
+
+/// As a label's value is written.
+fn escaped(text: &str) -> String {
+    let text = text.replace('\\', "\\\\").replace('"', "\\\"");
+    text.replace('\n', "\\n")
+}
+
+/// `WaitingForMap` as `waiting_for_map`.
+fn snake(name: &str) -> String {
+    let mut snake = String::new();
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() && !snake.is_empty() {
+            snake.push('_');
+        }
+        snake.push(letter.to_ascii_lowercase());
+    }
+    snake
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_topics::{NavigatorStatus, Role, Stamp, SteeringReport};
+    use serde_json::Value;
+
+    use super::*;
+    use crate::DASHBOARD;
+
+    fn line<'a>(text: &'a str, begin: &str) -> Option<&'a str> {
+        text.lines().find_map(|line| line.strip_prefix(begin))
+    }
+
+    #[test]
+    fn what_is_not_known_yet_has_a_description_and_no_value() {
+        let text = text(&Figures::new("r1"), None);
+        assert!(line(&text, "# HELP lager_battery_volts ").is_some());
+        assert_eq!(line(&text, "# TYPE lager_battery_volts "), Some("gauge"));
+        for unknown in ["lager_battery_volts{", "lager_mode{", "lager_stop_latched{"] {
+            assert_eq!(line(&text, unknown), None);
+        }
+    }
+
+    #[test]
+    fn a_state_is_a_one_among_noughts() {
+        let mut figures = Figures::new("r1");
+        figures.health = Some(lager_topics::Health {
+            mode: Mode::Autonomous.into(),
+            ..Default::default()
+        });
+        figures.status = Some(NavigatorStatus {
+            phase: Phase::TurningBack.into(),
+            ..Default::default()
+        });
+        let stop = Stop::new(Role::Operator, StopCause::BoardResets, 1_000);
+        let text = text(&figures, Some(Some(stop)));
+        let value = |begin: &str| line(&text, begin);
+        assert_eq!(
+            value("lager_mode{robot=\"r1\",mode=\"autonomous\"} "),
+            Some("1")
+        );
+        assert_eq!(
+            value("lager_mode{robot=\"r1\",mode=\"manual\"} "),
+            Some("0")
+        );
+        assert_eq!(
+            value("lager_navigator_phase{robot=\"r1\",phase=\"turning_back\"} "),
+            Some("1")
+        );
+        assert_eq!(
+            value("lager_stop_latched{robot=\"r1\",cause=\"board_resets\"} "),
+            Some("1")
+        );
+        assert_eq!(
+            value("lager_stop_latched{robot=\"r1\",cause=\"ordered\"} "),
+            Some("0")
+        );
+        assert!(value("lager_stop_timestamp_seconds{robot=\"r1\"} ").is_some());
+    }
+
+    #[test]
+    fn a_robot_that_is_not_stopped_has_a_nought_at_every_cause() {
+        let text = text(&Figures::new("r1"), Some(None));
+        let latches = text
+            .lines()
+            .filter(|line| line.starts_with("lager_stop_latched{"));
+        assert_eq!(latches.clone().count(), StopCause::VARIANTS.len() - 1);
+        assert!(latches.into_iter().all(|line| line.ends_with(" 0")));
+    }
+
+    #[test]
+    fn a_label_is_escaped_and_a_sample_without_loss_is_a_nought() {
+        let mut figures = Figures::new("r1");
+        figures.count("a\"b\\c", &Stamp::default(), 0);
+        let text = text(&figures, None);
+        assert_eq!(
+            line(
+                &text,
+                "lager_topic_samples_total{robot=\"r1\",topic=\"a\\\"b\\\\c\"} "
+            ),
+            Some("1")
+        );
+        assert_eq!(
+            line(
+                &text,
+                "lager_topic_lost_samples_total{robot=\"r1\",topic=\"a\\\"b\\\\c\"} "
+            ),
+            Some("0")
+        );
+    }
+
+    #[test]
+    fn a_board_that_was_never_heard_has_no_age() {
+        let mut figures = Figures::new("r1");
+        let mut report = SteeringReport {
+            age_ms: SteeringReport::NEVER_HEARD,
+            ..Default::default()
+        };
+        let stamp = Stamp {
+            publish_time_ns: 5_000_000_000,
+            ..Stamp::default()
+        };
+        // A robot at twice its speed.
+        let real = |robot: std::time::Duration| robot / 2;
+        figures.learn(&stamp, &report, &real);
+        assert_eq!(figures.heard_ns, [None; 2]);
+        report.age_ms = 20;
+        figures.learn(&stamp, &report, &real);
+        assert_eq!(figures.heard_ns[1], Some(4_990_000_000));
+    }
+
+    /// Every word of a query that is the name of a figure.
+    fn names(query: &str) -> impl Iterator<Item = &str> {
+        let is_of_word = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+        let words = query.split(move |letter| !is_of_word(letter));
+        words.filter(|word| word.starts_with("lager_"))
+    }
+
+    #[test]
+    fn every_query_of_the_dashboard_is_of_a_figure_that_there_is() {
+        let text = text(&Figures::new("r1"), None);
+        let kind = |name: &str| line(&text, &format!("# TYPE {name} "));
+        let dashboard: Value = serde_json::from_str(DASHBOARD).expect("JSON");
+        let panels = dashboard["panels"].as_array().expect("panels");
+        let mut queries = Vec::new();
+        for panel in panels {
+            for target in panel["targets"].as_array().into_iter().flatten() {
+                queries.push(target["expr"].as_str().expect("a query"));
+            }
+        }
+        for variable in dashboard["templating"]["list"].as_array().expect("a list") {
+            queries.extend(
+                variable["query"]
+                    .as_str()
+                    .filter(|query| query.contains("lager_")),
+            );
+        }
+        assert!(queries.len() > 15, "{}", queries.len());
+        let mut asked = std::collections::BTreeSet::new();
+        for query in queries {
+            let mut found = 0;
+            for name in names(query) {
+                found += 1;
+                let bucket = name.strip_suffix("_bucket");
+                let is_there = match bucket {
+                    Some(name) => kind(name) == Some("histogram"),
+                    None => kind(name).is_some(),
+                };
+                assert!(is_there, "{name} in {query}");
+                asked.insert(bucket.unwrap_or(name));
+                // A counter alone says nothing: it is asked for its rate or its increase.
+                if kind(name) == Some("counter") {
+                    assert!(
+                        query.contains("rate(") || query.contains("increase("),
+                        "{query}"
+                    );
+                }
+            }
+            assert!(found > 0, "{query}");
+        }
+        let told = text.lines().filter_map(|line| line.strip_prefix("# TYPE "));
+        for name in told.filter_map(|line| line.split(' ').next()) {
+            let is_shown = asked.contains(name) || name == "lager_build_info";
+            assert!(is_shown, "{name} is on no panel");
+        }
+    }
+}

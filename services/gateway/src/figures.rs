@@ -1,0 +1,138 @@
+//! What is known of the robot: of each topic from the stamps, of everything else from what bridge,
+//! logic and the boards say of themselves.
+
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use lager_ports::TopicInfo;
+use lager_topics::{
+    DistanceFrame, Health, LineFrame, NavigatorStatus, SensorDistance, SensorLine, Stamp,
+    SteeringOrder, SteeringReport, Topic as _,
+};
+
+use crate::histogram::Histogram;
+use crate::processes::{self, Process};
+
+/// What is known of one topic.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TopicFigures {
+    /// Samples that have come.
+    pub(crate) received: u64,
+    /// Samples that were overwritten before the gateway looked.
+    pub(crate) lost: u64,
+    /// When the last one was published, in ns of `CLOCK_MONOTONIC`; 0 = none has come.
+    pub(crate) published_ns: u64,
+    pub(crate) writers: usize,
+    pub(crate) readers: usize,
+}
+
+/// The way from a sensor frame to the order that it causes, in three stages and as a whole.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Path {
+    pub(crate) read_publish: Histogram,
+    pub(crate) publish_receive: Histogram,
+    pub(crate) decide: Histogram,
+    pub(crate) total: Histogram,
+}
+
+/// Everything the gateway tells.
+#[derive(Clone, Debug)]
+pub(crate) struct Figures {
+    pub(crate) robot: String,
+    pub(crate) topics: BTreeMap<String, TopicFigures>,
+    pub(crate) health: Option<Health>,
+    pub(crate) status: Option<NavigatorStatus>,
+    pub(crate) report: Option<SteeringReport>,
+    /// When the sensor board was heard last, and the steering board, in ns of `CLOCK_MONOTONIC`.
+    pub(crate) heard_ns: [Option<u64>; 2],
+    pub(crate) path: Path,
+    /// The order that was counted last, as its writer's epoch and its id.
+    counted: Option<(u64, u32)>,
+    pub(crate) processes: Vec<Process>,
+}
+
+impl Figures {
+    pub(crate) fn new(robot: &str) -> Self {
+        Self {
+            robot: robot.to_owned(),
+            topics: BTreeMap::new(),
+            health: None,
+            status: None,
+            report: None,
+            heard_ns: [None; 2],
+            path: Path::default(),
+            counted: None,
+            processes: Vec::new(),
+        }
+    }
+
+    /// A sample of any topic has come; `lost` were missed so far.
+    pub(crate) fn count(&mut self, topic: &str, stamp: &Stamp, lost: u64) {
+        // Found first: the name is copied once.
+        if !self.topics.contains_key(topic) {
+            self.topics
+                .insert(topic.to_owned(), TopicFigures::default());
+        }
+        if let Some(figures) = self.topics.get_mut(topic) {
+            figures.received += 1;
+            figures.lost = lost;
+            figures.published_ns = figures.published_ns.max(stamp.publish_time_ns);
+        }
+    }
+
+    /// What a sample says, if anything of it is told. `real` says how long a span of robot time
+    /// lasts.
+    pub(crate) fn learn(
+        &mut self,
+        stamp: &Stamp,
+        payload: &dyn Any,
+        real: &dyn Fn(Duration) -> Duration,
+    ) {
+        if payload.is::<LineFrame>() || payload.is::<DistanceFrame>() {
+            self.heard_ns[0] = Some(stamp.source_time_ns);
+        } else if let Some(report) = payload.downcast_ref::<SteeringReport>() {
+            self.report = Some(*report);
+            if report.age_ms != SteeringReport::NEVER_HEARD {
+                let age = real(Duration::from_millis(report.age_ms.into()));
+                let heard_ns = stamp.publish_time_ns.saturating_sub(age.as_nanos() as u64);
+                self.heard_ns[1] = Some(heard_ns);
+            }
+        } else if let Some(health) = payload.downcast_ref::<Health>() {
+            self.health = Some(*health);
+        } else if let Some(status) = payload.downcast_ref::<NavigatorStatus>() {
+            self.status = Some(*status);
+        } else if let Some(order) = payload.downcast_ref::<SteeringOrder>() {
+            self.count_order(stamp, order);
+        }
+    }
+
+    /// Who is at the ends of the topics.
+    pub(crate) fn look_at_ends(&mut self, topics: &[TopicInfo]) {
+        for topic in topics {
+            let figures = self.topics.entry(topic.name.clone()).or_default();
+            (figures.writers, figures.readers) = (topic.publishers, topic.subscribers);
+        }
+        self.processes = processes::at(topics);
+    }
+
+    /// The first of each order that a sensor frame has caused; renewals repeat it.
+    fn count_order(&mut self, stamp: &Stamp, order: &SteeringOrder) {
+        let frames = [SensorLine::ID, SensorDistance::ID];
+        if !frames.contains(&stamp.cause_topic) || self.counted == Some((stamp.epoch, order.id)) {
+            return;
+        }
+        self.counted = Some((stamp.epoch, order.id));
+        let times = [
+            stamp.source_time_ns,
+            stamp.cause_publish_time_ns,
+            stamp.cause_receive_time_ns,
+            stamp.publish_time_ns,
+        ];
+        let since = |from: usize, to: usize| times[to].saturating_sub(times[from]);
+        self.path.read_publish.record(since(0, 1));
+        self.path.publish_receive.record(since(1, 2));
+        self.path.decide.record(since(2, 3));
+        self.path.total.record(since(0, 3));
+    }
+}

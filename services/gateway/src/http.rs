@@ -1,0 +1,111 @@
+//! The server of the figures.
+//!
+//! It answers to a number and to `localhost`, and not to a name: a page of somebody else could point
+//! its own name to this machine, and read through its reader's browser what only this machine may.
+
+use std::convert::Infallible;
+use std::io;
+use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use lager_ports::StopWord;
+
+use crate::Shared;
+use crate::exposition::{self, MEDIA_TYPE};
+
+/// How often the end is looked for.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Answers until `over` is set.
+pub(crate) fn serve(listener: TcpListener, shared: Shared, over: &AtomicBool) -> io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
+    runtime.block_on(async {
+        let listener = tokio::net::TcpListener::from_std(listener)?;
+        let router = Router::new()
+            .route("/metrics", get(metrics))
+            .fallback(nothing)
+            .with_state(shared);
+        let ended = async {
+            while !over.load(Ordering::Relaxed) {
+                tokio::time::sleep(LOOK).await;
+            }
+        };
+        tokio::select! {
+            served = axum::serve(listener, router) => served,
+            () = ended => Ok(()),
+        }
+    })
+}
+
+async fn metrics(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+    if !headers
+        .get(header::HOST)
+        .and_then(|host| host.to_str().ok())
+        .is_some_and(is_number)
+    {
+        let why = "the gateway answers to its number and to localhost, and not to this name\n";
+        return (StatusCode::MISDIRECTED_REQUEST, why).into_response();
+    }
+    // Read now, as the bridge does before each packet: a stop is told at once, whoever is silent.
+    let stop = StopWord::read(&shared.stop_word).ok();
+    let stop = stop.map(|told| told.and_then(|told| told.stop()));
+    let text = exposition::text(&shared.figures(), stop);
+    ([(header::CONTENT_TYPE, MEDIA_TYPE)], text).into_response()
+}
+
+async fn nothing() -> Result<Response, Infallible> {
+    let why = "there is nothing here; the figures are at /metrics\n";
+    Ok((StatusCode::NOT_FOUND, why).into_response())
+}
+
+/// Whether a host, with a port or without, is an address as a number, or this machine.
+fn is_number(host: &str) -> bool {
+    let without_port = match host.rsplit_once(':') {
+        Some((name, port)) if port.parse::<u16>().is_ok() => name,
+        _ => host,
+    };
+    let bare = without_port
+        .strip_prefix('[')
+        .and_then(|name| name.strip_suffix(']'));
+    host.parse::<SocketAddr>().is_ok()
+        || without_port == "localhost"
+        || bare.unwrap_or(without_port).parse::<IpAddr>().is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_somebody_has_pointed_here_is_refused() {
+        for host in [
+            "127.0.0.1:7430",
+            "localhost:7430",
+            "localhost",
+            "192.168.1.4",
+            "[::1]:7430",
+            "[::1]",
+        ] {
+            assert!(is_number(host), "{host}");
+        }
+        for host in [
+            "evil.example:7430",
+            "evil.example",
+            "localhost.evil.example",
+            "127.0.0.1.evil.example:7430",
+            "",
+            ":7430",
+            "[::1",
+        ] {
+            assert!(!is_number(host), "{host}");
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! The thread that polls the bus.
+
+use std::any::Any;
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use lager_ports::{
+    Bus, Clock, Found, Layout, Look, PortError, ReceiveError, Shutdown, Source, Subscriber,
+    Watchdog,
+};
+use lager_topics::{Stamp, TOPICS, Topic, TopicVisitor, visit};
+use serde::Serialize;
+
+use crate::figures::Figures;
+use crate::{GatewayError, Shared};
+
+/// The pace at which it polls. A state's queue holds one sample, so the pace decides how many
+/// states are missed; `lager_recorder` has measured it.
+const POLL: Duration = Duration::from_millis(2);
+/// How often it looks for topics that have come, and at the ends of all.
+const LOOK: Duration = Duration::from_secs(1);
+/// So many samples of one topic are taken before the next topic has its turn.
+const TURN: usize = 1_024;
+
+/// Reads every topic until the end is wished for, or `is_over`.
+pub(crate) fn listen(
+    bus: &Bus,
+    watchdog: &Watchdog,
+    shutdown: &Shutdown,
+    shared: &Shared,
+    is_over: impl Fn() -> bool,
+) -> Result<(), GatewayError> {
+    let mut listener = Listener {
+        bus,
+        watchdog,
+        clock: bus.clock(),
+        feeds: Vec::new(),
+        opened: BTreeSet::new(),
+        refused: BTreeSet::new(),
+    };
+    let mut looked: Option<Instant> = None;
+    while !shutdown.is_requested() && !is_over() {
+        if looked.is_none_or(|looked| looked.elapsed() >= LOOK) {
+            looked = Some(Instant::now());
+            if !bus.is_listed() {
+                return Err(GatewayError::Cleared);
+            }
+            listener.look(shared)?;
+        }
+        listener.drain(shared)?;
+        std::thread::sleep(POLL);
+    }
+    Ok(())
+}
+
+/// Everything that is listened to.
+struct Listener<'a> {
+    bus: &'a Bus,
+    watchdog: &'a Watchdog,
+    clock: Clock,
+    feeds: Vec<Box<dyn Feed>>,
+    opened: BTreeSet<String>,
+    /// Topics that could not be opened, which was said.
+    refused: BTreeSet<String>,
+}
+
+/// A topic that is listened to.
+trait Feed {
+    /// Takes what has come.
+    fn drain(
+        &mut self,
+        figures: &mut Figures,
+        real: &dyn Fn(Duration) -> Duration,
+    ) -> Result<(), ReceiveError>;
+}
+
+impl Listener<'_> {
+    /// Opens topics that are not listened to yet, of the table and of other people's, and looks at
+    /// the ends of all. One that cannot be opened is tried again at the next look.
+    fn look(&mut self, shared: &Shared) -> Result<(), GatewayError> {
+        for entry in TOPICS {
+            if !self.opened.contains(entry.name) {
+                let open = || visit(entry.name, Open { bus: self.bus });
+                let opened = self.watchdog.over("opening the topic", open);
+                self.keep(entry.name, opened.expect("a topic of the table").map(Some));
+            }
+        }
+        let look = || self.bus.topics();
+        let mut topics = self.watchdog.over("listing the topics", look)?;
+        topics.retain(|topic| topic.robot == *self.bus.robot());
+        for topic in &topics {
+            let is_new = topic.entry.is_none() && !self.opened.contains(&topic.name);
+            if is_new && topic.layout == Layout::Described {
+                let open = || self.bus.found(&topic.name);
+                let opened = self.watchdog.over("opening the topic", open);
+                let opened =
+                    opened.map(|found| found.map(|found| Box::new(found) as Box<dyn Feed>));
+                self.keep(&topic.name, opened);
+            }
+        }
+        shared.figures().look_at_ends(&topics);
+        Ok(())
+    }
+
+    fn keep(&mut self, name: &str, opened: Result<Option<Box<dyn Feed>>, PortError>) {
+        match opened {
+            Ok(Some(feed)) => {
+                self.opened.insert(name.to_owned());
+                self.feeds.push(feed);
+            }
+            // It went while it was looked at, and may come back.
+            Ok(None) => {}
+            Err(error) => {
+                if self.refused.insert(name.to_owned()) {
+                    tracing::warn!("{name} is not read: {error}");
+                }
+            }
+        }
+    }
+
+    fn drain(&mut self, shared: &Shared) -> Result<(), GatewayError> {
+        self.watchdog.enter("reading the topics");
+        let mut figures = shared.figures();
+        let real = |robot| self.clock.real(robot);
+        let drained = self
+            .feeds
+            .iter_mut()
+            .try_for_each(|feed| feed.drain(&mut figures, &real));
+        self.watchdog.leave();
+        Ok(drained?)
+    }
+}
+
+struct Open<'a> {
+    bus: &'a Bus,
+}
+
+impl TopicVisitor for Open<'_> {
+    type Output = Result<Box<dyn Feed>, PortError>;
+
+    fn visit<T: Topic>(self) -> Self::Output {
+        Ok(Box::new(self.bus.subscriber::<T>()?))
+    }
+}
+
+impl<T: Topic> Feed for Subscriber<T> {
+    fn drain(
+        &mut self,
+        figures: &mut Figures,
+        real: &dyn Fn(Duration) -> Duration,
+    ) -> Result<(), ReceiveError> {
+        for _ in 0..TURN {
+            let Some(sample) = self.receive()? else {
+                break;
+            };
+            figures.count(T::NAME, sample.stamp(), self.lost());
+            let payload: &T::Payload = &sample;
+            figures.learn(sample.stamp(), payload as &dyn Any, real);
+        }
+        Ok(())
+    }
+}
+
+impl Feed for Found {
+    fn drain(
+        &mut self,
+        figures: &mut Figures,
+        _real: &dyn Fn(Duration) -> Duration,
+    ) -> Result<(), ReceiveError> {
+        let name = self.name().to_owned();
+        for _ in 0..TURN {
+            let Some((stamp, lost)) = self.next(Counted)? else {
+                break;
+            };
+            figures.count(&name, &stamp, lost);
+        }
+        Ok(())
+    }
+}
+
+/// Takes of a sample what its stamp says.
+struct Counted;
+
+impl Look for Counted {
+    type Output = (Stamp, u64);
+
+    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, _payload: &P) -> Self::Output {
+        (*stamp, lost)
+    }
+}

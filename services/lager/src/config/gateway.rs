@@ -1,0 +1,21 @@
+//! `[gateway]`: what programs outside are shown of the robot.
+
+use std::net::SocketAddr;
+
+use serde::{Deserialize, Serialize};
+
+/// `[gateway]`: what programs outside are shown of the robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GatewaySection {
+    /// Where Prometheus reads figures; unset, nowhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metrics: Option<SocketAddr>,
+}
+
+impl GatewaySection {
+    /// Whether `up` starts a gateway.
+    pub fn is_wanted(&self) -> bool {
+        self.metrics.is_some()
+    }
+}
