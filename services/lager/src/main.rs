@@ -218,7 +218,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                 Role::Gateway,
                 &args.service,
                 &shutdown,
-                |bus, _| gateway::run(bus, &running, wanted, &shutdown),
+                |bus, _, _| gateway::run(bus, &running, wanted, &shutdown),
             )?;
             return Ok(ExitCode::SUCCESS);
         }

@@ -10,7 +10,9 @@ use lager_ports::{
     Bus, Clock, NodeState, PortError, ReceiveError, Source, StopPage, StopWord, Subscriber,
     Watchdog,
 };
-use lager_topics::{LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit};
+use lager_topics::{
+    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit,
+};
 
 use super::head::Load;
 use super::model::Model;
@@ -32,6 +34,7 @@ pub(crate) struct Feed<'a> {
     status: Subscriber<NavStatus>,
     queue: Subscriber<MissionQueue>,
     path: Subscriber<LatencyPath>,
+    command: Subscriber<LatencyCommand>,
     /// Real and robot time at the last look at the clock.
     clock: Clock,
     clocked: (Instant, std::time::Duration),
@@ -54,6 +57,7 @@ impl<'a> Feed<'a> {
                 status: bus.subscriber()?,
                 queue: bus.subscriber()?,
                 path: bus.subscriber()?,
+                command: bus.subscriber()?,
                 clocked: (Instant::now(), clock.now()),
                 clock,
             })
@@ -145,7 +149,10 @@ impl<'a> Feed<'a> {
             model.head.queue = Some(*queue);
         }
         if let Some(path) = self.path.latest()? {
-            model.head.path = Some(*path);
+            model.head.path.take(*path);
+        }
+        if let Some(command) = self.command.latest()? {
+            model.head.command.take(*command);
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lager_ports::Stop;
 use lager_topics::{
-    BoardHealth, Health, Hold, NavigatorStatus, OrderQueue, PathLatency, StageLatency,
+    BoardHealth, CommandLatency, Durations, Health, Hold, NavigatorStatus, OrderQueue, PathLatency,
 };
 use serde_json::{Value, json};
 
@@ -27,7 +27,9 @@ pub(crate) struct Head {
     heard_ns: [Option<u64>; 2],
     pub(crate) status: Option<NavigatorStatus>,
     pub(crate) queue: Option<OrderQueue>,
-    pub(crate) path: Option<PathLatency>,
+    /// The ways of frames to decisions, and of orders to the wire.
+    pub(crate) path: Recent<PathLatency>,
+    pub(crate) command: Recent<CommandLatency>,
     /// The stop that is set, as its word says; `None` if none is or the word cannot be read.
     pub(crate) stop: Option<Stop>,
     pub(crate) load: Load,
@@ -125,58 +127,97 @@ impl Head {
                 "reboots": board.reboots, "load_percent": board.board_load_percent,
             }))
         };
+        let path: serde_json::Map<String, Value> = self
+            .stages()
+            .into_iter()
+            .map(|(name, stage)| {
+                let [p50, p99] = [0.5, 0.99].map(|part| stage.quantile_ns(part));
+                let shown = json!({
+                    "count": stage.count, "p50_ns": p50, "p99_ns": p99, "max_ns": stage.max_ns,
+                });
+                (name.replace(' ', "_"), shown)
+            })
+            .collect();
         json!({
             "robot": self.robot, "mode": self.mode(), "stop": self.stopped(now_ns),
             "sensor": link(0), "steering": link(1), "mission": self.mission(),
             "robot_seconds_per_second": self.pace, "load_minute": self.load.minute,
-            "cores": self.load.cores, "path": self.path,
+            "cores": self.load.cores, "path": path,
         })
     }
 }
 
-/// The stages of the path in their order, by name; the last one is all of it.
-pub(crate) fn stages(path: &PathLatency) -> [(&'static str, &StageLatency); 6] {
-    [
-        ("read", &path.read_publish),
-        ("to logic", &path.publish_receive),
-        ("decide", &path.decide),
-        ("to bridge", &path.order_receive),
-        ("write", &path.receive_write),
-        ("total", &path.total),
-    ]
+/// Counts that only grow: as they are, and as they were one sample before.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Recent<T> {
+    now: Option<T>,
+    before: Option<T>,
 }
 
-/// Shares of a stage's commands on a logarithmic scale of times, as far as its percentiles tell
-/// them: between two percentiles they are taken as even.
-pub(crate) fn shares<const N: usize>(stage: &StageLatency, from_ns: f64, to_ns: f64) -> [f64; N] {
+impl<T> Recent<T> {
+    pub(crate) fn take(&mut self, counts: T) {
+        self.before = self.now.replace(counts);
+    }
+
+    /// What was counted between the last two samples; of the first one, all of it.
+    fn of(&self, stage: impl Fn(&T) -> &Durations) -> Durations {
+        let Some(now) = &self.now else {
+            return Durations::default();
+        };
+        match &self.before {
+            Some(before) => stage(now).since(stage(before)),
+            None => *stage(now),
+        }
+    }
+}
+
+impl Head {
+    /// Whether anything is known of the path.
+    pub(crate) fn has_path(&self) -> bool {
+        self.path.now.is_some() || self.command.now.is_some()
+    }
+
+    /// The stages of the path in their order, by name: frames to their decision, and orders to the
+    /// wire. The last one is all of it.
+    pub(crate) fn stages(&self) -> [(&'static str, Durations); 7] {
+        [
+            ("read", self.path.of(|path| &path.read_publish)),
+            ("to logic", self.path.of(|path| &path.publish_receive)),
+            ("decide", self.path.of(|path| &path.decide)),
+            ("decided", self.path.of(|path| &path.total)),
+            ("to bridge", self.command.of(|way| &way.order_receive)),
+            ("write", self.command.of(|way| &way.receive_write)),
+            ("total", self.command.of(|way| &way.total)),
+        ]
+    }
+}
+
+/// Shares of a stage's durations on a logarithmic scale of times. Within a bucket they are taken as
+/// even.
+pub(crate) fn shares<const N: usize>(stage: &Durations, from_ns: f64, to_ns: f64) -> [f64; N] {
     let mut shares = [0.0; N];
+    if stage.count == 0 {
+        return shares;
+    }
     let scale = (to_ns / from_ns).ln();
     let at = |ns: u64| {
         let place = (ns.max(1) as f64 / from_ns).ln() / scale * N as f64;
         place.clamp(0.0, N as f64)
     };
-    let known = [
-        (stage.min_ns, stage.p50_ns, 0.5),
-        (stage.p50_ns, stage.p90_ns, 0.4),
-        (stage.p90_ns, stage.p99_ns, 0.09),
-        (stage.p99_ns, stage.p999_ns, 0.009),
-        (stage.p999_ns, stage.max_ns, 0.001),
-    ];
-    if stage.count == 0 {
-        return shares;
-    }
-    for (from, to, share) in known {
-        let (from, to) = (at(from), at(to).max(at(from) + 1e-3));
+    let mut lower_ns = 0;
+    for (bucket, count) in stage.buckets.iter().enumerate() {
+        let upper_ns = Durations::upper_ns(bucket).unwrap_or(stage.max_ns.max(lower_ns));
+        let share = *count as f64 / stage.count as f64;
+        let (from, to) = (at(lower_ns), at(upper_ns));
+        lower_ns = upper_ns;
+        if to - from < 1e-6 {
+            // All of it lies beyond one end of the scale.
+            shares[(from as usize).min(N - 1)] += share;
+            continue;
+        }
         for (place, sum) in shares.iter_mut().enumerate() {
-            let left = from.max(place as f64);
-            let right = to.min(place as f64 + 1.0);
-            // What lies at the very end belongs to the last place.
-            let is_last = place + 1 == N && from >= N as f64;
-            let part = match is_last {
-                true => 1.0,
-                false => ((right - left) / (to - from)).max(0.0),
-            };
-            *sum += share * part;
+            let inside = to.min(place as f64 + 1.0) - from.max(place as f64);
+            *sum += share * (inside / (to - from)).max(0.0);
         }
     }
     shares
@@ -214,24 +255,22 @@ mod tests {
 
     #[test]
     fn the_shares_of_a_stage_are_a_whole() {
-        let stage = StageLatency {
-            count: 100,
-            min_ns: 20_000,
-            p50_ns: 100_000,
-            p90_ns: 150_000,
-            p99_ns: 900_000,
-            p999_ns: 2_000_000,
-            max_ns: 60_000_000,
-            mean_ns: 120_000,
-        };
+        let mut stage = Durations::default();
+        for _ in 0..50 {
+            stage.record(100_000);
+        }
+        for far_ns in [20, 5_000, 3_000_000, 60_000_000] {
+            stage.record(far_ns);
+        }
         let shares = shares::<24>(&stage, 10_000.0, 10_000_000.0);
         let sum: f64 = shares.iter().sum();
         assert!((sum - 1.0).abs() < 1e-6, "{shares:?}");
         let most = shares.iter().copied().fold(0.0, f64::max);
-        // 100 to 150 us are the places 8 and 9 of three decades.
+        // 100 us are in the bucket from 98 us to 115 us: places 7 and 8 of three decades.
         assert!((shares[8] - most).abs() < 1e-9, "{shares:?}");
+        assert!(shares[0] > 0.0 && shares[23] > 0.0, "{shares:?}");
         assert_eq!(
-            super::shares::<4>(&StageLatency::default(), 1.0, 10.0),
+            super::shares::<4>(&Durations::default(), 1.0, 10.0),
             [0.0; 4]
         );
     }

@@ -21,7 +21,9 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use lager_ports::{Clock, Shutdown};
-use lager_topics::{LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic};
+use lager_topics::{
+    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic,
+};
 use ratatui::DefaultTerminal;
 use ratatui::buffer::Buffer;
 use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
@@ -155,7 +157,16 @@ impl Recorded {
             }
             NavStatus::NAME => head.status = of(payload).or(head.status),
             MissionQueue::NAME => head.queue = of(payload).or(head.queue),
-            LatencyPath::NAME => head.path = of(payload).or(head.path),
+            LatencyPath::NAME => {
+                if let Some(path) = of(payload) {
+                    head.path.take(path);
+                }
+            }
+            LatencyCommand::NAME => {
+                if let Some(command) = of(payload) {
+                    head.command.take(command);
+                }
+            }
             _ => {}
         }
     }

@@ -3,7 +3,7 @@
 //! ```text
 //!  robot, mode, clock, load, how many topics are in trouble
 //!  stop, both links, mission                    (four lines)
-//!  the path's total, or with room each stage
+//!  the way of frames to logic's decision, or with room each stage
 //!  the table: the most telling columns first, the others where there is room
 //!  the keys, or the filter while it is typed
 //! ```
@@ -12,7 +12,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 
-use super::head::{shares, span, stages};
+use super::head::{shares, span};
 use super::model::{Model, Sort};
 use super::row::{Life, Row, Trouble};
 
@@ -166,30 +166,30 @@ fn head(model: &Model, page: &mut Page<'_>) {
     path(model, page);
 }
 
-/// The latencies of the path: one line, or one for each stage.
+/// The latencies of the last second: of frames to their decision, or with room each stage.
 fn path(model: &Model, page: &mut Page<'_>) {
-    let Some(path) = &model.head.path else {
+    if !model.head.has_path() {
         return page.put("path      not measured", dim());
-    };
+    }
     let is_roomy = page.area.height >= ROOMY;
     let shows_all = model.view.shows_path.unwrap_or(is_roomy);
-    let all = stages(path);
-    let shown = match shows_all {
-        true => &all[..],
-        false => &all[5..],
-    };
-    for (name, stage) in shown {
-        let name = match shows_all {
+    for (name, stage) in model.head.stages() {
+        let label = match shows_all {
             true => format!("{:14}", format!("path {name}")),
-            false => "path     ".to_owned(),
+            false if name == "decided" => "path     ".to_owned(),
+            false => continue,
         };
         let ms = |ns: u64| ns as f64 / 1e6;
-        let bars = bars(&shares::<PLACES>(stage, LEAST_NS, MOST_NS));
+        let bars = bars(&shares::<PLACES>(&stage, LEAST_NS, MOST_NS));
+        if stage.count == 0 {
+            page.put(&format!("{label} {bars} none in the last second"), dim());
+            continue;
+        }
         page.put(
             &format!(
-                "{name} {bars} p50 {:.3} p99 {:.3} max {:.3} ms",
-                ms(stage.p50_ns),
-                ms(stage.p99_ns),
+                "{label} {bars} p50 {:.3} p99 {:.3} max {:.3} ms",
+                ms(stage.quantile_ns(0.5)),
+                ms(stage.quantile_ns(0.99)),
                 ms(stage.max_ns)
             ),
             plain(),

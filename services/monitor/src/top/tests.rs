@@ -7,8 +7,8 @@ use std::path::Path;
 
 use lager_ports::{Layout, Peer, RobotName, TopicInfo};
 use lager_topics::{
-    Health, Mode, NavigatorStatus, OrderQueue, PathLatency, Phase, Role, StageLatency, Stamp,
-    StopCause, TOPICS,
+    CommandLatency, Durations, Health, Mode, NavigatorStatus, OrderQueue, PathLatency, Phase, Role,
+    Stamp, StopCause, TOPICS,
 };
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -118,25 +118,30 @@ fn driving() -> Model {
         count: 3,
         ..OrderQueue::default()
     });
-    let stage = |scale: u64| StageLatency {
-        count: 1_000,
-        min_ns: 20_000 * scale,
-        p50_ns: 60_000 * scale,
-        p90_ns: 90_000 * scale,
-        p99_ns: 250_000 * scale,
-        p999_ns: 700_000 * scale,
-        max_ns: 2_100_000 * scale,
-        mean_ns: 70_000 * scale,
+    let stage = |scale: u64| {
+        let mut stage = Durations::default();
+        for number in 0..1_000 {
+            // Most take 60 us, some longer, one 2.1 ms.
+            let us = match number {
+                0 => 2_100,
+                1..=9 => 700,
+                10..=99 => 90 + number,
+                _ => 40 + number / 25,
+            };
+            stage.record(us * 1_000 * scale);
+        }
+        stage
     };
-    model.head.path = Some(PathLatency {
-        since_start: 1_000,
+    model.head.path.take(PathLatency {
         read_publish: stage(1),
         publish_receive: stage(1),
         decide: stage(1),
+        total: stage(3),
+    });
+    model.head.command.take(CommandLatency {
         order_receive: stage(2),
         receive_write: stage(1),
         total: stage(5),
-        ..PathLatency::default()
     });
     model.head.load = Load {
         minute: 0.84,
