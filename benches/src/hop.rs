@@ -34,10 +34,11 @@ use crate::domain::Domain;
 use crate::error::BenchError;
 use crate::machine::{self, Awake};
 use crate::parts::{Part, Play};
-use crate::report::{Mode, Options, Regime, Report, Row};
+use crate::report::{Mode, Options, Ratio, Regime, Report, Row};
 use crate::ring;
 use crate::run::{self, wanted};
 use crate::shared::Shared;
+use crate::slow;
 use players::{Court, Lines, Setup};
 
 const FIRST: &str = "first player of the hop";
@@ -63,6 +64,7 @@ pub fn measure(options: &Options) -> Result<Report, BenchError> {
             rows.extend(ring::measure(regime, options)?);
         }
     }
+    beside_the_parts(&mut rows);
     if rows.is_empty() {
         return Err(BenchError::NothingToMeasure(
             "no contender works in these modes and regimes".to_owned(),
@@ -72,6 +74,37 @@ pub fn measure(options: &Options) -> Result<Report, BenchError> {
         machine: machine::describe(),
         rows,
     })
+}
+
+/// What the floor of a blocking hop is called.
+const PARTS_OF_A_HOP: &str = "futex + polled iceoryx2";
+
+/// Compares the blocking hop on one core with the sum of what it is made of: a hop of a futex on
+/// that core, and one of bare iceoryx2 that is polled from another core. The sum has one cache line
+/// too many, which both pass.
+fn beside_the_parts(rows: &mut [Row]) {
+    let find = |label: &str, mode, regime| {
+        let is_it = |row: &&Row| {
+            row.what == "hop" && row.label() == label && row.mode == mode && row.regime == regime
+        };
+        rows.iter().position(|row| is_it(&row))
+    };
+    let Some(((hop, futex), polled)) = find("lager", Mode::Block, Regime::SameCore)
+        .zip(find("futex", Mode::Block, Regime::SameCore))
+        .zip(find("iceoryx2/header", Mode::Spin, Regime::Plain))
+    else {
+        return;
+    };
+    let ratio = |figure: fn(&Row) -> u64| {
+        figure(&rows[hop]) as f64 / (figure(&rows[futex]) + figure(&rows[polled])) as f64
+    };
+    let [p50, p99] = [ratio(|row| row.p50_ns), ratio(|row| row.p99_ns)];
+    rows[hop].ratios.push(Ratio {
+        to: PARTS_OF_A_HOP.to_owned(),
+        p50,
+        p99,
+        runs: vec![[p50, p99]],
+    });
 }
 
 fn in_regime(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchError> {
@@ -212,6 +245,7 @@ impl Session {
             balls,
             timing,
             number: self.rounds,
+            spin_ns: slow::spin_ns(),
         };
         // Players give up by themselves when nothing comes; this is for those that cannot, because
         // a bare `read` has no time-out: ten times what the slowest machine should need.

@@ -35,3 +35,4 @@ pub use error::BenchError;
 pub use parts::{heed_interrupts, interrupted};
 pub use report::{Mode, Options, Ratio, Regime, Report, Row};
 pub use scenarios::{a_second_of_bytes, a_second_of_packets};
+pub use stats::median;

@@ -40,7 +40,7 @@ use crate::run::{self, Entry};
 use crate::stats::Quantiles;
 use floor::Floor;
 use pace::{Chain, TURN, turn};
-use players::Place;
+use players::{Place, RealTime};
 use robot::Robot;
 
 pub(crate) use floor::PARTS as FLOOR_PARTS;
@@ -253,6 +253,14 @@ fn overtaken(times: &[u64], entry: &Entry, regime: Regime) -> Row {
         ratios: Vec::new(),
         cpu_percent: None,
     }
+}
+
+/// Whether this process may have real time, without which nothing is `path@observed`.
+///
+/// # Errors
+/// It may not; the sentence says what to do.
+pub fn may_have_real_time() -> Result<(), BenchError> {
+    in_a_thread(|| RealTime::begin(BOARDS).map(|_| Vec::new())).map(|_| ())
 }
 
 /// One chain for the criterion bench. Stays in the thread that opened it, which is bound to a core

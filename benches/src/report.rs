@@ -132,6 +132,9 @@ pub struct Ratio {
     pub p50: f64,
     /// The same of the p99.
     pub p99: f64,
+    /// Both of each run, in turn.
+    #[serde(default)]
+    pub runs: Vec<[f64; 2]>,
 }
 
 /// What one contender showed in one mode and regime. Times are in ns.
@@ -306,6 +309,7 @@ mod tests {
             to: to.to_owned(),
             p50,
             p99: 2.0 * p50,
+            runs: vec![[p50, 2.0 * p50]],
         };
         Report {
             machine: "a machine".to_owned(),

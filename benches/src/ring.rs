@@ -38,6 +38,7 @@ use crate::parts::{Part, Play, Stage};
 use crate::report::{Mode, Options, Regime, Row};
 use crate::run::{self, Entry};
 use crate::shared::{Barrier, Board, Shared};
+use crate::slow;
 use audience::audience;
 use ringer::ringer;
 
@@ -175,6 +176,8 @@ struct Round {
     mode: Mode,
     balls: u32,
     number: u32,
+    /// A deliberate slow-down of each ball, in ns.
+    spin_ns: u64,
 }
 
 impl Round {
@@ -250,6 +253,7 @@ impl Session {
             mode,
             balls,
             number: self.rounds,
+            spin_ns: slow::spin_ns(),
         };
         self.ringer.tell(&round)?;
         self.audience.tell(&round)?;

@@ -8,6 +8,7 @@ use std::io::{IsTerminal, Write};
 use crate::error::BenchError;
 use crate::parts::interrupted;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
+use crate::slow;
 use crate::stats::{Quantiles, median};
 
 /// One line of a report before it is measured.
@@ -73,6 +74,12 @@ pub(crate) fn measure(
                 }
                 let index = (place + turn) % entries.len();
                 progress(what, regime, run, options, &entries[index]);
+                let entry = &entries[index];
+                slow::row(&format!(
+                    "{what} {} {regime}: {}",
+                    entry.mode,
+                    entry.label()
+                ));
                 samples[index].extend(round(index)?);
             }
         }
@@ -127,20 +134,23 @@ pub(crate) fn rows(
 
 /// The median of the ratios of each run: what drifts from run to run cancels.
 fn ratio(to: &str, own: &[Quantiles], other: &[Quantiles]) -> Option<Ratio> {
-    let paired = |figure: fn(&Quantiles) -> u64| {
-        median(
-            own.iter()
-                .zip(other)
-                // A clock that cannot tell a sample from nothing cannot tell ratios either.
-                .filter(|(_, other)| figure(other) > 0)
-                .map(|(own, other)| figure(own) as f64 / figure(other) as f64)
-                .collect(),
-        )
-    };
+    let runs: Vec<[f64; 2]> = own
+        .iter()
+        .zip(other)
+        // A clock that cannot tell a sample from nothing cannot tell ratios either.
+        .filter(|(_, other)| other.p50_ns > 0)
+        .map(|(own, other)| {
+            [
+                own.p50_ns as f64 / other.p50_ns as f64,
+                own.p99_ns as f64 / other.p99_ns as f64,
+            ]
+        })
+        .collect();
     Some(Ratio {
         to: to.to_owned(),
-        p50: paired(|run| run.p50_ns)?,
-        p99: paired(|run| run.p99_ns)?,
+        p50: median(runs.iter().map(|run| run[0]).collect())?,
+        p99: median(runs.iter().map(|run| run[1]).collect())?,
+        runs,
     })
 }
 

@@ -4,11 +4,13 @@
 //! They stand where the code of `lager-ports` would do the same: in the bench code around its
 //! calls, never in a crate that runs on the robot. Without the feature `slow-downs` every function
 //! here is empty, so that the figures anybody else sees are of the code alone; with it,
-//! `LAGER_BENCH_SLOW` says which one is at work, in all processes of a measurement.
+//! `LAGER_BENCH_SLOW` says which one is at work. A spin is of single rows of a report, and as long
+//! as `benches/guard --try` wants it; who measures a row tells its processes.
 
-pub use at_work::{publish, receive, refuse_in_vain};
+pub use at_work::{answer, publish, receive, refuse_in_vain, row, spin_ns, spins_for};
 
-/// Names the slow-down: `allocation`, `spin` or `system-call`.
+/// Names the slow-down: `allocation`, `system-call`, or `spin:ROW=NS;ROW=NS` with so many ns for
+/// each of these rows, as in `spin:hop block same-core: lager=400`.
 pub const VARIABLE: &str = "LAGER_BENCH_SLOW";
 
 #[cfg(not(feature = "slow-downs"))]
@@ -20,6 +22,21 @@ mod at_work {
     /// To be called beside each receiving.
     #[inline(always)]
     pub fn receive() {}
+
+    /// To be called for each answer of the path.
+    #[inline(always)]
+    pub fn answer() {}
+
+    /// That row is measured now.
+    pub fn row(_row: &str) {}
+
+    /// How long this row is to spin for each sample, in ns.
+    pub fn spin_ns() -> u64 {
+        0
+    }
+
+    /// The process that measures a row has said so.
+    pub fn spins_for(_spin_ns: u64) {}
 
     /// Ends the process if a slow-down is asked for: measuring without it would prove nothing.
     pub fn refuse_in_vain() {
@@ -35,19 +52,23 @@ mod at_work {
 
 #[cfg(feature = "slow-downs")]
 mod at_work {
-    use core::sync::atomic::AtomicU32;
+    use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
     use core::time::Duration;
     use std::hint::black_box;
     use std::sync::OnceLock;
     use std::time::Instant;
 
-    #[derive(Clone, Copy, PartialEq)]
+    #[derive(PartialEq)]
     enum Slow {
         Not,
         Allocation,
-        Spin,
+        /// Rows of a report, each with its ns.
+        Spin(Vec<(String, u64)>),
         SystemCall,
     }
+
+    /// How long the row that is measured now spins, in ns.
+    static SPIN_NS: AtomicU64 = AtomicU64::new(0);
 
     /// To be called beside each publishing on a topic that so many observers read.
     #[inline]
@@ -55,7 +76,7 @@ mod at_work {
         match which() {
             Slow::Not => {}
             Slow::Allocation => allocate(),
-            Slow::Spin => spin(),
+            Slow::Spin(_) => spin(),
             Slow::SystemCall => (0..observers).for_each(|_| wake_nobody()),
         }
     }
@@ -63,9 +84,35 @@ mod at_work {
     /// To be called beside each receiving.
     #[inline]
     pub fn receive() {
-        if which() == Slow::Allocation {
+        if *which() == Slow::Allocation {
             allocate();
         }
+    }
+
+    /// To be called for each answer of the path.
+    #[inline]
+    pub fn answer() {
+        if let Slow::Spin(_) = which() {
+            spin();
+        }
+    }
+
+    /// That row is measured now.
+    pub fn row(row: &str) {
+        if let Slow::Spin(rows) = which() {
+            let of_row = rows.iter().find(|(name, _)| name == row);
+            spins_for(of_row.map_or(0, |(_, spin_ns)| *spin_ns));
+        }
+    }
+
+    /// How long this row is to spin for each sample, in ns.
+    pub fn spin_ns() -> u64 {
+        SPIN_NS.load(Ordering::Relaxed)
+    }
+
+    /// The process that measures a row has said so.
+    pub fn spins_for(spin_ns: u64) {
+        SPIN_NS.store(spin_ns, Ordering::Relaxed);
     }
 
     /// Ends the process if the variable names no slow-down: measuring without it would prove
@@ -74,21 +121,35 @@ mod at_work {
         which();
     }
 
-    fn which() -> Slow {
+    fn which() -> &'static Slow {
         static WHICH: OnceLock<Slow> = OnceLock::new();
-        *WHICH.get_or_init(|| match std::env::var(super::VARIABLE).as_deref() {
-            Err(_) => Slow::Not,
-            Ok("allocation") => Slow::Allocation,
-            Ok("spin") => Slow::Spin,
-            Ok("system-call") => Slow::SystemCall,
-            Ok(other) => {
+        WHICH.get_or_init(|| {
+            let Ok(text) = std::env::var(super::VARIABLE) else {
+                return Slow::Not;
+            };
+            read(&text).unwrap_or_else(|| {
                 eprintln!(
-                    "{} is `{other}`; set it to allocation, spin or system-call",
+                    "{} is `{text}`; set it to allocation, system-call or spin:ROW=NS",
                     super::VARIABLE
                 );
                 std::process::exit(2);
-            }
+            })
         })
+    }
+
+    fn read(text: &str) -> Option<Slow> {
+        match text {
+            "allocation" => Some(Slow::Allocation),
+            "system-call" => Some(Slow::SystemCall),
+            _ => {
+                let row = |row: &str| {
+                    let (name, spin_ns) = row.rsplit_once('=')?;
+                    Some((name.to_owned(), spin_ns.parse().ok()?))
+                };
+                let rows = text.strip_prefix("spin:")?.split(';');
+                Some(Slow::Spin(rows.map(row).collect::<Option<_>>()?))
+            }
+        }
     }
 
     /// What `loan` of plain iceoryx2 does: a small cell on the heap for each sample.
@@ -96,10 +157,14 @@ mod at_work {
         drop(black_box(Box::new([0_u8; 64])));
     }
 
-    /// Five microseconds of nothing.
+    /// Nothing, for as long as the row wants.
     fn spin() {
+        let wanted = Duration::from_nanos(spin_ns());
+        if wanted.is_zero() {
+            return;
+        }
         let start = Instant::now();
-        while start.elapsed() < Duration::from_micros(5) {
+        while start.elapsed() < wanted {
             core::hint::spin_loop();
         }
     }

@@ -48,7 +48,8 @@ fn at(sorted: &[u64], permille: usize) -> Option<u64> {
 }
 
 /// The median; the mean of the middle two of an even number. `None` of nothing.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let upper = *values.get(values.len() / 2)?;
     let lower = values[(values.len() - 1) / 2];

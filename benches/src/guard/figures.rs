@@ -6,12 +6,12 @@ use core::str::FromStr;
 use std::collections::BTreeMap;
 
 use lager_benches::chip::Trace;
-use lager_benches::{Mode, Regime, Report};
+use lager_benches::{Mode, Regime, Report, median};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// The figures of one source.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Figures {
     /// `hop`, `path`, `fanout`, or what the limits call a counted source.
@@ -19,8 +19,17 @@ pub(crate) struct Figures {
     /// What built the program, for counts.
     #[serde(default)]
     pub(crate) built: Option<Built>,
-    /// The figures by name.
+    /// The figures by name; of ratios, the medians of `runs`.
     pub(crate) figures: BTreeMap<String, f64>,
+    /// The ratios of each run, by the same names.
+    #[serde(skip)]
+    pub(crate) runs: BTreeMap<String, Vec<f64>>,
+    /// The time that each ratio compares with its baseline's, in ns, by the same names.
+    #[serde(skip)]
+    pub(crate) times_ns: BTreeMap<String, f64>,
+    /// What this machine cannot measure, with the reason: the first words of figures' names.
+    #[serde(skip)]
+    pub(crate) unmeasured: BTreeMap<String, String>,
 }
 
 /// Which compiler built a program, and for what.
@@ -69,6 +78,18 @@ pub(crate) struct RatioName {
 enum Quantile {
     P50,
     P99,
+}
+
+impl RatioName {
+    /// Whether one of the two rows can be slowed down without touching the other one's ratio.
+    pub(crate) fn is_apart_from(&self, other: &Self) -> bool {
+        let (label, beside) = (&self.label, &other.label);
+        if (&self.what, self.regime) != (&other.what, other.regime) {
+            return true;
+        }
+        let same_row = label == beside && self.mode == other.mode;
+        !same_row && self.to != *beside && other.to != *label
+    }
 }
 
 impl fmt::Display for RatioName {
@@ -122,10 +143,14 @@ impl FromStr for RatioName {
 impl Figures {
     /// The ratios of a report.
     pub(crate) fn of_report(source: &str, report: &Report) -> Result<Self, FiguresError> {
-        let mut figures = BTreeMap::new();
+        let (mut figures, mut runs) = (BTreeMap::new(), BTreeMap::new());
+        let mut times_ns = BTreeMap::new();
         for row in &report.rows {
             for ratio in &row.ratios {
-                for (quantile, value) in [(Quantile::P50, ratio.p50), (Quantile::P99, ratio.p99)] {
+                for (place, quantile, value, own_ns) in [
+                    (0, Quantile::P50, ratio.p50, row.p50_ns),
+                    (1, Quantile::P99, ratio.p99, row.p99_ns),
+                ] {
                     let name = RatioName {
                         what: row.what.clone(),
                         mode: row.mode,
@@ -135,6 +160,9 @@ impl Figures {
                         quantile,
                     }
                     .to_string();
+                    let values = ratio.runs.iter().map(|run| run[place]).collect();
+                    runs.insert(name.clone(), values);
+                    times_ns.insert(name.clone(), own_ns as f64);
                     insert(source, &mut figures, name, value)?;
                 }
             }
@@ -143,6 +171,9 @@ impl Figures {
             source: source.to_owned(),
             built: None,
             figures,
+            runs,
+            times_ns,
+            ..Self::default()
         })
     }
 
@@ -170,6 +201,7 @@ impl Figures {
             source: "instructions".to_owned(),
             built: Some(built),
             figures,
+            ..Self::default()
         }
         .not_empty(file)
     }
@@ -211,16 +243,28 @@ impl Figures {
             source: source.to_owned(),
             built,
             figures,
+            ..Self::default()
         })
     }
 
-    /// Keeps the lower one of each figure of two measurements of the same source.
-    pub(crate) fn lower_of(mut self, other: &Self) -> Self {
-        for (name, value) in &other.figures {
-            self.figures
-                .entry(name.clone())
-                .and_modify(|least| *least = least.min(*value))
-                .or_insert(*value);
+    /// Whether this machine cannot measure that figure.
+    pub(crate) fn cannot_be_measured(&self, figure: &str) -> bool {
+        let what = figure.split(' ').next().unwrap_or_default();
+        self.unmeasured.contains_key(what)
+    }
+
+    /// Puts the runs of two measurements of the same source together; each figure is the median of
+    /// all of them.
+    pub(crate) fn pooled_with(mut self, other: Self) -> Self {
+        for (name, value) in other.figures {
+            self.figures.entry(name).or_insert(value);
+        }
+        for (name, more) in other.runs {
+            let runs = self.runs.entry(name.clone()).or_default();
+            runs.extend(more);
+            if let Some(middle) = median(runs.clone()) {
+                self.figures.insert(name, middle);
+            }
         }
         self
     }
@@ -366,14 +410,17 @@ mod tests {
     }
 
     #[test]
-    fn of_two_measurements_the_lower_figure_stays() {
-        let of = |value| Figures {
+    fn of_two_measurements_the_median_of_all_runs_counts() {
+        let of = |runs: &[f64]| Figures {
             source: "hop".to_owned(),
             built: None,
-            figures: [("a".to_owned(), value)].into(),
+            figures: [("a".to_owned(), median(runs.to_vec()).unwrap())].into(),
+            runs: [("a".to_owned(), runs.to_vec())].into(),
+            ..Figures::default()
         };
-        assert_eq!(of(2.0).lower_of(&of(1.0)), of(1.0));
-        assert_eq!(of(1.0).lower_of(&of(2.0)), of(1.0));
+        // One lucky run does not decide, and one unlucky one does not either.
+        let pooled = of(&[1.3, 1.2, 1.4]).pooled_with(of(&[0.5, 1.25, 9.0]));
+        assert_eq!(pooled.figures["a"], 1.275);
     }
 
     #[test]

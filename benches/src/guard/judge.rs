@@ -18,7 +18,8 @@ pub(crate) enum Verdict {
     Broken,
     /// There is no such figure.
     Missing,
-    /// The figure is of a target for which the limit says nothing.
+    /// The figure is of a target for which the limit says nothing, or this machine cannot measure
+    /// it; a note says why.
     NotJudged,
 }
 
@@ -65,6 +66,7 @@ pub(crate) fn judge(limits: &Limits, figures: &Figures) -> (Vec<Judgement>, Vec<
     if counted.is_some() {
         notes.extend(notes_on_counts(limits, figures));
     }
+    notes.extend(figures.unmeasured.values().cloned());
     (judgements, notes)
 }
 
@@ -95,6 +97,7 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
     });
     let measured = figures.figures.get(&limit.figure).copied();
     let verdict = match measured {
+        None if figures.cannot_be_measured(&limit.figure) => Verdict::NotJudged,
         None => Verdict::Missing,
         Some(_) if margin == Margin::NotJudged => Verdict::NotJudged,
         // Written so that a figure that is no number breaks the limit.
@@ -198,6 +201,7 @@ mod tests {
             source: "hop".to_owned(),
             built: None,
             figures: [("ratio".to_owned(), value)].into(),
+            ..Figures::default()
         };
         judge(&limits(), &figures).0[0].verdict
     }
@@ -210,6 +214,7 @@ mod tests {
                 target: target.to_owned(),
             }),
             figures: [(name.to_owned(), value)].into(),
+            ..Figures::default()
         };
         let (judgements, notes) = judge(&limits(), &figures);
         assert_eq!(judgements.len(), 1, "only its own source's limits");
@@ -244,6 +249,7 @@ mod tests {
                     target: "here".to_owned(),
                 }),
                 figures: [("send".to_owned(), 1000.0)].into(),
+                ..Figures::default()
             };
             assert_eq!(judge(&limits, &figures).0[0].limit, bound);
         }
@@ -267,9 +273,27 @@ mod tests {
                     target: "here".to_owned(),
                 }),
                 figures: [("send".to_owned(), value)].into(),
+                ..Figures::default()
             };
             assert_eq!(judge(&limits, &figures).0[0].verdict, verdict, "{value}");
         }
+    }
+
+    #[test]
+    fn what_this_machine_cannot_measure_is_told_and_not_judged() {
+        let figures = Figures {
+            source: "hop".to_owned(),
+            unmeasured: [("rat".to_owned(), "no right".to_owned())].into(),
+            ..Figures::default()
+        };
+        let (judgements, notes) = judge(&limits(), &figures);
+        assert_eq!(judgements[0].verdict, Verdict::Missing, "another scenario");
+        assert_eq!(notes, ["no right"]);
+        let figures = Figures {
+            unmeasured: [("ratio".to_owned(), "no right".to_owned())].into(),
+            ..figures
+        };
+        assert_eq!(judge(&limits(), &figures).0[0].verdict, Verdict::NotJudged);
     }
 
     #[test]

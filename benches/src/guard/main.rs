@@ -11,13 +11,14 @@ mod figures;
 mod judge;
 mod limits;
 mod measure;
+mod trial;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
 use lager_benches::chip::{self, Programs};
-use lager_benches::{BenchError, machine};
+use lager_benches::{BenchError, machine, median};
 use serde::Serialize;
 
 use crate::figures::{Built, Figures, FiguresError};
@@ -34,7 +35,7 @@ use crate::measure::{MeasureError, Thoroughness, measure};
 #[command(
     name = "benches/guard",
     bin_name = "benches/guard",
-    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json"
+    after_help = "Examples:\n  benches/guard                        everything, about four minutes\n  benches/guard --only instructions    the counts alone, which no load disturbs\n  benches/guard --only hop --json\n  benches/guard --only hop,path,fanout --spread 10    before a limit is changed\n  benches/guard --only hop,path,fanout --try          after that: does each limit hold?"
 )]
 struct Arguments {
     /// The limits
@@ -46,9 +47,15 @@ struct Arguments {
     /// Runs of each measurement; a ratio is the median over them
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
     runs: usize,
-    /// How often to measure a scenario while one of its limits is broken; the lower ratio counts
+    /// How often to measure a scenario while one of its limits is broken; all runs count together
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
     attempts: usize,
+    /// Judge nothing: measure each scenario so many times, and show how far its figures spread
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    spread: Option<usize>,
+    /// Try the limits on ratios: plant a slow-down just above each, and fail if one goes unnoticed
+    #[arg(long = "try", conflicts_with = "spread")]
+    trial: bool,
     /// One line of JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -78,6 +85,8 @@ enum GuardError {
     Measure(#[from] MeasureError),
     #[error("cycles: {0}")]
     Chip(#[from] BenchError),
+    #[error("the guard could not be started again with a slow-down: {0}")]
+    Trial(std::io::Error),
     #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
     NoSuchSource(String, String),
     #[error(
@@ -102,6 +111,24 @@ fn main() -> ExitCode {
     lager_benches::cast::play_if_asked();
     lager_benches::slow::refuse_in_vain();
     let arguments = Arguments::parse();
+    if let Some(times) = arguments.spread {
+        return match spread(&arguments, times) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("benches/guard: {error}");
+                ExitCode::from(2)
+            }
+        };
+    }
+    if arguments.trial {
+        return match try_limits(&arguments) {
+            Ok(all_noticed) => ExitCode::from(u8::from(!all_noticed)),
+            Err(error) => {
+                eprintln!("benches/guard: {error}");
+                ExitCode::from(2)
+            }
+        };
+    }
     match guard(&arguments) {
         Ok(findings) => {
             if arguments.json {
@@ -142,7 +169,7 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
                 if measured.attempts > 1 {
                     let times = measured.attempts;
                     findings.notes.push(format!(
-                        "{source}: measured {times} times because a limit was broken; the lower ratios count"
+                        "{source}: measured {times} times because a limit was broken; the medians of all runs count"
                     ));
                 }
                 measured.figures
@@ -163,6 +190,83 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
         findings.notes.extend(notes);
     }
     Ok(findings)
+}
+
+/// Shows how far the ratios that have limits spread from one measurement to the next.
+fn spread(arguments: &Arguments, times: usize) -> Result<(), GuardError> {
+    let limits = Limits::load(&arguments.limits)?;
+    let mut sources = sources(&limits, &arguments.only)?;
+    sources.retain(|source| SCENARIOS.contains(&source.as_str()));
+    println!("{}\n", machine::describe());
+    println!(
+        "{:<70} {:>7} {:>7} {:>7} {:>7} {:>7}",
+        "figure", "lowest", "median", "highest", "limit", "goal"
+    );
+    for source in sources {
+        let measured = measure::spread(&limits, &source, arguments.runs, times)?;
+        for limit in limits.of(&source) {
+            let mut values: Vec<f64> = measured
+                .iter()
+                .filter_map(|figures| figures.figures.get(&limit.figure).copied())
+                .collect();
+            values.sort_unstable_by(f64::total_cmp);
+            let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), number);
+            println!(
+                "{:<70} {:>7} {:>7} {:>7} {:>7} {:>7}",
+                limit.figure,
+                show(values.first().copied()),
+                show(median(values.clone())),
+                show(values.last().copied()),
+                show(limit.at_most),
+                show(limit.goal),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Plants a slow-down just above each limit on a ratio; whether the guard has noticed each.
+fn try_limits(arguments: &Arguments) -> Result<bool, GuardError> {
+    let limits = Limits::load(&arguments.limits)?;
+    let mut sources = sources(&limits, &arguments.only)?;
+    sources.retain(|source| SCENARIOS.contains(&source.as_str()));
+    let how = Thoroughness {
+        runs: arguments.runs,
+        attempts: 1,
+    };
+    let mut all_noticed = true;
+    if !arguments.json {
+        println!("{}\n", machine::describe());
+        println!(
+            "{:<70} {:>7} {:>7} {:>12} {:>7}  noticed",
+            "figure", "limit", "before", "slower by ns", "with it"
+        );
+    }
+    for source in sources {
+        let measured = measure(&limits, &source, how)?;
+        for mut trial in trial::trials(&limits, &measured.figures) {
+            trial::run(&mut trial, &arguments.limits, &source, arguments.runs)
+                .map_err(GuardError::Trial)?;
+            for planted in trial {
+                all_noticed &= planted.noticed;
+                if arguments.json {
+                    let json = serde_json::to_string(&planted).expect("names and numbers are JSON");
+                    println!("{json}");
+                    continue;
+                }
+                println!(
+                    "{:<70} {:>7} {:>7} {:>12} {:>7}  {}",
+                    planted.figure,
+                    number(planted.limit),
+                    number(planted.before),
+                    planted.spin_ns,
+                    planted.with.map_or_else(|| "-".to_owned(), number),
+                    if planted.noticed { "yes" } else { "NO" },
+                );
+            }
+        }
+    }
+    Ok(all_noticed)
 }
 
 /// The sources that have limits, in the file's order, or those of them that were asked for.

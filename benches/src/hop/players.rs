@@ -23,6 +23,7 @@ use crate::machine;
 use crate::parts::Stage;
 use crate::report::Mode;
 use crate::shared::{Barrier, Board, Shared, inherit};
+use crate::slow;
 
 /// What both processes see without a bus.
 #[derive(Debug)]
@@ -109,6 +110,8 @@ pub struct Round {
     pub timing: Timing,
     /// Which round it is, from 1.
     pub number: u32,
+    /// A deliberate slow-down of each sample, in ns.
+    pub spin_ns: u64,
 }
 
 impl Round {
@@ -267,6 +270,7 @@ fn play<P: Player>(stage: &mut Stage, player: P) -> Result<(), BenchError> {
     };
     stage.tell(&())?;
     while let Some(round) = stage.hear::<Round>()? {
+        slow::spins_for(round.spin_ns);
         stage.tell(&table.round(&player, &round)?)?;
     }
     Ok(())

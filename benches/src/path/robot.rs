@@ -39,6 +39,7 @@ use crate::domain::Domain;
 use crate::error::BenchError;
 use crate::parts::{Part, interrupted};
 use crate::report::Mode;
+use crate::slow;
 
 /// How long the robot may take to come up, and to come back after it stood still.
 const UP_WITHIN: Duration = Duration::from_secs(10);
@@ -318,6 +319,9 @@ impl Robot {
         loop {
             let look = give_up.min(now_ns() + REPORT_EVERY);
             let count = self.steering.cable.read_until(look, &mut buffer)?;
+            if count > 0 {
+                slow::answer();
+            }
             let end = now_ns();
             if count == 0 && end >= give_up {
                 return Ok(Answer::None);

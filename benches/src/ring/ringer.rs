@@ -24,6 +24,7 @@ pub(super) fn ringer(stage: &mut Stage) -> Result<(), BenchError> {
         return Ok(());
     };
     while let Some(round) = stage.hear::<Round>()? {
+        slow::spins_for(round.spin_ns);
         let mut rope = Rope::tie(&place, round.contender)?;
         place.meet(&round, 1)?;
         let mut samples = Vec::with_capacity(round.balls as usize);

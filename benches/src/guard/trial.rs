@@ -1,0 +1,170 @@
+//! Tries the limits on ratios: plants a slow-down just above each and sees whether the guard fails.
+//!
+//! How long a slow-down has to be is computed from what this machine shows without it, so the same
+//! trial is fair to a fast and a slow one. The slow-downs stand in the benches beside the code that
+//! is measured (`lager_benches::slow`). A trial runs the guard anew with several of them, in rows
+//! that are not compared with each other.
+
+use std::path::Path;
+use std::process::Command;
+
+use lager_benches::slow;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::figures::{Figures, RatioName};
+use crate::limits::{Limit, Limits};
+
+/// How far above its limit a ratio is brought.
+const ABOVE: f64 = 1.25;
+
+/// A limit and the slow-down that should break it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Planted {
+    pub(crate) figure: String,
+    pub(crate) limit: f64,
+    /// The ratio without the slow-down.
+    pub(crate) before: f64,
+    /// The slow-down of each sample, in ns.
+    pub(crate) spin_ns: u64,
+    /// The ratio with it.
+    pub(crate) with: Option<f64>,
+    /// The guard has failed because of this figure.
+    pub(crate) noticed: bool,
+}
+
+/// Slow-downs that are tried at once.
+pub(crate) type Trial = Vec<Planted>;
+
+/// The trials of a source, whose ratios without any slow-down are `figures`.
+pub(crate) fn trials(limits: &Limits, figures: &Figures) -> Vec<Trial> {
+    let mut trials: Vec<(Trial, Vec<RatioName>)> = Vec::new();
+    for limit in limits.of(&figures.source) {
+        let (Some(planted), Ok(name)) = (planted(limit, figures), limit.figure.parse()) else {
+            continue;
+        };
+        let fits = |names: &[RatioName]| names.iter().all(|other| other.is_apart_from(&name));
+        match trials.iter_mut().find(|(_, names)| fits(names)) {
+            Some((trial, names)) => {
+                trial.push(planted);
+                names.push(name);
+            }
+            None => trials.push((vec![planted], vec![name])),
+        }
+    }
+    trials.into_iter().map(|(trial, _)| trial).collect()
+}
+
+/// The slow-down that brings a ratio above its limit; `None` without such a ratio.
+fn planted(limit: &Limit, figures: &Figures) -> Option<Planted> {
+    let at_most = limit.at_most?;
+    let before = *figures.figures.get(&limit.figure)?;
+    let own_ns = *figures.times_ns.get(&limit.figure)?;
+    let baseline_ns = own_ns / before;
+    let spin_ns = (ABOVE * at_most - before).max(0.0) * baseline_ns;
+    Some(Planted {
+        figure: limit.figure.clone(),
+        limit: at_most,
+        before,
+        spin_ns: spin_ns.ceil() as u64,
+        with: None,
+        noticed: false,
+    })
+}
+
+/// Runs this program again with the slow-downs of one trial, and notes what it says.
+pub(crate) fn run(
+    trial: &mut Trial,
+    limits: &Path,
+    source: &str,
+    runs: usize,
+) -> std::io::Result<()> {
+    let row = |planted: &Planted| {
+        let (row, _) = planted.figure.split_once(" / ").unwrap_or_default();
+        format!("{row}={}", planted.spin_ns)
+    };
+    let rows: Vec<String> = trial.iter().map(row).collect();
+    let output = Command::new(std::env::current_exe()?)
+        .env(slow::VARIABLE, format!("spin:{}", rows.join(";")))
+        .arg("--limits")
+        .arg(limits)
+        .args(["--only", source, "--json", "--attempts", "1", "--runs"])
+        .arg(runs.to_string())
+        .output()?;
+    let findings: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+        std::io::Error::other(String::from_utf8_lossy(&output.stderr).trim().to_owned())
+    })?;
+    for planted in trial {
+        let found = findings["limits"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .find(|limit| limit["figure"] == planted.figure.as_str());
+        if let Some(found) = found {
+            planted.with = found["measured"].as_f64();
+            planted.noticed = found["verdict"] == "broken" && output.status.code() == Some(1);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits(figures: &[(&str, f64)]) -> Limits {
+        let limits = figures.iter().map(|(figure, at_most)| Limit {
+            source: "path".to_owned(),
+            figure: (*figure).to_owned(),
+            at_most: Some(*at_most),
+            at_least: None,
+            measured: None,
+            margin_percent: None,
+            goal: None,
+            reason: "a test".to_owned(),
+        });
+        Limits {
+            counted: [].into(),
+            limits: limits.collect(),
+        }
+    }
+
+    const BLOCK: &str = "path block plain: lager/block / floor p50";
+    const BLOCK_P99: &str = "path block plain: lager/block / floor p99";
+    const ADAPTIVE: &str = "path adaptive plain: lager/adaptive / lager/block p50";
+    const OBSERVED: &str = "path@observed block plain: lager/64 observers / lager/alone p50";
+
+    #[test]
+    fn a_slow_down_is_as_long_as_its_limit_wants() {
+        let figures = Figures {
+            source: "path".to_owned(),
+            figures: [(BLOCK.to_owned(), 1.2)].into(),
+            times_ns: [(BLOCK.to_owned(), 60_000.0)].into(),
+            ..Figures::default()
+        };
+        let trials = trials(&limits(&[(BLOCK, 1.6)]), &figures);
+        // From 60 us to 1.25 times 1.6 baselines of 50 us.
+        assert_eq!(trials[0][0].spin_ns.abs_diff(40_000), 0, "{trials:?}");
+    }
+
+    #[test]
+    fn rows_that_are_compared_with_each_other_are_slowed_down_one_after_the_other() {
+        let all = [BLOCK, BLOCK_P99, ADAPTIVE, OBSERVED];
+        let figures = Figures {
+            source: "path".to_owned(),
+            figures: all.map(|figure| (figure.to_owned(), 1.0)).into(),
+            times_ns: all.map(|figure| (figure.to_owned(), 1_000.0)).into(),
+            ..Figures::default()
+        };
+        let limits = limits(&all.map(|figure| (figure, 1.3)));
+        let trials = trials(&limits, &figures);
+        let names: Vec<Vec<&str>> = trials
+            .iter()
+            .map(|trial| trial.iter().map(|one| one.figure.as_str()).collect())
+            .collect();
+        assert_eq!(
+            names,
+            [vec![BLOCK, OBSERVED], vec![BLOCK_P99], vec![ADAPTIVE]]
+        );
+    }
+}
