@@ -65,5 +65,16 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
         assert_eq!(found["received"], topic["received"], "{topic}");
         assert_eq!(found["missing"], topic["lost"], "{topic}");
     }
+
+    let picture = domain.folder().join("mission.png");
+    let plotted = Command::new(std::env::var_os("LAGER_PYTHON").expect("as above"))
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../bus/python/examples/mission.py"))
+        .arg(domain.folder().join("tour.mcap"))
+        .arg(&picture)
+        .output()
+        .expect("Python starts");
+    assert!(plotted.status.success(), "{}", said(&plotted));
+    let picture = std::fs::read(picture).expect("a picture");
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
     domain.assert_clean();
 }

@@ -20,7 +20,10 @@ from lagerrobot.layouts import EventKind, GoodState, Phase, Side
 
 # Phases in which the robot does the same for a person who looks, each with its colour.
 DOING = {
-    "waits": ("0.88", {Phase.WaitingForMap, Phase.WaitingForOrder, Phase.Halted, Phase.Stuck, Phase.Lost}),
+    "waits": (
+        "0.88",
+        {Phase.WaitingForMap, Phase.WaitingForOrder, Phase.Halted, Phase.Stuck, Phase.Lost},
+    ),
     "drives": ("tab:blue", {Phase.Driving, Phase.Approaching, Phase.Exiting, Phase.Returning}),
     "turns": (
         "tab:cyan",
@@ -44,7 +47,9 @@ def read(path):
         poses = bag.topic("truth/pose")
         found["pose"] = [(seconds(s), s.data.x_mm / 1e3, s.data.y_mm / 1e3) for s in poses]
         reports = bag.topic("steering/state")
-        found["duty"] = [(seconds(s), s.data.left_duty / 2.55, s.data.right_duty / 2.55) for s in reports]
+        found["duty"] = [
+            (seconds(s), s.data.left_duty / 2.55, s.data.right_duty / 2.55) for s in reports
+        ]
         distances = bag.topic("sensor/distance")
         found["distance"] = [
             (seconds(s), s.data.distance_cm if s.data.distance_cm != 255 else float("nan"))
@@ -52,15 +57,18 @@ def read(path):
         ]
         found["phase"] = [(seconds(s), s.data.phase) for s in bag.topic("nav/status")]
         found["event"] = [(seconds(s), s.data.kind) for s in bag.topic("mission/event")]
-        orders = bag.topic("steering/command")
-        # From a sensor frame's bytes to the order that it caused, in us.
-        found["path"] = [
-            (seconds(s), (s.stamp.publish_time_ns - s.stamp.source_time_ns) / 1e3)
-            for s in orders
-            if s.stamp.cause_topic != 0
+        # From a sensor frame's bytes to the order that it caused, in us; renewals repeat an order.
+        found["path"], given = [], set()
+        for order in bag.topic("steering/command"):
+            if order.stamp.cause_topic and order.data.id not in given:
+                given.add(order.data.id)
+                took = order.stamp.publish_time_ns - order.stamp.source_time_ns
+                found["path"].append((seconds(order), took / 1e3))
+        world = bag.topic("truth/pose").latest().data
+        found["goods"] = [
+            (good.id, good.x_mm / 1e3, good.y_mm / 1e3, good.state)
+            for good in list(world.goods)[: world.good_count]
         ]
-        last = bag.topic("truth/pose").latest()
-        found["goods"] = [(g.id, g.x_mm / 1e3, g.y_mm / 1e3, g.state) for g in last.data.goods if g.id]
     return found
 
 
@@ -109,7 +117,8 @@ def draw_phases(axes, found):
     ends = [moment for moment, _ in found["phase"][1:]] + [found["phase"][-1][0]]
     for (moment, phase), end in zip(found["phase"], ends):
         doing = next(name for name, (_, phases) in DOING.items() if phase in phases)
-        axes.axvspan(moment, end, color=DOING[doing][0], lw=0, label=None if doing in drawn else doing)
+        label = None if doing in drawn else doing
+        axes.axvspan(moment, end, color=DOING[doing][0], lw=0, label=label)
         drawn.add(doing)
     axes.set(yticks=[], title="What it did")
     axes.legend(ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.1), frameon=False, fontsize=8)
@@ -117,22 +126,22 @@ def draw_phases(axes, found):
 
 def draw(found, path):
     figure = plt.figure(figsize=(12, 6.5), layout="constrained")
-    grid = figure.add_gridspec(4, 2, width_ratios=[1, 1.35], height_ratios=[0.5, 1, 1, 1])
-    draw_map(figure.add_subplot(grid[:, 0]), found, figure)
-    phases = figure.add_subplot(grid[0, 1])
+    left, right = figure.subfigures(1, 2, width_ratios=[1, 1.35])
+    draw_map(left.subplots(), found, left)
+    heights = {"height_ratios": [0.5, 1, 1, 1]}
+    phases, duty, distance, latency = right.subplots(4, 1, sharex=True, gridspec_kw=heights)
     draw_phases(phases, found)
-    duty, distance, latency = (figure.add_subplot(grid[row, 1], sharex=phases) for row in (1, 2, 3))
     times = [moment for moment, *_ in found["duty"]]
     duty.plot(times, [left for _, left, _ in found["duty"]], lw=0.8, label="left")
     duty.plot(times, [right for _, _, right in found["duty"]], lw=0.8, label="right")
     duty.set(ylabel="duty (%)", title="Motors")
     duty.legend(loc="upper right", fontsize=8)
     distance.plot(*zip(*found["distance"]), lw=1.5, color="tab:purple")
-    distance.set(ylabel="distance (cm)", title="What is in front (nothing within 80 cm: no line)", ylim=(0, 80))
+    title = "What is in front (nothing within 80 cm: no line)"
+    distance.set(ylabel="distance (cm)", title=title, ylim=(0, 80))
     latency.semilogy(*zip(*found["path"]), ".", ms=2, color="tab:gray")
-    latency.set(ylabel="time (us)", xlabel="time (s)", title="From a sensor frame to the order it caused")
-    for axes in (phases, duty, distance):
-        axes.tick_params(labelbottom=False)
+    title = "From a sensor frame to the order it caused"
+    latency.set(ylabel="time (us)", xlabel="time (s)", title=title)
     for moment, kind in found["event"]:
         if kind in EVENTS:
             for axes in (phases, duty, distance, latency):

@@ -8,7 +8,8 @@
 
 A sample lies in shared memory and is not copied. It lives until the next one is taken;
 `sample.copy()` keeps its payload. `Bag("tour.mcap")` reads a recording in the same way, up to its
-end. `Robot("r1", role="operator")` may also give commands. `lagerrobot.layouts` has the payloads and their enums.
+end. `Robot("r1", role="operator")` may also give commands. `lagerrobot.layouts` has the payloads and
+their enums.
 """
 
 from ._bag import Bag

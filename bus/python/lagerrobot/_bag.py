@@ -43,7 +43,8 @@ class Bag(ByName):
         except McapError as error:
             self._file.close()
             raise NoRecording(
-                f"{self.path} is no whole recording ({error}); `lager bag recover` saves what is whole"
+                f"{self.path} is no whole recording ({error}); `lager bag recover` saves what is "
+                "whole"
             ) from error
         start = notes.get("lager.recording")
         if summary is None or summary.statistics is None or start is None:
@@ -61,7 +62,8 @@ class Bag(ByName):
             if "lager.derived" not in channel.metadata
         }
         """The samples of each topic that is in it."""
-        self._counts = {name: json.loads(text) for name, text in notes.get("lager.counts", {}).items()}
+        counted = notes.get("lager.counts", {})
+        self._counts = {name: json.loads(text) for name, text in counted.items()}
 
     def missing(self, name: str) -> int:
         """Samples of the topic that are not in the file, as it says itself: those that were lost

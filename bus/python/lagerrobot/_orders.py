@@ -34,7 +34,8 @@ COMMANDS = (
 def give(lager: str, robot: str, folder: str, words: List[str]) -> str:
     """Runs `lager` and returns what it says."""
     if not words or words[0] not in COMMANDS:
-        raise Refused(f"{' '.join(words)!r} is no command to a robot; those are {' '.join(COMMANDS)}")
+        said = " ".join(words)
+        raise Refused(f"`{said}` is no command to a robot; those are {' '.join(COMMANDS)}")
     command = [lager, "--name", robot, "--bus", folder, *words]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)

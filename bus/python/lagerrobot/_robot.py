@@ -70,13 +70,15 @@ class Robot(ByName):
             raise NoBus(f"the bus at {self._place.folder} cannot be joined: {error}") from error
 
     def tell(self, *words: Union[str, int]) -> str:
-        """Gives a command as `lager` does, such as `tell("fetch", 2)` or `tell("stop")`, and returns
-        what it says when the robot has taken it. Raises `Refused` with the reason if it has not."""
+        """Gives a command as `lager` does, such as `tell("fetch", 2)` or `tell("stop")`, and
+        returns what it says when the robot has taken it. Raises `Refused` with the reason if it
+        has not."""
         if self.role != "operator":
             raise NotOperator(
                 'this program only looks; Robot(..., role="operator") may give commands'
             )
-        return _orders.give(self._lager, self.name, self._place.folder, [str(each) for each in words])
+        said = [str(each) for each in words]
+        return _orders.give(self._lager, self.name, self._place.folder, said)
 
     def close(self) -> None:
         """Leaves the bus; every sample is given back."""

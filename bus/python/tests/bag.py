@@ -31,7 +31,8 @@ with Bag(path) as bag:
             last = sample
             assert bytes(sample.copy()) == bytes(sample.data)
         assert reader.received == messages, topic
-        read[topic] = {"received": reader.received, "lost": reader.lost, "missing": bag.missing(topic)}
+        missing = bag.missing(topic)
+        read[topic] = {"received": reader.received, "lost": reader.lost, "missing": missing}
         # The end gives the last one back, as the next one would.
         refused(lagerrobot.Released, last.copy)
 
