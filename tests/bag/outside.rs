@@ -68,7 +68,10 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
 
     let picture = domain.folder().join("mission.png");
     let plotted = Command::new(std::env::var_os("LAGER_PYTHON").expect("as above"))
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../bus/python/examples/mission.py"))
+        .arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../bus/python/examples/mission.py"
+        ))
         .arg(domain.folder().join("tour.mcap"))
         .arg(&picture)
         .output()

@@ -83,7 +83,8 @@ fn the_warehouse_is_lines_and_marks_in_metres() {
     assert_eq!(drawn["lines"][0]["points"].as_array().unwrap().len(), 14);
     close(&drawn["lines"][0]["points"][1]["x"], 1.2);
     let goods = &drawn["cubes"][1]["pose"]["position"];
-    (close(&goods["x"], 0.6), close(&goods["y"], 0.4));
+    close(&goods["x"], 0.6);
+    close(&goods["y"], 0.4);
     assert_eq!(drawn["texts"][1]["text"], "7");
 
     let mut ways = BlockedWays {
@@ -124,10 +125,8 @@ fn the_robot_is_where_the_simulator_and_where_the_navigator_say() {
     scene.take("nav/map", BEGIN, &message(map()));
     let shown = scene.take("nav/status", BEGIN, &message(status));
     let believed = &of(&shown, View::Believed).unwrap()["pose"];
-    (
-        close(&believed["position"]["x"], 0.7),
-        close(&believed["position"]["y"], 0.4),
-    );
+    close(&believed["position"]["x"], 0.7);
+    close(&believed["position"]["y"], 0.4);
     // Half a turn about the vertical.
     close(
         &believed["orientation"]["z"].as_f64().unwrap().abs().into(),
