@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use lager_ports::{BUS_VERSION, Bus, Cause, Publisher, Subscriber};
+use lager_ports::{BUS_VERSION, Bus, BusConfig, Cause, Publisher, Subscriber};
 use lager_tests::Domain;
 use lager_topics::{
     LineFrame, Make, NavMap, OBSERVERS, Role, SensorDistance, SensorLine, Stamp, StructInfo,
@@ -217,6 +217,45 @@ fn python_reads_what_rust_reads_and_counts_what_it_missed() {
     assert_eq!(reader.says()["done"], true);
     assert!(reader.child.wait().expect("a child").success());
     drop((publisher, distances, maps, beside, bus));
+    domain.assert_clean();
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn without_a_folder_python_finds_the_bus_that_lager_would() {
+    let usual = BusConfig::default().place().expect("this user's folder");
+    let code = "from lagerrobot import _place; place = _place.find(None); \
+                print(place.folder, place.prefix, place.root, sep=chr(10))";
+    let output = python().args(["-c", code]).output().expect("Python starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let found = String::from_utf8_lossy(&output.stdout);
+    let root = usual.transport_folder();
+    let wanted = [
+        &usual.folder().to_string_lossy(),
+        usual.prefix(),
+        &*root.to_string_lossy(),
+    ];
+    assert_eq!(found.lines().collect::<Vec<_>>(), wanted);
+    // It stays where anything is in it.
+    let _ = std::fs::remove_dir(usual.folder());
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn only_an_operator_gives_commands_and_lager_gives_them_for_him() {
+    let domain = Domain::new();
+    let up = domain.start(&["up", "--headless", "--no-station"]);
+    domain.done(&["topic", "echo", "link/health", "--count", "1", "--wait"]);
+    let output = python()
+        .arg(program("orders.py"))
+        .arg(domain.bus_folder())
+        .arg(lager_tests::lager())
+        .output()
+        .expect("Python starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    drop(up);
     domain.assert_clean();
 }
 

@@ -41,5 +41,43 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
         assert_eq!(topic["received"].as_u64(), Some(there), "{name}");
     }
     assert!(counts["sensor/line"].as_u64() > Some(1_000), "{counts}");
+    // Each fits the exact schema that the file has for it.
+    for view in lager_journal::View::ALL {
+        assert!(counts[view.topic()].as_u64() > Some(0), "{view:?}");
+    }
+
+    // The project's own package, which reads it as it reads a robot.
+    let read = Command::new(std::env::var_os("LAGER_PYTHON").expect("as above"))
+        .arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../bus/python/tests/bag.py"
+        ))
+        .arg(domain.folder().join("tour.mcap"))
+        .output()
+        .expect("Python starts");
+    assert!(read.status.success(), "{}", said(&read));
+    let read: Value = serde_json::from_slice(&read.stdout).expect("JSON");
+    for topic in topics
+        .iter()
+        .filter(|topic| topic["received"].as_u64() > Some(0))
+    {
+        let found = &read[topic["topic"].as_str().expect("a name")];
+        assert_eq!(found["received"], topic["received"], "{topic}");
+        assert_eq!(found["missing"], topic["lost"], "{topic}");
+    }
+
+    let picture = domain.folder().join("mission.png");
+    let plotted = Command::new(std::env::var_os("LAGER_PYTHON").expect("as above"))
+        .arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../bus/python/examples/mission.py"
+        ))
+        .arg(domain.folder().join("tour.mcap"))
+        .arg(&picture)
+        .output()
+        .expect("Python starts");
+    assert!(plotted.status.success(), "{}", said(&plotted));
+    let picture = std::fs::read(picture).expect("a picture");
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
     domain.assert_clean();
 }

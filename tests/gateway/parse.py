@@ -13,7 +13,8 @@ for family in families:
         series = {}
         for sample in family.samples:
             labels = tuple(sorted((k, v) for k, v in sample.labels.items() if k != "le"))
-            series.setdefault(labels, {}).setdefault(sample.name[len(family.name) :], []).append(sample)
+            part = sample.name[len(family.name) :]
+            series.setdefault(labels, {}).setdefault(part, []).append(sample)
         for parts in series.values():
             buckets = sorted((float(each.labels["le"]), each.value) for each in parts["_bucket"])
             counts = [count for _, count in buckets]

@@ -89,15 +89,13 @@ impl Recovery {
         let channel = match self.channels.get(&message.channel) {
             Some(channel) => *channel,
             None => {
+                let topic = message.topic;
                 let schema = EnvelopeSchema {
-                    name: message.topic.schema.clone(),
-                    text: message.topic.schema_text.clone(),
+                    name: topic.schema.clone(),
+                    text: topic.schema_text.clone(),
                 };
-                let name = &message.topic.name;
-                let channel = match &message.topic.derived_from {
-                    None => journal.topic(name, &schema)?,
-                    Some(from) => journal.derived(name, &schema, from)?,
-                };
+                let derived_from = topic.derived_from.as_deref();
+                let channel = journal.channel(&topic.name, &schema, derived_from)?;
                 self.channels.insert(message.channel, channel);
                 channel
             }

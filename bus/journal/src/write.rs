@@ -10,6 +10,7 @@ use mcap::{Compression, McapError, WriteOptions};
 
 use crate::counts::{self, Counts};
 use crate::envelope::{EnvelopeSchema, channel_notes};
+use crate::scene::View;
 
 /// The metadata record that says what a file is of.
 pub(crate) const RECORDING: &str = "lager.recording";
@@ -150,20 +151,17 @@ impl Journal {
         self.channel(name, schema, None)
     }
 
-    /// Adds a channel whose messages are made of those of the topic `from`, and are no samples.
+    /// Adds a channel for what viewers are shown. Its messages are no samples.
     ///
     /// # Errors
     /// There are too many.
-    pub fn derived(
-        &mut self,
-        name: &str,
-        schema: &EnvelopeSchema,
-        from: &str,
-    ) -> Result<Channel, WriteError> {
-        self.channel(name, schema, Some(from))
+    pub fn view(&mut self, view: View) -> Result<Channel, WriteError> {
+        let from = view.made_of().join(" ");
+        self.channel(view.topic(), &view.schema(), Some(&from))
     }
 
-    fn channel(
+    /// Adds a channel, derived or not.
+    pub(crate) fn channel(
         &mut self,
         name: &str,
         schema: &EnvelopeSchema,

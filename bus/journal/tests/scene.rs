@@ -75,16 +75,17 @@ fn close(value: &Value, to: f64) {
 fn the_warehouse_is_lines_and_marks_in_metres() {
     let mut scene = Scene::default();
     let shown = scene.take("nav/map", BEGIN, &message(map()));
-    let map = &of(&shown, View::Map).unwrap()["entities"][0];
-    assert_eq!(map["frame_id"], "map");
-    assert_eq!(map["timestamp"]["sec"], BEGIN / 1_000_000_000);
-    assert_eq!(map["timestamp"]["nsec"], 7);
+    let drawn = &of(&shown, View::Map).unwrap()["entities"][0];
+    assert_eq!(drawn["frame_id"], "map");
+    assert_eq!(drawn["timestamp"]["sec"], BEGIN / 1_000_000_000);
+    assert_eq!(drawn["timestamp"]["nsec"], 7);
     // Three rows and four columns of tape, each with two ends.
-    assert_eq!(map["lines"][0]["points"].as_array().unwrap().len(), 14);
-    close(&map["lines"][0]["points"][1]["x"], 1.2);
-    let goods = &map["cubes"][1]["pose"]["position"];
-    (close(&goods["x"], 0.6), close(&goods["y"], 0.4));
-    assert_eq!(map["texts"][1]["text"], "7");
+    assert_eq!(drawn["lines"][0]["points"].as_array().unwrap().len(), 14);
+    close(&drawn["lines"][0]["points"][1]["x"], 1.2);
+    let goods = &drawn["cubes"][1]["pose"]["position"];
+    close(&goods["x"], 0.6);
+    close(&goods["y"], 0.4);
+    assert_eq!(drawn["texts"][1]["text"], "7");
 
     let mut ways = BlockedWays {
         count: 1,
@@ -96,6 +97,12 @@ fn the_warehouse_is_lines_and_marks_in_metres() {
         heading: Heading::Left.into(),
         ..BlockedWay::default()
     };
+    // A robot tells its blocked ways before it has a map.
+    let mut early = Scene::default();
+    assert_eq!(early.take("nav/blocks", BEGIN, &message(ways)), []);
+    let shown = early.take("nav/map", BEGIN, &message(map()));
+    assert!(of(&shown, View::Blocks).is_some());
+
     let shown = scene.take("nav/blocks", BEGIN, &message(ways));
     let blocked = &of(&shown, View::Blocks).unwrap()["entities"][0]["cubes"][0];
     close(&blocked["pose"]["position"]["x"], 0.2);
@@ -118,10 +125,8 @@ fn the_robot_is_where_the_simulator_and_where_the_navigator_say() {
     scene.take("nav/map", BEGIN, &message(map()));
     let shown = scene.take("nav/status", BEGIN, &message(status));
     let believed = &of(&shown, View::Believed).unwrap()["pose"];
-    (
-        close(&believed["position"]["x"], 0.7),
-        close(&believed["position"]["y"], 0.4),
-    );
+    close(&believed["position"]["x"], 0.7);
+    close(&believed["position"]["y"], 0.4);
     // Half a turn about the vertical.
     close(
         &believed["orientation"]["z"].as_f64().unwrap().abs().into(),
@@ -231,11 +236,9 @@ fn file() -> (Vec<u8>, usize, u64) {
         journal.write(topic, times, number, &message).unwrap();
         for shown in scene.take("truth/pose", time, &message) {
             let view = shown.view;
-            let channel = *views.entry(view).or_insert_with(|| {
-                journal
-                    .derived(view.topic(), &view.schema(), view.made_of())
-                    .unwrap()
-            });
+            let channel = *views
+                .entry(view)
+                .or_insert_with(|| journal.view(view).unwrap());
             journal
                 .write(channel, times, number, &shown.message)
                 .unwrap();

@@ -21,5 +21,17 @@ class Released(BusError):
     """A view was used after its sample had been given back."""
 
 
+class NoRecording(BusError):
+    """A file is no recording, or cannot be read."""
+
+
+class NotOperator(BusError):
+    """A command was given through a robot that was opened to look at."""
+
+
+class Refused(BusError):
+    """The robot, or `lager`, has refused a command; the message is its own sentence."""
+
+
 class Unread(BusError):
     """A topic could not be opened or read."""

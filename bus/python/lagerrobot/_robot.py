@@ -1,4 +1,7 @@
-"""A robot's bus, joined as an observer: this package has no way to write to it."""
+"""A robot's bus, joined as an observer: this package has no way to write to it.
+
+Commands are given by the program `lager`; `_orders.py` says why.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,12 @@ import importlib.metadata
 import os
 import re
 from types import TracebackType
-from typing import Any, List, Optional, Type
+from typing import Any, List, Literal, Optional, Type, Union
 
 import iceoryx2 as iox2
 
-from . import _place
-from ._errors import NoBus, OtherLayout, OtherVersion, Unread
+from . import _orders, _place
+from ._errors import NoBus, NotOperator, OtherLayout, OtherVersion, Unread
 from ._layout import TopicEntry
 from ._reader import Reader
 from .layouts import TOPICS, ByName, Stamp
@@ -35,13 +38,26 @@ class Robot(ByName):
 
     `robot.topic("sensor/line")` reads a topic. Use it as a context manager, or `close` it; it stays
     in the thread that made it.
+
+    With `role="operator"` it may also give commands, by the program `lager`.
     """
 
-    def __init__(self, name: str = "r1", *, bus: Optional[str] = None) -> None:
+    def __init__(
+        self,
+        name: str = "r1",
+        *,
+        bus: Optional[str] = None,
+        role: Literal["observer", "operator"] = "observer",
+        lager: str = "lager",
+    ) -> None:
         _check_version()
         if not _NAME.fullmatch(name) or name.startswith("iceoryx2"):
             raise NoBus(f"`{name}` is no robot's name: 1 to 24 of a-z, 0-9 and -")
+        if role not in ("observer", "operator"):
+            raise NotOperator(f"`{role}` is no role of a program: observer or operator")
         self.name = name
+        self.role = role
+        self._lager = lager
         self._place = _place.find(bus)
         self._port_name = f"observer/{os.getpid()}"
         self._readers: List[Reader[Any]] = []
@@ -52,6 +68,17 @@ class Robot(ByName):
             self._node: Optional[Any] = builder.create(iox2.ServiceType.Ipc)
         except Exception as error:
             raise NoBus(f"the bus at {self._place.folder} cannot be joined: {error}") from error
+
+    def tell(self, *words: Union[str, int]) -> str:
+        """Gives a command as `lager` does, such as `tell("fetch", 2)` or `tell("stop")`, and
+        returns what it says when the robot has taken it. Raises `Refused` with the reason if it
+        has not."""
+        if self.role != "operator":
+            raise NotOperator(
+                'this program only looks; Robot(..., role="operator") may give commands'
+            )
+        said = [str(each) for each in words]
+        return _orders.give(self._lager, self.name, self._place.folder, said)
 
     def close(self) -> None:
         """Leaves the bus; every sample is given back."""

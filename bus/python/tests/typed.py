@@ -1,6 +1,6 @@
 """What a program may write, and mypy must accept."""
 
-from lagerrobot import Robot
+from lagerrobot import Bag, Robot
 from lagerrobot.layouts import LineFrame, LineState
 
 
@@ -12,3 +12,14 @@ def on_the_line(robot: Robot) -> int:
         if frame.state == LineState.OnLine and bits and sample.stamp.sequence > 9:
             count += 1
     return count
+
+
+def farthest(path: str) -> float:
+    with Bag(path) as bag:
+        poses = bag.topic("truth/pose")
+        return max(sample.data.x_mm for sample in poses) + poses.lost
+
+
+def fetch(product: int) -> str:
+    with Robot("r1", role="operator") as robot:
+        return robot.tell("fetch", product)

@@ -8,10 +8,9 @@ use std::fmt::{Display, Write};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use lager_ports::{Clock, Stop};
-use lager_topics::{BoardHealth, Coded, Hold, Mode, Phase, StopCause};
+use lager_topics::{BoardHealth, Coded, Durations, Hold, Mode, Phase, StopCause};
 
 use crate::figures::Figures;
-use crate::histogram::Histogram;
 
 /// The media type of the text.
 pub(crate) const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
@@ -26,7 +25,7 @@ pub(crate) fn text(figures: &Figures, stop: Option<Option<Stop>>) -> String {
     let mut build = text.gauge("lager_build_info", "1, with the version of the gateway.");
     build.add(&[("version", env!("CARGO_PKG_VERSION"))], 1);
     topics(&mut text, figures);
-    path(&mut text, figures);
+    latency(&mut text, figures);
     robot(&mut text, figures, stop);
     mission(&mut text, figures);
     links(&mut text, figures);
@@ -70,21 +69,29 @@ fn topics(text: &mut Text, figures: &Figures) {
     }
 }
 
-fn path(text: &mut Text, figures: &Figures) {
-    let path = &figures.path;
-    let mut stages = text.family(
+fn latency(text: &mut Text, figures: &Figures) {
+    let mut path = text.family(
         "lager_path_seconds",
         "histogram",
-        "From a sensor frame's bytes to the order it causes, by stage: read_publish, \
+        "From a sensor frame's bytes to logic's decision, by stage: read_publish, \
          publish_receive, decide, and total, which is all of it.",
     );
-    for (stage, histogram) in [
-        ("read_publish", &path.read_publish),
-        ("publish_receive", &path.publish_receive),
-        ("decide", &path.decide),
-        ("total", &path.total),
-    ] {
-        stages.histogram(stage, histogram);
+    if let Some(latency) = &figures.path {
+        path.histogram("read_publish", &latency.read_publish);
+        path.histogram("publish_receive", &latency.publish_receive);
+        path.histogram("decide", &latency.decide);
+        path.histogram("total", &latency.total);
+    }
+    let mut command = text.family(
+        "lager_command_seconds",
+        "histogram",
+        "Logic's orders on their way to the steering board, by stage: order_receive, \
+         receive_write, and total, which begins with the sensor frame's bytes.",
+    );
+    if let Some(latency) = &figures.command {
+        command.histogram("order_receive", &latency.order_receive);
+        command.histogram("receive_write", &latency.receive_write);
+        command.histogram("total", &latency.total);
     }
 }
 
@@ -319,14 +326,19 @@ impl Family<'_> {
         }
     }
 
-    fn histogram(&mut self, stage: &str, histogram: &Histogram) {
-        for (end, count) in histogram.cumulative() {
-            let end = end.to_string();
-            self.line("_bucket", &[("stage", stage), ("le", &end)], count);
+    /// Four buckets of the topic are one here: each doubling.
+    fn histogram(&mut self, stage: &str, durations: &Durations) {
+        let mut count = 0;
+        for (bucket, more) in durations.buckets.iter().enumerate() {
+            count += more;
+            let end = Durations::upper_ns(bucket).filter(|end| end.is_power_of_two());
+            if let Some(end) = end {
+                let end = (end as f64 / 1e9).to_string();
+                self.line("_bucket", &[("stage", stage), ("le", &end)], count);
+            }
         }
-        let count = histogram.count();
         self.line("_bucket", &[("stage", stage), ("le", "+Inf")], count);
-        self.line("_sum", &[("stage", stage)], histogram.sum_seconds());
+        self.line("_sum", &[("stage", stage)], durations.sum_ns as f64 / 1e9);
         self.line("_count", &[("stage", stage)], count);
     }
 
@@ -425,6 +437,31 @@ mod tests {
             .filter(|line| line.starts_with("lager_stop_latched{"));
         assert_eq!(latches.clone().count(), StopCause::VARIANTS.len() - 1);
         assert!(latches.into_iter().all(|line| line.ends_with(" 0")));
+    }
+
+    #[test]
+    fn a_histogram_has_a_bucket_for_each_doubling_and_counts_what_is_longer() {
+        let mut figures = Figures::new("r1");
+        let mut latency = lager_topics::PathLatency::default();
+        for duration_ns in [100, 1_000, 1_024, 1_025, 5_000_000_000] {
+            latency.total.record(duration_ns);
+        }
+        figures.path = Some(Box::new(latency));
+        let text = text(&figures, None);
+        let name = "lager_path_seconds";
+        let within = |end: &str| {
+            let begin = format!("{name}_bucket{{robot=\"r1\",stage=\"total\",le=\"{end}\"}} ");
+            line(&text, &begin).map(str::to_owned)
+        };
+        assert_eq!(within("0.000000256").as_deref(), Some("1"));
+        assert_eq!(within("0.000001024").as_deref(), Some("3"));
+        assert_eq!(within("0.000002048").as_deref(), Some("4"));
+        assert_eq!(within("1.073741824").as_deref(), Some("4"));
+        assert_eq!(within("+Inf").as_deref(), Some("5"));
+        let begin = format!("{name}_sum{{robot=\"r1\",stage=\"total\"}} ");
+        assert_eq!(line(&text, &begin), Some("5.000003149"));
+        let buckets = text.matches("_bucket{robot=\"r1\",stage=\"total\"").count();
+        assert_eq!(buckets, 24);
     }
 
     #[test]

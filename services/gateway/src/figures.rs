@@ -7,11 +7,10 @@ use std::time::Duration;
 
 use lager_ports::TopicInfo;
 use lager_topics::{
-    DistanceFrame, Health, LineFrame, NavigatorStatus, SensorDistance, SensorLine, Stamp,
-    SteeringOrder, SteeringReport, Topic as _,
+    CommandLatency, DistanceFrame, Health, LineFrame, NavigatorStatus, PathLatency, Stamp,
+    SteeringReport,
 };
 
-use crate::histogram::Histogram;
 use crate::processes::{self, Process};
 
 /// What is known of one topic.
@@ -27,15 +26,6 @@ pub(crate) struct TopicFigures {
     pub(crate) readers: usize,
 }
 
-/// The way from a sensor frame to the order that it causes, in three stages and as a whole.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Path {
-    pub(crate) read_publish: Histogram,
-    pub(crate) publish_receive: Histogram,
-    pub(crate) decide: Histogram,
-    pub(crate) total: Histogram,
-}
-
 /// Everything the gateway tells.
 #[derive(Clone, Debug)]
 pub(crate) struct Figures {
@@ -46,9 +36,9 @@ pub(crate) struct Figures {
     pub(crate) report: Option<SteeringReport>,
     /// When the sensor board was heard last, and the steering board, in ns of `CLOCK_MONOTONIC`.
     pub(crate) heard_ns: [Option<u64>; 2],
-    pub(crate) path: Path,
-    /// The order that was counted last, as its writer's epoch and its id.
-    counted: Option<(u64, u32)>,
+    /// The way of sensor frames to logic's decision, and of logic's orders to the wire.
+    pub(crate) path: Option<Box<PathLatency>>,
+    pub(crate) command: Option<Box<CommandLatency>>,
     pub(crate) processes: Vec<Process>,
 }
 
@@ -61,8 +51,8 @@ impl Figures {
             status: None,
             report: None,
             heard_ns: [None; 2],
-            path: Path::default(),
-            counted: None,
+            path: None,
+            command: None,
             processes: Vec::new(),
         }
     }
@@ -102,8 +92,10 @@ impl Figures {
             self.health = Some(*health);
         } else if let Some(status) = payload.downcast_ref::<NavigatorStatus>() {
             self.status = Some(*status);
-        } else if let Some(order) = payload.downcast_ref::<SteeringOrder>() {
-            self.count_order(stamp, order);
+        } else if let Some(path) = payload.downcast_ref::<PathLatency>() {
+            self.path = Some(Box::new(*path));
+        } else if let Some(command) = payload.downcast_ref::<CommandLatency>() {
+            self.command = Some(Box::new(*command));
         }
     }
 
@@ -114,25 +106,5 @@ impl Figures {
             (figures.writers, figures.readers) = (topic.publishers, topic.subscribers);
         }
         self.processes = processes::at(topics);
-    }
-
-    /// The first of each order that a sensor frame has caused; renewals repeat it.
-    fn count_order(&mut self, stamp: &Stamp, order: &SteeringOrder) {
-        let frames = [SensorLine::ID, SensorDistance::ID];
-        if !frames.contains(&stamp.cause_topic) || self.counted == Some((stamp.epoch, order.id)) {
-            return;
-        }
-        self.counted = Some((stamp.epoch, order.id));
-        let times = [
-            stamp.source_time_ns,
-            stamp.cause_publish_time_ns,
-            stamp.cause_receive_time_ns,
-            stamp.publish_time_ns,
-        ];
-        let since = |from: usize, to: usize| times[to].saturating_sub(times[from]);
-        self.path.read_publish.record(since(0, 1));
-        self.path.publish_receive.record(since(1, 2));
-        self.path.decide.record(since(2, 3));
-        self.path.total.record(since(0, 3));
     }
 }

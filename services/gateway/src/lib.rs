@@ -19,7 +19,6 @@
 
 mod exposition;
 mod figures;
-mod histogram;
 mod http;
 mod listener;
 mod processes;

@@ -106,8 +106,7 @@ impl Part {
             let channel = match self.views.get(view) {
                 Some(channel) => *channel,
                 None => {
-                    let (name, from) = (view.topic(), view.made_of());
-                    let channel = self.journal.derived(name, &view.schema(), from)?;
+                    let channel = self.journal.view(*view)?;
                     self.views.insert(*view, channel);
                     channel
                 }

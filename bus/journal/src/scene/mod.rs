@@ -92,14 +92,15 @@ impl View {
         }
     }
 
-    /// The topic that it is made of first.
-    pub const fn made_of(self) -> &'static str {
+    /// The topics of whose messages it is made.
+    pub const fn made_of(self) -> &'static [&'static str] {
         match self {
-            Self::Map => NavMap::NAME,
-            Self::Blocks => NavBlocks::NAME,
-            Self::World | Self::Pose | Self::Frames => TruthPose::NAME,
-            Self::Bodies | Self::Believed => NavStatus::NAME,
-            Self::Log => LogThought::NAME,
+            Self::Map => &[NavMap::NAME],
+            Self::Blocks => &[NavBlocks::NAME, NavMap::NAME],
+            Self::World | Self::Pose => &[TruthPose::NAME],
+            Self::Bodies | Self::Frames => &[TruthPose::NAME, NavStatus::NAME],
+            Self::Believed => &[NavStatus::NAME],
+            Self::Log => &[LogThought::NAME],
         }
     }
 
@@ -131,6 +132,7 @@ pub struct Shown {
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     map: Option<Box<WarehouseMap>>,
+    blocks: Option<Box<BlockedWays>>,
     /// What stands on the floor as it was shown last, and when.
     world: Option<(u64, Box<Truth>)>,
     has_bodies: bool,
@@ -150,11 +152,18 @@ impl Scene {
         if topic == NavMap::NAME {
             if let Some(map) = payload::<WarehouseMap>(message) {
                 shown.push(show(View::Map, &drawn::map(&map, time)));
+                if let Some(ways) = &self.blocks {
+                    shown.push(show(View::Blocks, &drawn::blocks(ways, &map, time)));
+                }
                 self.map = Some(Box::new(map));
             }
         } else if topic == NavBlocks::NAME {
-            if let (Some(ways), Some(map)) = (payload::<BlockedWays>(message), &self.map) {
-                shown.push(show(View::Blocks, &drawn::blocks(&ways, map, time)));
+            if let Some(ways) = payload::<BlockedWays>(message) {
+                // Without a map nobody knows how far nodes are apart.
+                if let Some(map) = &self.map {
+                    shown.push(show(View::Blocks, &drawn::blocks(&ways, map, time)));
+                }
+                self.blocks = Some(Box::new(ways));
             }
         } else if topic == TruthPose::NAME {
             if let Some(truth) = payload::<Truth>(message) {
