@@ -85,7 +85,7 @@ enum Target {
 }
 
 const SEGMENTS: [&str; 4] = [".dynamic", ".data", ".connection", ".global_mgmt"];
-const FILES: [&str; 8] = [
+const FILES: [&str; 11] = [
     ".service",
     ".details",
     ".node_monitor",
@@ -94,6 +94,10 @@ const FILES: [&str; 8] = [
     ".lock",
     "lager.toml",
     "stop",
+    "warehouse.toml",
+    "warehouse.toml.queue",
+    // A socket, of which nothing but its name can be spoilt.
+    "gag",
 ];
 
 impl Target {
