@@ -360,6 +360,47 @@ fn what_is_short_is_named() {
     }
 }
 
+/// What `topic list` says and how it ends where `mounts`, a script, has made `/dev/shm` anew; the
+/// bus is in `/dev/shm/bus`.
+fn listed_where(domain: &Domain, mounts: &str, user: &[&str]) -> Output {
+    let script = format!("{mounts}\ncp \"$0\" program\nexec \"$@\"");
+    let program = domain.lager(&[]);
+    let mut command = Command::new("unshare");
+    command
+        .args(["--mount", "sh", "-ec", &script])
+        .arg(program.get_program())
+        .args(user)
+        .args(["./program", "--bus", "/dev/shm/bus", "topic", "list"])
+        .current_dir(domain.folder())
+        .output()
+        .expect("`unshare` is there")
+}
+
+#[test]
+#[ignore = "mounts file systems, which needs root; `tests/soak attack` runs it"]
+fn a_full_memory_and_a_missing_right_are_told_with_file_and_cause() {
+    let domain = Domain::new();
+    let full = "mount -t tmpfs -o size=2m tmpfs /dev/shm
+        mkdir -m 700 /dev/shm/bus
+        head -c 64M /dev/zero >/dev/shm/full || true";
+    let output = listed_where(&domain, full, &[]);
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("/dev/shm is full"), "{told}");
+    assert!(told.contains("ENOSPC"), "{told}");
+
+    let forbidden = "mount -t tmpfs -o mode=755 tmpfs /dev/shm
+        mkdir -m 700 /dev/shm/bus
+        chown 12345 /dev/shm/bus
+        chmod 755 .";
+    let user = ["setpriv", "--reuid", "12345", "--clear-groups"];
+    let output = listed_where(&domain, forbidden, &user);
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let why = "this user may not write to /dev/shm (EACCES)";
+    assert!(told.contains(why), "{told}");
+}
+
 #[test]
 fn wrong_usage_ends_with_two_and_a_sentence() {
     let domain = Domain::new();
