@@ -85,7 +85,7 @@ enum Target {
 }
 
 const SEGMENTS: [&str; 4] = [".dynamic", ".data", ".connection", ".global_mgmt"];
-const FILES: [&str; 8] = [
+const FILES: [&str; 11] = [
     ".service",
     ".details",
     ".node_monitor",
@@ -94,6 +94,10 @@ const FILES: [&str; 8] = [
     ".lock",
     "lager.toml",
     "stop",
+    "warehouse.toml",
+    "warehouse.toml.queue",
+    // A socket, of which nothing but its name can be spoilt.
+    "gag",
 ];
 
 impl Target {
@@ -490,9 +494,11 @@ fn in_its_own_mounts(domain: &Domain, log: &str) -> Child {
         .expect("`unshare` is there")
 }
 
-/// A command in the mounts of process `robot`; whether it succeeds.
+/// A command in the mounts of process `robot`; whether it succeeds. Panics if it hangs.
 fn enters(robot: u32, command: &[&str]) -> bool {
-    Command::new("timeout")
+    // As `timeout` has it for what it had to end.
+    const ENDED: [i32; 2] = [124, 137];
+    let status = Command::new("timeout")
         .args(["-k", "1", "5", "nsenter", "--mount", "--wd", "--target"])
         .arg(robot.to_string())
         .args(command)
@@ -500,8 +506,21 @@ fn enters(robot: u32, command: &[&str]) -> bool {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status()
+        .expect("`nsenter` is there");
+    let hung = status.code().is_some_and(|code| ENDED.contains(&code));
+    assert!(!hung, "{command:?} hangs");
+    status.success()
+}
+
+/// A process that does nothing in the mounts of another, so that they outlive that one.
+fn stays_in(robot: u32) -> Child {
+    Command::new("nsenter")
+        .args(["--mount", "--target"])
+        .arg(robot.to_string())
+        .args(["sleep", "600"])
+        .stdin(Stdio::null())
+        .spawn()
         .expect("`nsenter` is there")
-        .success()
 }
 
 fn has_argument(process: u32, wanted: &[u8]) -> bool {
@@ -525,6 +544,7 @@ fn fill(full: &str, log: &str) -> Outcome {
     wait_for("the robot's process", || {
         has_argument(id, b"up").then_some(())
     });
+    let mut witness = stays_in(id);
     wait_for("the stop to be released", || {
         tool(&["resume"]).then_some(())
     });
@@ -576,6 +596,18 @@ fn fill(full: &str, log: &str) -> Outcome {
     wait_for("the motors to stand", || {
         (!boards.watch.runs()).then_some(())
     });
+    let memory = PathBuf::from(format!("/proc/{}/root/dev/shm", witness.id()));
+    let binary = binary.to_str().expect("UTF-8");
+    enters(
+        witness.id(),
+        &[binary, "--bus", "/dev/shm/bus", "doctor", "--fix"],
+    );
+    let mut left = files(&memory);
+    // A robot that was stopped stays stopped.
+    left.retain(|file| !file.ends_with("stop"));
+    let _ = witness.kill();
+    let _ = witness.wait();
+    assert!(left.is_empty(), "{full}: left {left:#?}");
     Outcome {
         what: format!("{full}, and the bridge killed"),
         said,

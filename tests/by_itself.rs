@@ -7,7 +7,7 @@ use std::time::Duration;
 use lager_ports::{Clock, Subscriber};
 use lager_tests::{Cable, Domain, Running, is_stopped, pid, wait_for};
 use lager_topics::{
-    Health, LinkHealth, Mode, NavStatus, Origin, Phase, Refusal, SteeringState, TruthPose,
+    Health, Hold, LinkHealth, Mode, NavStatus, Origin, Phase, Refusal, SteeringState, TruthPose,
 };
 use rustix::process::{Signal, kill_process};
 
@@ -234,6 +234,52 @@ fn boards_at_a_cable(domain: &Domain) -> (Running, Cable, String) {
         steering.exists().then(|| Cable::plug(&steering, &cable))
     });
     (body, plugged, config)
+}
+
+#[test]
+fn a_mission_stands_while_the_steering_board_is_not_heard_and_is_delivered_after() {
+    let domain = Domain::new();
+    let (body, plugged, config) = boards_at_a_cable(&domain);
+    let mut up = domain.start(&[
+        "--config",
+        &config,
+        "up",
+        "--script",
+        "--mission",
+        "1",
+        "--exit-when-done",
+        "--json",
+    ]);
+    let mut watch = Watch::new(&domain);
+    let bus = domain.observe("r1", 1.0);
+    let mut status = bus.subscriber::<NavStatus>().expect("a topic");
+    insist(&domain, &["--config", &config, "resume"]);
+    let mut wait_for_logic = |what: &str, phase: Phase, hold: Hold| {
+        wait_for(what, || {
+            let status = status.latest().expect("readable")?;
+            (status.phase == phase && status.hold == hold).then_some(())
+        });
+    };
+    wait_for_logic("the robot to drive", Phase::Driving, Hold::None);
+    wait_for("the wheels to turn", || {
+        watch.moves().filter(|moves| *moves)
+    });
+
+    plugged.cut_reports(true);
+    wait_for_logic("logic to say why it stands", Phase::Driving, Hold::Unheard);
+    watch.wait_for_health("the bridge to say so", |health| {
+        health.blocked == Refusal::BoardSilent
+    });
+    watch.wait_to_stand();
+    watch.assert_stands();
+
+    plugged.cut_reports(false);
+    wait_for_logic("logic to go on", Phase::Driving, Hold::None);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], serde_json::json!([1]), "{}", up.log());
+    drop((body, plugged, watch, status, bus));
+    domain.assert_clean();
 }
 
 #[test]

@@ -10,7 +10,7 @@ use rustix::process::{Signal, kill_process};
 use serde_json::Value;
 
 /// Every tool that needs the bus of a robot that is up.
-const NEEDY: [&[&str]; 18] = [
+const NEEDY: [&[&str]; 26] = [
     &["topic", "echo", "sensor/line"],
     &["topic", "echo", "link/health", "--json"],
     &["topic", "hz", "sensor/line"],
@@ -18,7 +18,15 @@ const NEEDY: [&[&str]; 18] = [
     &["topic", "delay", "sensor/line"],
     &["top", "--once"],
     &["fetch", "2"],
+    &["queue"],
+    &["queue", "add", "2"],
+    &["pick", "auto"],
     &["picked"],
+    &["press", "switch"],
+    &["place"],
+    &["obstacle"],
+    &["obstacle", "put", "1,0,up"],
+    &["bag", "record", "hung.mcap"],
     &["reset"],
     &["mode", "manual"],
     &["resume"],
@@ -76,19 +84,24 @@ impl Frozen {
         for process in &processes {
             wait_for("all to be frozen", || is_stopped(*process).then_some(()));
         }
-        let place = domain.bus("r1", 2.0).place().expect("the bus's folder");
-        let mut cut = 0;
-        for segment in place.segments() {
-            if segment.to_string_lossy().ends_with(".dynamic") {
-                let file = fs::File::options().write(true).open(segment);
-                file.and_then(|file| file.set_len(0)).expect("our own file");
-                cut += 1;
-            }
-        }
-        assert!(cut > 10, "{cut} topics and requests were cut");
+        cut(domain);
         let _up = up;
         Self { processes, _up }
     }
+}
+
+/// Takes the size of what stands in shared memory of every topic and request.
+fn cut(domain: &Domain) {
+    let place = domain.bus("r1", 2.0).place().expect("the bus's folder");
+    let mut cut = 0;
+    for segment in place.segments() {
+        if segment.to_string_lossy().ends_with(".dynamic") {
+            let file = fs::File::options().write(true).open(segment);
+            file.and_then(|file| file.set_len(0)).expect("our own file");
+            cut += 1;
+        }
+    }
+    assert!(cut > 10, "{cut} topics and requests were cut");
 }
 
 impl Drop for Frozen {
@@ -141,6 +154,7 @@ fn no_tool_hangs_on_a_bus_that_does_not_answer() {
             if !matches!(words, ["topic", "list" | "info", ..]) {
                 assert_eq!(output.status.code(), Some(1), "{words:?}: {told}");
                 assert!(told.contains("is frozen"), "{words:?}: {told}");
+                assert!(told.contains(".dynamic is damaged"), "{words:?}: {told}");
             }
         }
     }
@@ -161,6 +175,26 @@ fn one_ctrl_c_ends_every_tool_also_while_the_bus_does_not_answer() {
         }
         end(words, tool, began);
     }
+    drop(frozen);
+}
+
+#[test]
+fn a_player_is_refused_also_by_a_robot_that_is_frozen() {
+    let domain = Domain::new();
+    let mut recorder = domain.start(&["bag", "record", "tour.mcap", "--wait"]);
+    let frozen = {
+        let _up = up(&domain);
+        std::thread::sleep(Duration::from_secs(1));
+        recorder.signal(Signal::INT);
+        assert_eq!(recorder.wait(), Some(0), "{}", recorder.log());
+        drop(_up);
+        Frozen::new(&domain)
+    };
+    let play = ["bag", "play", "tour.mcap"];
+    let output = end(&play, spawn(&domain, &play), Instant::now());
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(4), "{told}");
+    assert!(told.contains("`r1` is already up"), "{told}");
     drop(frozen);
 }
 
@@ -326,6 +360,47 @@ fn what_is_short_is_named() {
     }
 }
 
+/// What `topic list` says and how it ends where `mounts`, a script, has made `/dev/shm` anew; the
+/// bus is in `/dev/shm/bus`.
+fn listed_where(domain: &Domain, mounts: &str, user: &[&str]) -> Output {
+    let script = format!("{mounts}\ncp \"$0\" program\nexec \"$@\"");
+    let program = domain.lager(&[]);
+    let mut command = Command::new("unshare");
+    command
+        .args(["--mount", "sh", "-ec", &script])
+        .arg(program.get_program())
+        .args(user)
+        .args(["./program", "--bus", "/dev/shm/bus", "topic", "list"])
+        .current_dir(domain.folder())
+        .output()
+        .expect("`unshare` is there")
+}
+
+#[test]
+#[ignore = "mounts file systems, which needs root; `tests/soak attack` runs it"]
+fn a_full_memory_and_a_missing_right_are_told_with_file_and_cause() {
+    let domain = Domain::new();
+    let full = "mount -t tmpfs -o size=2m tmpfs /dev/shm
+        mkdir -m 700 /dev/shm/bus
+        head -c 64M /dev/zero >/dev/shm/full || true";
+    let output = listed_where(&domain, full, &[]);
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("/dev/shm is full"), "{told}");
+    assert!(told.contains("ENOSPC"), "{told}");
+
+    let forbidden = "mount -t tmpfs -o mode=755 tmpfs /dev/shm
+        mkdir -m 700 /dev/shm/bus
+        chown 12345 /dev/shm/bus
+        chmod 755 .";
+    let user = ["setpriv", "--reuid", "12345", "--clear-groups"];
+    let output = listed_where(&domain, forbidden, &user);
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let why = "this user may not write to /dev/shm (EACCES)";
+    assert!(told.contains(why), "{told}");
+}
+
 #[test]
 fn wrong_usage_ends_with_two_and_a_sentence() {
     let domain = Domain::new();
@@ -406,7 +481,15 @@ fn up_speaks_with_one_voice_and_traces_only_where_it_is_asked_to() {
         let time: Option<f64> = words.next().and_then(|time| time.parse().ok());
         let who = (words.next() == Some("s")).then(|| words.next()).flatten();
         assert!(time.is_some(), "`{line}` begins with no time:\n{told}");
-        let known = ["up", "bridge", "logic", "simulator", "robot"];
+        let known = [
+            "up",
+            "bridge",
+            "logic",
+            "simulator",
+            "comm",
+            "station",
+            "robot",
+        ];
         assert!(
             who.is_some_and(|who| known.contains(&who)),
             "`{line}` does not say who speaks:\n{told}"

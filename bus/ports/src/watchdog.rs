@@ -13,6 +13,7 @@
 //!     +----- leave -----+   +-- shutdown wished, grace over --> given up (interrupted)
 //!     +----------------------- shutdown wished, grace over ---> given up (interrupted)
 //! ```
+//! The last line is not there for a tool that ends in order ([`Watchdog::start_in_order`]).
 
 use core::fmt;
 use std::io;
@@ -68,11 +69,35 @@ impl Watchdog {
         shutdown: &Shutdown,
         give_up: impl FnOnce(GivenUp) + Send + 'static,
     ) -> io::Result<Self> {
+        Self::watching(Watch::new(limit), shutdown, give_up)
+    }
+
+    /// The same, but between two calls the end that was wished for may take as long as it likes.
+    ///
+    /// # Errors
+    /// The system has no thread for it.
+    pub fn start_in_order(
+        limit: Duration,
+        shutdown: &Shutdown,
+        give_up: impl FnOnce(GivenUp) + Send + 'static,
+    ) -> io::Result<Self> {
+        let watch = Watch {
+            only_calls: true,
+            ..Watch::new(limit)
+        };
+        Self::watching(watch, shutdown, give_up)
+    }
+
+    fn watching(
+        watch: Watch,
+        shutdown: &Shutdown,
+        give_up: impl FnOnce(GivenUp) + Send + 'static,
+    ) -> io::Result<Self> {
         let watchdog = Self::default();
         let (watching, shutdown) = (watchdog.clone(), shutdown.clone());
         std::thread::Builder::new()
             .name("watchdog".to_owned())
-            .spawn(move || give_up(watching.watch(limit, &shutdown)))?;
+            .spawn(move || give_up(watching.watch(watch, &shutdown)))?;
         Ok(watchdog)
     }
 
@@ -101,8 +126,7 @@ impl Watchdog {
     }
 
     /// Looks until there is a reason to give up.
-    fn watch(&self, limit: Duration, shutdown: &Shutdown) -> GivenUp {
-        let mut watch = Watch::new(limit);
+    fn watch(&self, mut watch: Watch, shutdown: &Shutdown) -> GivenUp {
         let mut looked = Instant::now();
         loop {
             std::thread::sleep(TICK);
@@ -128,6 +152,8 @@ impl fmt::Debug for Watchdog {
 /// What the watch has counted so far.
 struct Watch {
     limit: Duration,
+    /// Whether the wish to end cuts nothing short but a call.
+    only_calls: bool,
     call: u64,
     lasted: Duration,
     wished_for: Duration,
@@ -137,6 +163,7 @@ impl Watch {
     fn new(limit: Duration) -> Self {
         Self {
             limit,
+            only_calls: false,
             call: 0,
             lasted: Duration::ZERO,
             wished_for: Duration::ZERO,
@@ -146,7 +173,9 @@ impl Watch {
     /// One look, `tick` after the one before; whether to give up.
     fn look(&mut self, tick: Duration, now: Now, shutdown: bool) -> Option<GivenUp> {
         let tick = tick.min(LONGEST_TICK);
-        if shutdown {
+        if shutdown && self.only_calls && (now.what.is_none() || now.calls != self.call) {
+            self.wished_for = Duration::ZERO;
+        } else if shutdown {
             self.wished_for += tick;
             if self.wished_for >= GRACE {
                 return Some(GivenUp::Interrupted);
@@ -222,6 +251,24 @@ mod tests {
             }
             assert!(TICK * looks < GRACE, "{looks} looks");
         }
+    }
+
+    #[test]
+    fn an_end_in_order_is_cut_short_within_a_call_only() {
+        let mut watch = Watch {
+            only_calls: true,
+            ..Watch::new(LIMIT)
+        };
+        let between = |calls| Now { calls, what: None };
+        for calls in 0..1_000 {
+            assert_eq!(watch.look(LONGEST_TICK, call(calls), true), None);
+            assert_eq!(watch.look(LONGEST_TICK, between(calls), true), None);
+        }
+        let mut looks = 0;
+        while watch.look(TICK, call(1_000), true).is_none() {
+            looks += 1;
+        }
+        assert!(TICK * looks <= GRACE, "{looks} looks");
     }
 
     #[test]

@@ -54,12 +54,6 @@ fn refused(error: BagError) -> anyhow::Error {
     }
 }
 
-/// A watch over the bus that leaves the end to the tool: a file is ended in order, however long the
-/// disk takes.
-fn patience(config: &Config) -> Result<Patience> {
-    Patience::new(config, &Shutdown::new())
-}
-
 fn record(
     config: &Config,
     args: RecordArgs,
@@ -81,7 +75,7 @@ fn record(
         queue: args.queue,
         flush: FLUSH,
     };
-    let patience = patience(config)?;
+    let patience = Patience::in_order(config, shutdown)?;
     let join = || Bus::open(&config.bus()?, Role::Recorder).map_err(anyhow::Error::from);
     let bus = patience.watchdog.over("joining the bus", join)?;
     let mut live = Live::new(as_json);
@@ -237,7 +231,7 @@ fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> 
             StampsArg::Recorded => Stamps::Recorded,
         },
     };
-    let patience = patience(config)?;
+    let patience = Patience::in_order(config, shutdown)?;
     let join = || Bus::open(&config.bus()?, Role::Recorder).map_err(anyhow::Error::from);
     let bus = patience.watchdog.over("joining the bus", join)?;
     let mut begun = |left_out: &[String]| {

@@ -3,6 +3,8 @@
 //! An error of the bus says what failed. This file is asked after such an error, and before a tool
 //! waits for a robot that is not there.
 
+use std::path::PathBuf;
+
 use anyhow::{Result, bail};
 use lager_ports::{Holder, Shortage};
 
@@ -31,6 +33,19 @@ pub fn must_be_up(config: &Config) -> Result<()> {
     );
 }
 
+/// The damaged segments of the bus, if there are any.
+fn damage(mut segments: Vec<PathBuf>) -> Option<String> {
+    segments.sort();
+    let first = segments.first()?.display();
+    let more = match segments.len() - 1 {
+        0 => String::new(),
+        more => format!(", and so are {more} more of the bus"),
+    };
+    Some(format!(
+        "{first} is damaged (emptied, or another user's){more}; `lager doctor --fix` removes what nobody uses, and `lager doctor` says who uses the rest"
+    ))
+}
+
 /// What keeps the robot from answering, a sentence for each cause that is found.
 pub fn causes(config: &Config) -> Vec<String> {
     let mut causes = Vec::new();
@@ -44,6 +59,7 @@ pub fn causes(config: &Config) -> Vec<String> {
         // That error already names folder and cause.
         return causes;
     };
+    causes.extend(damage(lager_ports::damaged(&bus).unwrap_or_default()));
     let holders = place.up().remove(&bus.robot).unwrap_or_default();
     for Holder { what, pid, .. } in holders.iter().filter(|holder| holder.frozen) {
         causes.push(format!(
@@ -52,4 +68,21 @@ pub fn causes(config: &Config) -> Vec<String> {
         ));
     }
     causes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damaged_segments_are_told_by_name() {
+        let named = |names: &[&str]| damage(names.iter().map(PathBuf::from).collect());
+        assert_eq!(named(&[]), None);
+        let one = named(&["/dev/shm/lager_1_2.global_mgmt"]).expect("a cause");
+        assert!(one.starts_with("/dev/shm/lager_1_2.global_mgmt is damaged"));
+        assert!(!one.contains("more"), "{one}");
+        let three = named(&["/dev/shm/c", "/dev/shm/a", "/dev/shm/b"]).expect("a cause");
+        assert!(three.starts_with("/dev/shm/a is damaged"), "{three}");
+        assert!(three.contains("2 more"), "{three}");
+    }
 }

@@ -102,3 +102,94 @@ fn hand_over<T: Topic>(keeper: &mut Keeper<T>) -> Result<()> {
         None => Err(error),
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::time::Duration;
+
+    use lager_ports::{BusConfig, Cause, Publisher};
+    use lager_topics::{BlockedWays, NavigatorStatus, OrderQueue, Role};
+
+    use super::*;
+
+    /// Publishes one value and is gone, as a service that was killed.
+    fn published<T: Topic>(bus: &Bus, keepers: &mut Keepers, value: T::Payload) {
+        let publisher = bus.publisher::<T>().expect("a place");
+        publisher.send(Cause::OWN, value).expect("room");
+        keepers
+            .remember()
+            .into_iter()
+            .for_each(|kept| kept.expect("kept"));
+    }
+
+    /// What a successor of logic finds while the keepers serve it.
+    fn found(bus: &Bus, keepers: &mut Keepers) -> (Option<i16>, Option<u8>, Option<u32>) {
+        let wait = Duration::from_millis(500);
+        let bus = bus.clone();
+        let successor = std::thread::spawn(move || {
+            let status = bus.kept::<NavStatus>(wait).expect("readable");
+            let blocks = bus.kept::<NavBlocks>(wait).expect("readable");
+            let queue = bus.kept::<MissionQueue>(wait).expect("readable");
+            (
+                status.map(|status| status.x),
+                blocks.map(|blocks| blocks.width),
+                queue.map(|queue| queue.order_id),
+            )
+        });
+        while !successor.is_finished() {
+            keepers.remember();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        successor.join().expect("it does not panic")
+    }
+
+    #[test]
+    fn a_topic_that_cannot_be_handed_over_keeps_no_other_back_and_is_tried_again() {
+        let folder = format!("/dev/shm/lagkeep{}", std::process::id());
+        let config = BusConfig {
+            folder: Some(Path::new(&folder).to_owned()),
+            ..BusConfig::default()
+        };
+        {
+            let bus = Bus::open(&config, Role::Supervisor).expect("a bus");
+            let mut keepers = Keepers::new(&bus).expect("a keeper for each topic");
+            let (x, width, order_id) = (5, 7, 9);
+            let status = NavigatorStatus {
+                x,
+                ..NavigatorStatus::default()
+            };
+            let blocks = BlockedWays {
+                width,
+                ..BlockedWays::default()
+            };
+            let queue = OrderQueue {
+                order_id,
+                ..OrderQueue::default()
+            };
+            published::<NavStatus>(&bus, &mut keepers, status);
+            published::<NavBlocks>(&bus, &mut keepers, blocks);
+            published::<MissionQueue>(&bus, &mut keepers, queue);
+
+            // Every writer's place of one topic is taken.
+            let mut writers: Vec<Publisher<NavBlocks>> = Vec::new();
+            while let Ok(writer) = bus.publisher() {
+                writers.push(writer);
+            }
+            keepers.owe(Service::Logic);
+            let served = keepers.hand_over();
+            assert!(matches!(served[..], [Err(_)]), "{served:?}");
+            assert_eq!(found(&bus, &mut keepers), (Some(x), None, Some(order_id)));
+
+            writers.clear();
+            let served = keepers.hand_over();
+            assert!(matches!(served[..], [Ok(Service::Logic)]), "{served:?}");
+            assert_eq!(
+                found(&bus, &mut keepers),
+                (Some(x), Some(width), Some(order_id))
+            );
+            assert!(keepers.hand_over().is_empty(), "nothing is owed");
+        }
+        config.place().expect("a folder").remove();
+    }
+}

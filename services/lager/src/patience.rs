@@ -4,6 +4,7 @@
 //! of any dead process. So one Ctrl-C ends it whatever it is doing, and it ends by itself, with a
 //! sentence, when the bus does not answer.
 
+use std::io;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
@@ -13,8 +14,12 @@ use crate::config::Config;
 use crate::voice::{self, Speaker};
 use crate::{cut_short, diagnose, exit};
 
-/// How long one call into the bus may take, in real time. The tool ends within three seconds.
+/// How long one call into the bus may take, in real time, and a command that waits for the robot as
+/// a whole. The tool ends within three seconds.
 const CALL: Duration = Duration::from_millis(2_800);
+/// How long a command waits for the robot in all its steps together, in real time, so that it can
+/// say which of them was in vain.
+const ANSWER: Duration = Duration::from_millis(2_500);
 /// How often the wish to end is looked at in a pause.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -25,27 +30,71 @@ pub struct Patience {
     pub watchdog: Watchdog,
     /// The wish to end.
     pub shutdown: Shutdown,
+    give_up: Instant,
 }
 
 impl Patience {
     /// Watches from now on, and ends this process when it is given up.
     pub fn new(config: &Config, shutdown: &Shutdown) -> Result<Self> {
+        Self::with(config, shutdown, Watchdog::start)
+    }
+
+    /// The same for a tool that ends in order, however long the disk takes: only a call into the
+    /// bus is cut short by the wish to end.
+    pub fn in_order(config: &Config, shutdown: &Shutdown) -> Result<Self> {
+        Self::with(config, shutdown, Watchdog::start_in_order)
+    }
+
+    fn with(
+        config: &Config,
+        shutdown: &Shutdown,
+        start: impl FnOnce(Duration, &Shutdown, Box<dyn FnOnce(GivenUp) + Send>) -> io::Result<Watchdog>,
+    ) -> Result<Self> {
         cut_short::say_so()?;
         let looked_at = config.clone();
-        let watchdog = Watchdog::start(CALL, shutdown, move |why| give_up(&looked_at, why))
-            .context("there is no thread for the watch over the bus")?;
+        let end = Box::new(move |why| give_up(&looked_at, why));
+        let watchdog =
+            start(CALL, shutdown, end).context("there is no thread for the watch over the bus")?;
         Ok(Self {
             watchdog,
             shutdown: shutdown.clone(),
+            give_up: Instant::now() + ANSWER,
         })
     }
 
-    /// Waits that long, outside the watch over the bus, and then goes on under it.
+    /// Whether the command has waited for the robot for long enough.
+    pub fn is_over(&self) -> bool {
+        Instant::now() >= self.give_up
+    }
+
+    /// How long the command may wait yet.
+    pub fn left(&self) -> Duration {
+        self.give_up.saturating_duration_since(Instant::now())
+    }
+
+    /// Whether a robot that was last heard then has been silent for too long. A command that has
+    /// just begun waits no longer than for its first answer.
+    pub fn is_silent(&self, heard: Option<Instant>) -> bool {
+        heard.map_or_else(|| self.is_over(), |heard| heard.elapsed() >= ANSWER)
+    }
+
+    /// Waits that long, outside the watch over the bus, and then goes on under it with a new call:
+    /// for commands that last.
+    ///
+    /// # Errors
+    /// [`exit::Interrupted`] when the end is wished for.
+    pub fn rest(&self, pause: Duration) -> Result<()> {
+        self.watchdog.leave();
+        self.pause(pause)?;
+        self.watchdog.enter("waiting for the robot");
+        Ok(())
+    }
+
+    /// Waits that long within the one call that the command is.
     ///
     /// # Errors
     /// [`exit::Interrupted`] when the end is wished for.
     pub fn pause(&self, pause: Duration) -> Result<()> {
-        self.watchdog.leave();
         let end = Instant::now() + pause;
         loop {
             if self.shutdown.is_requested() {
@@ -53,12 +102,10 @@ impl Patience {
             }
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
-                break;
+                return Ok(());
             }
             std::thread::sleep(left.min(LOOK));
         }
-        self.watchdog.enter("waiting for the robot");
-        Ok(())
     }
 }
 

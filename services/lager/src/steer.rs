@@ -32,9 +32,6 @@ pub use world::{Obstacle, Place};
 const RENEW: Duration = Duration::from_millis(40);
 /// How long a calibration may take in robot time; the board watches its sensors for five seconds.
 const CALIBRATION: Duration = Duration::from_secs(8);
-/// How long the robot may take to show an effect, in real time.
-const PATIENCE: Duration = Duration::from_millis(2_500);
-
 /// An operator at work on a robot that is up.
 pub struct Operator {
     patience: Patience,
@@ -59,9 +56,9 @@ impl Operator {
             clock,
             ..config.bus()?
         };
-        patience.watchdog.enter("joining the bus");
+        // Until the robot has taken a command that lasts, all of it is one call.
+        patience.watchdog.enter("the command");
         let bus = Bus::open(&bus, Role::Operator)?;
-        patience.watchdog.enter("opening the operator's topics");
         let operator = Self {
             hands: Hands::new(&bus)?,
             running,
@@ -197,8 +194,7 @@ impl Operator {
             id: Hands::fresh_id(),
             ..Input::default()
         })?;
-        let give_up = Instant::now() + PATIENCE;
-        while Instant::now() < give_up {
+        while !self.patience.is_over() {
             if let Some(health) = self.health.latest()?
                 && health.mode != before
             {
@@ -221,7 +217,6 @@ impl Operator {
     ) -> Result<()> {
         let pressed = Clock::monotonic_ns();
         let id = Hands::fresh_id();
-        let give_up = Instant::now() + PATIENCE;
         loop {
             self.hands.press(Input { id, ..input })?;
             self.patience.pause(Duration::from_millis(50))?;
@@ -231,7 +226,7 @@ impl Operator {
             {
                 return Ok(());
             }
-            if Instant::now() >= give_up {
+            if self.patience.is_over() {
                 bail!("logic does not react; is the robot up? (`lager up`)");
             }
         }
@@ -260,19 +255,19 @@ impl Operator {
         })?;
         crate::say("calibrating for five seconds: move the robot over tape and floor")?;
         let clock = self.bus.clock();
-        let mut heard = Instant::now();
+        let mut heard = None;
         let give_up = clock.now() + CALIBRATION;
         while clock.now() < give_up {
             if let Some(health) = self.health.latest()? {
-                heard = Instant::now();
+                heard = Some(Instant::now());
                 if health.calibrations_ended != ended_before {
                     return calibrated(&health);
                 }
             }
-            if heard.elapsed() >= PATIENCE {
+            if self.patience.is_silent(heard) {
                 bail!("the bridge has fallen silent; nobody knows how the calibration went");
             }
-            self.patience.pause(Duration::from_millis(20))?;
+            self.patience.rest(Duration::from_millis(20))?;
         }
         bail!("the sensor board does not say how the calibration went; try again")
     }
@@ -319,8 +314,7 @@ impl Operator {
         };
         let mut accepted = false;
         let mut ended = None;
-        let mut heard = Instant::now();
-        let give_up = Instant::now() + PATIENCE;
+        let mut heard = None;
         let mut renewed = clock.now();
         while end.is_none_or(|end| clock.now() < end) {
             // This process was stopped and continued, or kept from its core: the order that it
@@ -335,7 +329,7 @@ impl Operator {
             renewed = clock.now();
             self.hands.steer(order)?;
             // A user who lets go by Ctrl-C has done what he wanted.
-            if self.patience.pause(clock.real(RENEW)).is_err() {
+            if self.patience.rest(clock.real(RENEW)).is_err() {
                 break;
             }
             if let Some(report) = state.latest()? {
@@ -347,7 +341,7 @@ impl Operator {
                 }
             }
             if let Some(health) = self.health.latest()?.map(|health| *health) {
-                heard = Instant::now();
+                heard = Some(Instant::now());
                 if health.refused_origin.get() == Some(Origin::Operator)
                     && health.refused_id == order.id
                     && let Some(why) = health.refusal.get()
@@ -369,10 +363,10 @@ impl Operator {
                     Some(finish) => bail!("`{name}` {finish}"),
                 }
             }
-            if heard.elapsed() >= PATIENCE {
+            if self.patience.is_silent(heard) {
                 bail!("the bridge has fallen silent; the robot stands by itself");
             }
-            if !accepted && Instant::now() >= give_up {
+            if !accepted && self.patience.is_over() {
                 bail!("the robot does not carry out `{name}`; `lager doctor` looks for the cause");
             }
         }
@@ -402,12 +396,11 @@ fn first<T: Topic>(
     bus: &Bus,
     patience: &Patience,
 ) -> Result<T::Payload> {
-    let give_up = Instant::now() + PATIENCE;
     loop {
         if let Some(sample) = subscriber.latest()? {
             return Ok(*sample);
         }
-        if Instant::now() >= give_up {
+        if patience.is_over() {
             bail!(
                 "nobody publishes {} of the robot `{}`; is it up? (`lager up`)",
                 T::NAME,

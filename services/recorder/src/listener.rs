@@ -65,6 +65,12 @@ impl Listener<'_> {
     /// Opens the topics of the table, whether somebody writes them yet or not. Returns why some of
     /// them cannot be recorded; one that was asked for by name is an error.
     pub(crate) fn open_table(&mut self) -> Result<Vec<String>, RecordError> {
+        // All of them together: each could wait for a bus that does not answer.
+        let watchdog = self.watchdog;
+        watchdog.over("opening the topics", || self.open_each())
+    }
+
+    fn open_each(&mut self) -> Result<Vec<String>, RecordError> {
         let mut refused = Vec::new();
         for entry in TOPICS {
             if !self.wants(entry.name) {
@@ -163,8 +169,7 @@ impl TopicVisitor for Open<'_, '_> {
 
     fn visit<T: TableTopic>(self) -> Self::Output {
         let listener = self.listener;
-        let open = || listener.bus.subscriber::<T>();
-        let from = listener.watchdog.over("opening the topic", open)?;
+        let from = listener.bus.subscriber::<T>()?;
         Ok(listener.feed(from, T::NAME, schema(&T::Payload::MAKE)))
     }
 }

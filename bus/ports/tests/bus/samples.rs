@@ -248,6 +248,27 @@ fn a_late_joiner_of_a_stream_gets_nothing_old() {
 }
 
 #[test]
+fn the_latest_keeps_what_came_before_a_failure() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Bridge);
+    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
+    let publisher = bus.publisher::<SensorLine>().unwrap();
+    for value in 1..=6 {
+        send(&publisher, value);
+    }
+    // With one more held, the next cannot be received.
+    let held: Vec<_> = (0..3)
+        .map(|_| subscriber.receive().unwrap().unwrap())
+        .collect();
+    let latest = subscriber.latest().unwrap().unwrap();
+    assert_eq!(latest.link_epoch, 4);
+    let failed = subscriber.latest().unwrap_err();
+    assert_eq!(failed, ReceiveError::TooManyHeld { limit: 4 });
+    drop((held, latest));
+    assert_eq!(subscriber.latest().unwrap().unwrap().link_epoch, 6);
+}
+
+#[test]
 fn the_latest_is_what_was_published_last_by_anybody() {
     let domain = Domain::new();
     let bus = domain.open(Role::Bridge);

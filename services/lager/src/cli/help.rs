@@ -81,6 +81,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_flag_of_up_stands_under_a_heading() {
+        let mut command = Cli::command();
+        // Puts the flags of all subcommands with its own.
+        command.build();
+        let up = command.find_subcommand("up").expect("a subcommand");
+        let mut headings = std::collections::BTreeSet::new();
+        for flag in up.get_arguments().filter(|flag| !flag.is_hide_set()) {
+            let id = flag.get_id().as_str();
+            match flag.get_help_heading() {
+                Some(heading) => drop(headings.insert(heading)),
+                None => assert_eq!(id, "help", "--{id} stands under no heading"),
+            }
+        }
+        for heading in ["Robot", "Body", "Mission", "Output", "Real time", "Bus"] {
+            assert!(headings.contains(heading), "{heading}: {headings:?}");
+        }
+    }
+
+    #[test]
     fn every_subcommand_stands_in_one_group_with_its_sentence() {
         let command = Cli::command();
         let mut listed: Vec<&str> = GROUPS

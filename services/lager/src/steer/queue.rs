@@ -2,7 +2,7 @@
 //! `mission/queue` and never assume it.
 
 use std::fmt::Write;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Result, bail};
 use lager_ports::Subscriber;
@@ -10,7 +10,7 @@ use lager_topics::{
     EventKind, Input, InputKind, MissionEvent, MissionQueue, Mode, Order, OrderQueue,
 };
 
-use super::{Operator, PATIENCE, first};
+use super::{Operator, first};
 use crate::hands::Hands;
 
 /// How long after a word the robot is looked at again, in real time.
@@ -87,7 +87,6 @@ impl Operator {
             id: Hands::fresh_id(),
             product,
         };
-        let give_up = Instant::now() + PATIENCE;
         loop {
             self.hands.fetch(order)?;
             self.patience.pause(GLANCE)?;
@@ -111,7 +110,7 @@ impl Operator {
                     Err(_) => {}
                 }
             }
-            if Instant::now() >= give_up {
+            if self.patience.is_over() {
                 bail!("logic does not take the order: it is not up, or does not answer");
             }
         }
@@ -126,7 +125,6 @@ impl Operator {
         queue: &mut Subscriber<MissionQueue>,
         done: impl Fn(&OrderQueue) -> bool,
     ) -> Result<()> {
-        let give_up = Instant::now() + PATIENCE;
         self.hands.press(Input {
             kind: kind.into(),
             order_id,
@@ -140,7 +138,7 @@ impl Operator {
             {
                 return Ok(());
             }
-            if Instant::now() >= give_up {
+            if self.patience.is_over() {
                 bail!("logic does not react; `lager queue` shows what it goes by");
             }
         }

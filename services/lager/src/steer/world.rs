@@ -10,7 +10,7 @@ use lager_topics::{
 };
 use lager_wire::{Command, WheelCommand};
 
-use super::{Operator, PATIENCE, first};
+use super::{Operator, first};
 
 impl Operator {
     /// `lager place`: puts a simulated robot on a node, the delivery node if none is named, and
@@ -105,7 +105,7 @@ impl Operator {
     /// Asks the simulated world. `nowhere` says that there is no such place.
     fn world(&self, ask: WorldAsk, nowhere: impl FnOnce() -> String) -> Result<()> {
         let hands = self.bus.client::<WorldRequest>()?;
-        let answer = hands.call(ask, PATIENCE)?;
+        let answer = hands.call(ask, self.patience.left())?;
         match (answer.outcome.get(), answer.refusal.get()) {
             (Some(Outcome::Done), _) => Ok(()),
             (_, Some(WorldRefusal::NoPlace)) => bail!(nowhere()),
