@@ -67,6 +67,14 @@ unsafe impl<T: Field, const N: usize> Field for [T; N] {
     const BLANK: Self = [T::BLANK; N];
 }
 
+/// The bytes of a value as they lie in memory, to be compared or hashed.
+#[allow(unsafe_code, reason = "a `Field` has no padding")]
+pub fn bytes_of<T: Field>(value: &T) -> &[u8] {
+    // SAFETY: a `Field` has no padding, so all its bytes are initialised, and they are borrowed as
+    // long as the value is.
+    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(value).cast(), size_of::<T>()) }
+}
+
 /// One field of a payload, for tools that describe a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldInfo {
