@@ -4,6 +4,7 @@
 //!   bus ──polls──> listener ──queue──> keeper ──> file            (record)
 //!   file ──> info, check, recover, export
 //!   file ──> player ──> bus of a robot that is not up             (play)
+//!   file ──> navigator ──> compared with the file                 (play --verify)
 //! ```
 //!
 //! It is an observer: it polls, wakes nobody and is woken by nobody, and costs a writer one queue
@@ -33,6 +34,7 @@ mod play;
 mod record;
 mod recover;
 mod tally;
+mod verify;
 
 pub use bag::BagError;
 pub use config::{RecordConfig, Split};
@@ -43,3 +45,7 @@ pub use look::{check, info};
 pub use play::{PlayConfig, PlayError, Stamps, play};
 pub use record::{LiveCount, Progress, Recorded, record};
 pub use recover::recover;
+pub use verify::{
+    Compared, Did, Difference, Gap, OfTopic, Rerun, SampleDifference, Verified, VerifyError, Why,
+    verify,
+};
