@@ -1,18 +1,20 @@
 //! Recordings as people make them: of a mission, of somebody's own topic, cut short by `kill -9` and
-//! by a full disk, and played onto another robot's name.
+//! by a full disk, played onto another robot's name, and proved.
 
+mod hard;
 mod outside;
 mod play;
+mod verify;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 use std::time::Duration;
 
 use lager_journal::{Damage, Envelope, Learnt, Message, Visit, Walk};
 use lager_ports::{Bus, Cause, Publisher};
-use lager_tests::{Domain, Running, lager, wait_for};
+use lager_tests::{Domain, Running, wait_for};
 use lager_topics::{
     MissionEvent, NavStatus, Qos, Role, SensorLine, Stamp, SteeringCommand, Topic, payload,
 };
@@ -314,22 +316,7 @@ fn a_full_disk_ends_the_recording_with_a_whole_file() {
     let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
-    fs::create_dir(domain.folder().join("disk")).expect("a folder");
-    // A disk of its own, of which a copy is left; it is gone when the shell ends.
-    let script = "mount -t tmpfs -o size=2m none disk || exit 99; \"$@\"; code=$?; \
-                  cp disk/noise.mcap full.mcap; exit $code";
-    let mut recorder = Command::new("unshare")
-        .args(["--map-root-user", "--mount", "sh", "-c", script, "sh"])
-        .arg(lager())
-        .arg("--bus")
-        .arg(domain.bus_folder())
-        .args(["bag", "record", "--topic", "noise/now", "disk/noise.mcap"])
-        .current_dir(domain.folder())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("`unshare` is there");
+    let mut recorder = hard::record_on_a_small_disk(&domain, 2_048, &["--topic", "noise/now"]);
     wait_for("the disk to be full", || {
         (0..4).for_each(|_| noisy.send());
         recorder.try_wait().expect("a child")

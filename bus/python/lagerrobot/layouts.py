@@ -224,6 +224,35 @@ class BlockSource(enum.IntEnum):
     Person = 1
 
 
+class TextKind(enum.IntEnum):
+    None_ = 0
+    Began = 1
+    Map = 2
+
+
+class ToldKind(enum.IntEnum):
+    None_ = 0
+    Tick = 1
+    Line = 2
+    Distance = 3
+    Steering = 4
+    Map = 5
+    Order = 6
+    Cancel = 7
+    MoveUp = 8
+    ClearQueue = 9
+    PickupDone = 10
+    Pick = 11
+    DrivenByHand = 12
+    Reset = 13
+    Placed = 14
+    Way = 15
+    Link = 16
+    Mode = 17
+    Renewed = 18
+    Repeated = 19
+
+
 class EventKind(enum.IntEnum):
     InPosition = 0
     GettingItem = 1
@@ -700,6 +729,77 @@ class BlockedWays(Layout):
     }
 
 
+class Sent(Layout):
+    _type_name_ = "lager::Sent"
+    _hash_ = 0xB8DFE9E40065892D
+    _fields_ = [
+        ("epoch", ctypes.c_uint64),
+        ("next", ctypes.c_uint64),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["epoch", "next"],
+        "formats": ["<u8", "<u8"],
+        "offsets": [0, 8],
+        "itemsize": 16,
+    }
+
+
+class Told(Layout):
+    _type_name_ = "lager::Told"
+    _hash_ = 0x47CAD9A876504954
+    _fields_ = [
+        ("time_ns", ctypes.c_uint64),
+        ("number", ctypes.c_uint64),
+        ("product", ctypes.c_int32),
+        ("proof", ctypes.c_uint32),
+        ("command_id", ctypes.c_uint32),
+        ("kind", ctypes.c_uint8),
+        ("value", ctypes.c_uint8),
+        ("flag", ctypes.c_uint8),
+        ("x", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+        ("heading", ctypes.c_uint8),
+        ("code", ctypes.c_uint8),
+        ("arm_granted", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 4),
+    ]
+    _enums_ = {"kind": ToldKind, "heading": Heading}
+    _dtype_ = {
+        "names": ["time_ns", "number", "product", "proof", "command_id", "kind", "value", "flag", "x", "y", "heading", "code", "arm_granted", "reserved"],
+        "formats": ["<u8", "<u8", "<i4", "<u4", "<u4", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (4,))],
+        "offsets": [0, 8, 16, 20, 24, 28, 29, 30, 31, 32, 33, 34, 35, 36],
+        "itemsize": 40,
+    }
+
+
+class ToldInputs(Layout):
+    _type_name_ = "lager::ToldInputs"
+    _hash_ = 0x4E9BCEB73D6ED77B
+    _fields_ = [
+        ("first", ctypes.c_uint64),
+        ("commands", Sent),
+        ("statuses", Sent),
+        ("events", Sent),
+        ("text_left", ctypes.c_uint32),
+        ("text_used", ctypes.c_uint16),
+        ("text_kind", ctypes.c_uint8),
+        ("entries_used", ctypes.c_uint8),
+        ("reports_used", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 7),
+        ("entries", Told * 24),
+        ("reports", SteeringReport * 8),
+        ("text", ctypes.c_uint8 * 32 * 16),
+    ]
+    _enums_ = {"text_kind": TextKind}
+    _dtype_ = {
+        "names": ["first", "commands", "statuses", "events", "text_left", "text_used", "text_kind", "entries_used", "reports_used", "reserved", "entries", "reports", "text"],
+        "formats": ["<u8", Sent._dtype_, Sent._dtype_, Sent._dtype_, "<u4", "<u2", "<u1", "<u1", "<u1", ("<u1", (7,)), (Told._dtype_, (24,)), (SteeringReport._dtype_, (8,)), (("<u1", (32,)), (16,))],
+        "offsets": [0, 8, 24, 40, 56, 60, 62, 63, 64, 65, 72, 1032, 1480],
+        "itemsize": 1992,
+    }
+
+
 class Order(Layout):
     _type_name_ = "lager::Order"
     _hash_ = 0xC03E5A56CC1C0602
@@ -997,6 +1097,12 @@ TOPICS = {
         BlockedWays,
         Qos(1, 1, 4, 72, 92),
         "The ways on which something stands.",
+    ),
+    "nav/inputs": TopicEntry(
+        "nav/inputs",
+        ToldInputs,
+        Qos(64, 0, 4, 72, 92),
+        "What the navigator was told, in pieces, with proofs of what it did: for `bag play --verify`.",
     ),
     "mission/order": TopicEntry(
         "mission/order",

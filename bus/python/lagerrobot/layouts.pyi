@@ -202,6 +202,33 @@ class BlockSource(enum.IntEnum):
     Sensor = 0
     Person = 1
 
+class TextKind(enum.IntEnum):
+    None_ = 0
+    Began = 1
+    Map = 2
+
+class ToldKind(enum.IntEnum):
+    None_ = 0
+    Tick = 1
+    Line = 2
+    Distance = 3
+    Steering = 4
+    Map = 5
+    Order = 6
+    Cancel = 7
+    MoveUp = 8
+    ClearQueue = 9
+    PickupDone = 10
+    Pick = 11
+    DrivenByHand = 12
+    Reset = 13
+    Placed = 14
+    Way = 15
+    Link = 16
+    Mode = 17
+    Renewed = 18
+    Repeated = 19
+
 class EventKind(enum.IntEnum):
     InPosition = 0
     GettingItem = 1
@@ -492,6 +519,41 @@ class BlockedWays(Layout):
     reserved: Sequence[int]
     ways: Sequence[BlockedWay]
 
+class Sent(Layout):
+    epoch: int
+    next: int
+
+class Told(Layout):
+    time_ns: int
+    number: int
+    product: int
+    proof: int
+    command_id: int
+    kind: int
+    value: int
+    flag: int
+    x: int
+    y: int
+    heading: int
+    code: int
+    arm_granted: int
+    reserved: Sequence[int]
+
+class ToldInputs(Layout):
+    first: int
+    commands: Sent
+    statuses: Sent
+    events: Sent
+    text_left: int
+    text_used: int
+    text_kind: int
+    entries_used: int
+    reports_used: int
+    reserved: Sequence[int]
+    entries: Sequence[Told]
+    reports: Sequence[SteeringReport]
+    text: Sequence[Sequence[int]]
+
 class Order(Layout):
     id: int
     product: int
@@ -612,6 +674,8 @@ class ByName:
     def topic(self, name: Literal["nav/route"]) -> Reader[Route]: ...
     @overload
     def topic(self, name: Literal["nav/blocks"]) -> Reader[BlockedWays]: ...
+    @overload
+    def topic(self, name: Literal["nav/inputs"]) -> Reader[ToldInputs]: ...
     @overload
     def topic(self, name: Literal["mission/order"]) -> Reader[Order]: ...
     @overload

@@ -37,12 +37,12 @@ extern crate self as lager_topics;
 pub use description::{Described, Description, DescriptionError, NoField, describe};
 pub use payloads::*;
 pub use role::{Role, UnknownRole};
-pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo, bytes};
+pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo, bytes_of};
 pub use stamp::Stamp;
 pub use table::{
     BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder,
-    MissionQueue, NavBlocks, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos, Request,
-    SERVICE_SLOTS, SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS, Topic,
-    TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, id, visit,
+    MissionQueue, NavBlocks, NavInputs, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos,
+    Request, SERVICE_SLOTS, SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS,
+    Topic, TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, id, visit,
 };
 pub use tag::{Coded, Tag};

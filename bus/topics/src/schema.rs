@@ -67,6 +67,14 @@ unsafe impl<T: Field, const N: usize> Field for [T; N] {
     const BLANK: Self = [T::BLANK; N];
 }
 
+/// The bytes of a value as they lie in memory, to be compared or hashed.
+#[allow(unsafe_code, reason = "a `Field` has no padding")]
+pub fn bytes_of<T: Field>(value: &T) -> &[u8] {
+    // SAFETY: a `Field` has no padding, so all its bytes are initialised, and they are borrowed as
+    // long as the value is.
+    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(value).cast(), size_of::<T>()) }
+}
+
 /// One field of a payload, for tools that describe a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldInfo {
@@ -149,13 +157,6 @@ pub trait Schema {
 pub trait Payload:
     Field + Schema + Debug + Default + PartialEq + Serialize + DeserializeOwned + Send + Sync
 {
-}
-
-/// A payload as it lies in memory.
-#[allow(unsafe_code, reason = "a payload is read as bytes")]
-pub fn bytes<P: Payload>(payload: &P) -> &[u8] {
-    // SAFETY: a payload is a `Field`, so it has no padding and all of its bytes are initialised.
-    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(payload).cast(), size_of::<P>()) }
 }
 
 /// Defines a payload: `repr(C)`, `Copy`, no implicit padding, exactly the given size.

@@ -1,7 +1,7 @@
 //! Every topic as a tool sees it that was built without it.
 
 use lager_topics::{
-    Coded, Description, Field, Role, TOPICS, Tag, Topic, TopicVisitor, bytes, coded, describe,
+    Coded, Description, Field, Role, TOPICS, Tag, Topic, TopicVisitor, bytes_of, coded, describe,
     payload, visit,
 };
 use proptest::prelude::*;
@@ -68,7 +68,7 @@ fn a_sample_reads_as_its_type_would_write_it() {
         reserved: 9,
     };
     weather.sky = Tag::from_raw(99);
-    let seen = serde_json::to_value(description.read(bytes(&weather)).unwrap()).unwrap();
+    let seen = serde_json::to_value(description.read(bytes_of(&weather)).unwrap()).unwrap();
     assert_eq!(
         seen,
         json!({
@@ -82,7 +82,7 @@ fn a_sample_reads_as_its_type_would_write_it() {
         })
     );
     assert_eq!(description.size(), 24);
-    assert!(description.read(&bytes(&weather)[1..]).is_none());
+    assert!(description.read(&bytes_of(&weather)[1..]).is_none());
 }
 
 /// What a topic's own type says of a blank sample, beside what its description says.
@@ -95,7 +95,7 @@ impl TopicVisitor for Both {
         let blank = T::Payload::default();
         let description = Description::parse(&describe(&T::Payload::MAKE)).unwrap();
         assert_eq!(description.size(), size_of::<T::Payload>(), "{}", T::NAME);
-        let described = description.read(bytes(&blank)).unwrap();
+        let described = description.read(bytes_of(&blank)).unwrap();
         (
             serde_json::to_value(blank).unwrap(),
             serde_json::to_value(described).unwrap(),
@@ -273,7 +273,7 @@ proptest! {
 
 /// A blank `Weather`, filled with what `text` says.
 fn filled(text: &str) -> Result<Vec<u8>, String> {
-    let mut filled = bytes(&Weather::default()).to_vec();
+    let mut filled = bytes_of(&Weather::default()).to_vec();
     let mut json = serde_json::Deserializer::from_str(text);
     let made = Description::of::<Weather>().fill(&mut json, &mut filled);
     made.map(|()| filled).map_err(|error| error.to_string())
@@ -289,8 +289,8 @@ fn a_payload_is_made_of_what_a_person_writes() {
     };
     weather.gusts[1].mm_s = -300;
     weather.gusts[1].sky = Sky::Storm.into();
-    assert_eq!(filled(text).unwrap(), bytes(&weather));
-    assert_eq!(filled("{}").unwrap(), bytes(&Weather::default()));
+    assert_eq!(filled(text).unwrap(), bytes_of(&weather));
+    assert_eq!(filled("{}").unwrap(), bytes_of(&Weather::default()));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! `lager bag`: recordings of the bus, as the command line asks for them.
 
+mod verify;
+
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -215,6 +217,11 @@ fn sum_up(recorded: &Recorded, as_json_line: bool) -> Result<()> {
 }
 
 fn play(config: &Config, args: PlayArgs, as_json: bool, shutdown: &Shutdown) -> Result<ExitCode> {
+    if args.verify {
+        // It needs no bus, and ends at the first Ctrl-C.
+        let _patience = Patience::new(config, shutdown)?;
+        return verify::verify(&args.file, args.with, as_json);
+    }
     if args.to.is_some_and(|to| to <= args.from) {
         let what = "--to must be later than --from".to_owned();
         return Err(exit::Usage(what).into());

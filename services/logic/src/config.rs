@@ -5,9 +5,13 @@ use core::time::Duration;
 use lager_ports::Policy;
 use lager_topics::Pick;
 use lager_wire::ArmProfile;
+use serde::{Deserialize, Serialize};
 
 /// What logic has to know of the robot and how much it forgives. Times are robot time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// In JSON, as recordings have it, it is without what only [`crate::run`] heeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct LogicConfig {
     /// Speed in mm/s with both motors at the standard duty of 100 (W3).
     pub cruise_mm_per_s: f32,
@@ -67,6 +71,7 @@ pub struct LogicConfig {
     /// unreachable.
     pub try_again: Duration,
     /// Who picks the goods up.
+    #[serde(with = "crate::told::named")]
     pub pick: Pick,
     /// What the arm may do and where it is carried (`[arm]`).
     pub arm: ArmProfile,
@@ -102,8 +107,10 @@ pub struct LogicConfig {
     /// How often the pick station may be passed without being found.
     pub misses: u8,
     /// How [`crate::run`] waits for samples.
+    #[serde(skip)]
     pub waiting: Policy,
     /// Whether [`crate::run`] takes up the state of its predecessor.
+    #[serde(skip)]
     pub resume: bool,
 }
 

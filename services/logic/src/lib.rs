@@ -29,12 +29,15 @@ pub mod odometer;
 mod output;
 mod place;
 pub mod queue;
+mod replay;
 pub mod route;
 mod shell;
+mod told;
 mod traced;
 pub mod turn;
 
 pub use config::LogicConfig;
 pub use navigator::{Input, Navigator};
 pub use output::Output;
+pub use replay::{Answer, Replay, ReplayError};
 pub use shell::run;

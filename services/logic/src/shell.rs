@@ -14,8 +14,13 @@
 //! a renewal those of the newest frame since its order was given. How long frames took is counted
 //! when the turn's orders are out ([`FrameMeter`]).
 //!
+//! Last of all the journal is told (`nav/inputs`): the input, its time, and a proof of what became of
+//! it.
+//!
 //! **Safe state**: silence. When this process ends, for whatever reason, the order in force is no
 //! longer renewed, and the bridge stops the robot when the lease is over, 120 ms later.
+
+mod journal;
 
 use core::time::Duration;
 
@@ -24,10 +29,9 @@ use lager_ports::{
     Waiter,
 };
 use lager_topics::{
-    BlockedWays, InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder,
-    MissionQueue, Mode, NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
-    OrderQueue, Pick, SensorDistance, SensorLine, Stamp, SteeringCommand, SteeringOrder,
-    SteeringState, Topic,
+    InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, Mode,
+    NavBlocks, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput, Pick, SensorDistance,
+    SensorLine, Sent, Stamp, SteeringCommand, SteeringOrder, SteeringState, ToldKind, Topic,
 };
 use lager_wire::Command;
 
@@ -35,7 +39,9 @@ use crate::config::LogicConfig;
 use crate::latency::FrameMeter;
 use crate::navigator::{Input, Navigator};
 use crate::node::Node;
+use crate::told::{Beginning, Kept};
 use crate::traced::Traced;
+use journal::{Journal, Places};
 
 /// How often the order in force is renewed, in robot time; its lease is three times as long.
 const RENEWAL: Duration = Duration::from_millis(40);
@@ -55,23 +61,31 @@ const RESUME_WAIT: Duration = Duration::from_millis(500);
 /// # Errors
 /// Logic's place on the bus cannot be had; the sentence says what to do.
 pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), PortError> {
-    let (kept, blocks, queue) = match config.resume {
-        true => (
-            kept::<NavStatus>(bus),
-            kept::<NavBlocks>(bus),
-            kept::<MissionQueue>(bus),
-        ),
-        false => (None, None, None),
+    let kept = match config.resume {
+        true => {
+            let (status, blocks, queue) = (
+                kept::<NavStatus>(bus),
+                kept::<NavBlocks>(bus),
+                kept::<MissionQueue>(bus),
+            );
+            status.map(|status| Kept {
+                status,
+                blocks: blocks.unwrap_or_default(),
+                queue: queue.unwrap_or_default(),
+            })
+        }
+        false => None,
     };
-    let (blocks, queue) = (blocks.unwrap_or_default(), queue.unwrap_or_default());
-    let mut shell = Shell::new(bus, config, kept.as_ref(), &blocks, &queue)?;
+    let mut shell = Shell::new(bus, config, &Beginning::new(config, kept))?;
     shutdown.wake(shell.waiter.ringer()?);
     shell.publish_blocks(Cause::OWN);
     shell.publish_queue(Cause::OWN);
-    shell.publish_status(shell.clock.now());
+    shell.repeat_status(shell.clock.now());
     while !shutdown.is_requested() {
         shell.turn();
     }
+    let ended = shell.journal.end();
+    shell.check(ended);
     Ok(())
 }
 
@@ -105,6 +119,7 @@ struct Shell {
     events: Publisher<MissionEvent>,
     thoughts: Publisher<LogThought>,
     latency: Publisher<LatencyPath>,
+    journal: Journal,
 
     meter: FrameMeter,
     /// Inputs the navigator was given.
@@ -126,30 +141,22 @@ struct Shell {
 }
 
 impl Shell {
-    fn new(
-        bus: &Bus,
-        config: &LogicConfig,
-        kept: Option<&NavigatorStatus>,
-        blocks: &BlockedWays,
-        queue: &OrderQueue,
-    ) -> Result<Self, PortError> {
-        let navigator = match kept {
-            Some(status) => {
-                tracing::info!(
-                    phase = ?status.phase,
-                    order = status.order_id,
-                    "the state of an earlier navigator is taken up"
-                );
-                Navigator::resume(*config, status, blocks, queue)
-            }
-            None if config.resume => {
-                tracing::warn!(
-                    "there is no state of an earlier navigator: where the robot is has to be told by a reset"
-                );
-                Navigator::lost(*config)
-            }
-            None => Navigator::new(*config),
-        };
+    fn new(bus: &Bus, config: &LogicConfig, beginning: &Beginning) -> Result<Self, PortError> {
+        let kept = beginning.kept.as_ref().map(|kept| &kept.status);
+        match kept {
+            Some(status) => tracing::info!(
+                phase = ?status.phase,
+                order = status.order_id,
+                "the state of an earlier navigator is taken up"
+            ),
+            None if config.resume => tracing::warn!(
+                "there is no state of an earlier navigator: where the robot is has to be told by a reset"
+            ),
+            None => {}
+        }
+        let navigator = beginning.navigator();
+        let (commands, status, events) = (bus.publisher()?, bus.publisher()?, bus.publisher()?);
+        let places = places(&commands, &status, &events);
         Ok(Self {
             clock: bus.clock(),
             // Before the subscribers: what they miss while they are made is drained anyway.
@@ -161,12 +168,13 @@ impl Shell {
             map: bus.subscriber()?,
             orders: bus.subscriber()?,
             inputs: bus.subscriber()?,
-            commands: bus.publisher()?,
-            status: bus.publisher()?,
+            journal: Journal::begin(bus, beginning, places)?,
+            commands,
+            status,
+            events,
             blocks: bus.publisher()?,
             queue: bus.publisher()?,
             route: bus.publisher()?,
-            events: bus.publisher()?,
             thoughts: bus.publisher()?,
             latency: bus.publisher()?,
             meter: FrameMeter::default(),
@@ -200,6 +208,8 @@ impl Shell {
         let now_ns = Clock::monotonic_ns();
         self.keep_time(self.clock.at(now_ns));
         self.tell_latency(now_ns);
+        let kept = self.journal.keep_time();
+        self.check(kept);
     }
 
     fn wait(&self) {
@@ -372,15 +382,22 @@ impl Shell {
             let sent = self.thoughts.send(cause, thought);
             self.check(sent);
         }
+        let places = places(&self.commands, &self.status, &self.events);
+        let navigator = &self.navigator;
+        let told = self.journal.told(now, &input, navigator, &output, places);
+        self.check(told);
     }
 
     /// Does what is due by the clock.
     fn keep_time(&mut self, now: Duration) {
         if now >= self.status_due {
-            self.publish_status(now);
+            self.repeat_status(now);
         }
         if now >= self.renewal_due {
             self.give_order(now, self.rests_on);
+            if self.sent_order.is_some() {
+                self.tell_again(now, ToldKind::Renewed);
+            }
         }
     }
 
@@ -391,6 +408,17 @@ impl Shell {
             let sent = self.latency.send(Cause::OWN, *latency);
             self.check(sent);
         }
+    }
+
+    fn repeat_status(&mut self, now: Duration) {
+        self.publish_status(now);
+        self.tell_again(now, ToldKind::Repeated);
+    }
+
+    fn tell_again(&mut self, now: Duration, kind: ToldKind) {
+        let places = places(&self.commands, &self.status, &self.events);
+        let told = self.journal.again(now, kind, places);
+        self.check(told);
     }
 
     fn give_order(&mut self, now: Duration, cause: Cause) {
@@ -446,6 +474,26 @@ impl Shell {
         if self.complaints.is_power_of_two() {
             tracing::error!(times = self.complaints, "{error}");
         }
+    }
+}
+
+/// How far the publishers have come whose samples are proved.
+fn places(
+    commands: &Publisher<SteeringCommand>,
+    statuses: &Publisher<NavStatus>,
+    events: &Publisher<MissionEvent>,
+) -> Places {
+    Places {
+        commands: sent(commands),
+        statuses: sent(statuses),
+        events: sent(events),
+    }
+}
+
+fn sent<T: Topic>(publisher: &Publisher<T>) -> Sent {
+    Sent {
+        epoch: publisher.epoch(),
+        next: publisher.sent(),
     }
 }
 

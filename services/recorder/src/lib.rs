@@ -4,6 +4,7 @@
 //!   bus ──polls──> listener ──queue──> keeper ──> file            (record)
 //!   file ──> info, check, recover, export
 //!   file ──> player ──> bus of a robot that is not up             (play)
+//!   file ──> navigator ──> compared with the file                 (play --verify)
 //! ```
 //!
 //! It is an observer: it polls, wakes nobody and is woken by nobody, and costs a writer one queue
@@ -34,6 +35,7 @@ mod record;
 mod recover;
 mod samples;
 mod tally;
+mod verify;
 
 pub use bag::BagError;
 pub use config::{RecordConfig, Split};
@@ -45,3 +47,7 @@ pub use play::{PlayConfig, PlayError, Stamps, play};
 pub use record::{LiveCount, Progress, Recorded, record};
 pub use recover::recover;
 pub use samples::samples;
+pub use verify::{
+    Compared, Did, Difference, Gap, OfTopic, Rerun, SampleDifference, Verified, VerifyError, Why,
+    verify,
+};

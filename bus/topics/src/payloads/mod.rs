@@ -11,6 +11,7 @@ mod request;
 mod sensor;
 mod steering;
 mod stop;
+mod told;
 mod truth;
 
 pub use failure::{Failure, FailureKind, Remedy};
@@ -29,6 +30,7 @@ pub use request::{
 pub use sensor::{DistanceFrame, LineFrame};
 pub use steering::{Finish, Origin, Refusal, SteeringOrder, SteeringReport};
 pub use stop::StopCause;
+pub use told::{Sent, TextKind, Told, ToldInputs, ToldKind};
 pub use truth::{GoodState, Truth, TruthGood, TruthObstacle};
 
 /// Position of a servo that has not been heard yet; real ones are 0..=1023 (AX-12).

@@ -15,6 +15,7 @@ use super::values;
   lager bag check tour.mcap
   lager bag recover tour.mcap                 what is whole of it, into tour.recovered.mcap
   lager bag --name r2 play tour.mcap --rate 2
+  lager bag play --verify tour.mcap           does this navigator do the same again?
   lager bag export tour.mcap --csv tables
 
 A recording is MCAP with JSON, for Foxglove and every other reader of MCAP.")]
@@ -93,7 +94,16 @@ pub struct RecordArgs {
 #[command(
     after_help = "It plays onto the robot that --name says, and refuses one that is up: while it plays, no robot of
 that name can be started and nothing reaches a board. Start what shall see the recording, such as
-`lager --name r2 topic echo nav/status --wait`, before or after it."
+`lager --name r2 topic echo nav/status --wait`, before or after it.
+
+With --verify nothing is played. The navigator of this program is told in this process what the
+recorded one was told (nav/inputs), at the same times, and what both did is compared: every order,
+status and event byte by byte, all the rest by its proof. 0 if all is the same; 1 with the first
+command that differs, or where the recording lacks inputs. A navigator is verified from its begin, so
+record from before `lager up` (`lager bag record --wait`). Verify on the same kind of processor.
+
+  lager bag play --verify tour.mcap
+  lager bag play --verify tour.mcap --with tolerance=0.3    which command would be another one?"
 )]
 pub struct PlayArgs {
     /// The recording
@@ -116,6 +126,12 @@ pub struct PlayArgs {
     /// Which stamps samples get
     #[arg(long, value_enum, default_value_t)]
     pub stamps: StampsArg,
+    /// Tell the navigator again what it was told, and compare what it does with the recording
+    #[arg(long, conflicts_with_all = ["topic", "rate", "repeat", "from", "to", "stamps"])]
+    pub verify: bool,
+    /// Another value of one of the navigator's constants, in JSON; may be given again
+    #[arg(long, value_name = "NAME=VALUE", requires = "verify", value_parser = values::constant)]
+    pub with: Vec<(String, String)>,
 }
 
 /// `--stamps`.

@@ -268,6 +268,14 @@ pub fn moment(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A constant of the navigator with its value.
+pub fn constant(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text
+        .split_once('=')
+        .ok_or("give the constant's name and value, as in tolerance=0.3")?;
+    Ok((name.to_owned(), value.to_owned()))
+}
+
 /// A whole number within `range`, or `rule`.
 fn whole<T: FromStr + PartialOrd>(
     text: &str,

@@ -1,0 +1,236 @@
+//! `bag play --verify`: a recording of what the navigator was told, told to a navigator once more.
+//!
+//! ```text
+//!   nav/inputs ──> navigator of this build ──> its answer <── compared ──> the entry's order, proof
+//!                                                  │
+//!                     steering/command, nav/status, mission/event <── compared, byte by byte
+//! ```
+//!
+//! `nav/inputs` alone proves a run: each entry has the order that was in force after it and a proof
+//! of all the rest. The samples of the three topics are compared as well, as far as the recording
+//! has them: `nav/inputs` says which number each of them has, so a lost one shifts no other.
+//!
+//! A navigator is followed from its begin, since only there all of its state is told. Where pieces
+//! are missing, nothing is compared until the next one begins; [`Verified::gaps`] says where.
+//!
+//! `frames_lost` in a status counts what the shell has missed, which no navigator knows. It is not
+//! compared.
+
+mod outcome;
+mod rerun;
+mod samples;
+
+use std::path::Path;
+
+use lager_journal::{Envelope, Selection, Times};
+use lager_topics::{NavInputs, TextKind, Told, ToldInputs, ToldKind, Topic, bytes_of};
+
+use crate::bag::Bag;
+pub use outcome::{
+    Compared, Difference, Gap, OfTopic, SampleDifference, Verified, VerifyError, Why,
+};
+pub use rerun::{Did, Rerun};
+use samples::{Samples, must_fit, read};
+
+/// Tells a navigator what the file says, and compares what it does until a command differs, or to
+/// the end.
+///
+/// # Errors
+/// The file cannot be read or has no inputs, or another build wrote it.
+pub fn verify(file: &Path, rerun: &mut dyn Rerun) -> Result<Verified, VerifyError> {
+    let bag = Bag::open(file)?;
+    let overview = bag.overview()?;
+    bag.must_have(&overview, &[])?;
+    let topic = overview
+        .topics
+        .iter()
+        .find(|topic| topic.name == NavInputs::NAME);
+    let topic = topic.ok_or(VerifyError::NoInputs)?;
+    must_fit::<ToldInputs>(NavInputs::NAME, &topic.schema_text)?;
+    for topic in &overview.topics {
+        samples::must_fit_as_compared(&topic.name, &topic.schema_text)?;
+    }
+    let mut topics = vec![NavInputs::NAME.to_owned()];
+    topics.extend(samples::TOPICS.map(str::to_owned));
+    let selection = Selection {
+        topics: Some(topics),
+        ..Selection::default()
+    };
+    let mut follower = Follower {
+        rerun,
+        begin_ns: overview.begin_ns,
+        stream: None,
+        next_sample: 0,
+        follows: Follows::Nothing,
+        next_entry: 0,
+        text: Vec::new(),
+        samples: Samples::default(),
+        verified: Verified::default(),
+    };
+    bag.ordered(&overview, &selection, |topic, times, message| {
+        if topic == NavInputs::NAME {
+            let envelope = read::<ToldInputs>(NavInputs::NAME, message)?;
+            follower.piece(&envelope, times)
+        } else {
+            follower.samples.keep(topic, message)?;
+            Ok(true)
+        }
+    })?;
+    follower.verified.compared = follower.samples.finish();
+    Ok(follower.verified)
+}
+
+/// Whose inputs are followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Follows {
+    /// Nobody's, until the next navigator begins.
+    Nothing,
+    /// A navigator's whose pieces came one after the other from its begin.
+    Navigator,
+    /// The same, after something differed: only its first command that differs is looked for.
+    Apart,
+}
+
+struct Follower<'a> {
+    rerun: &'a mut dyn Rerun,
+    begin_ns: u64,
+    /// Writer and epoch of the pieces.
+    stream: Option<(u32, u64)>,
+    next_sample: u64,
+    follows: Follows,
+    next_entry: u64,
+    text: Vec<u8>,
+    samples: Samples,
+    verified: Verified,
+}
+
+impl Follower<'_> {
+    /// Takes a piece. Whether to go on.
+    fn piece(
+        &mut self,
+        envelope: &Envelope<ToldInputs>,
+        times: Times,
+    ) -> Result<bool, VerifyError> {
+        let (stamp, piece) = (&envelope.stamp, &envelope.payload);
+        let at_ns = times.log.saturating_sub(self.begin_ns);
+        let is_new = self.stream != Some((stamp.writer, stamp.epoch));
+        if is_new {
+            if self.follows == Follows::Apart {
+                // No command differs in the life of the navigator that differs.
+                return Ok(false);
+            }
+            self.stream = Some((stamp.writer, stamp.epoch));
+            (self.next_sample, self.next_entry) = (0, 0);
+            self.follows = Follows::Navigator;
+            self.text.clear();
+        }
+        let missing = stamp.sequence.saturating_sub(self.next_sample);
+        self.next_sample = stamp.sequence + 1;
+        if missing > 0 {
+            let is_old = is_new && self.verified.navigators == 0 && self.verified.gaps.is_empty();
+            self.lose(
+                at_ns,
+                match is_old {
+                    true => Why::BegunBefore,
+                    false => Why::Missing(missing),
+                },
+            );
+        }
+        if self.follows == Follows::Nothing {
+            let gap = self
+                .verified
+                .gaps
+                .last_mut()
+                .expect("why nothing is followed");
+            gap.inputs += u64::from(piece.entries_used);
+            return Ok(true);
+        }
+        if piece.text_used > 0 {
+            self.take_text(piece)?;
+        }
+        if piece.first != self.next_entry {
+            self.lose(at_ns, Why::Unpublished);
+            return Ok(true);
+        }
+        if piece.entries_used > 0 {
+            let moved = self.samples.begin_piece(piece);
+            if self.follows == Follows::Navigator && moved.is_some() {
+                let told = piece.entries()[0];
+                self.differ(at_ns, &told, &told, moved);
+            }
+        }
+        self.entries(piece, at_ns)
+    }
+
+    fn lose(&mut self, at_ns: u64, why: Why) {
+        self.follows = Follows::Nothing;
+        let inputs = 0;
+        self.verified.gaps.push(Gap { at_ns, why, inputs });
+    }
+
+    fn take_text(&mut self, piece: &ToldInputs) -> Result<(), VerifyError> {
+        self.text.extend_from_slice(piece.text());
+        if piece.text_left > 0 {
+            return Ok(());
+        }
+        let text = std::mem::take(&mut self.text);
+        match piece.text_kind.get() {
+            Some(TextKind::Began) => {
+                self.rerun.begin(&text).map_err(VerifyError::Rerun)?;
+                self.verified.navigators += 1;
+                self.samples.begin(piece);
+            }
+            Some(TextKind::Map) => self.rerun.take_map(&text).map_err(VerifyError::Rerun)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn entries(&mut self, piece: &ToldInputs, at_ns: u64) -> Result<bool, VerifyError> {
+        let mut reports = piece.reports().iter();
+        for told in piece.entries() {
+            let report = match told.kind.get() {
+                Some(ToldKind::Steering) => reports.next(),
+                _ => None,
+            };
+            let did = self
+                .rerun
+                .handle(told, report)
+                .map_err(VerifyError::Rerun)?;
+            if !matches!(
+                told.kind.get(),
+                Some(ToldKind::Renewed | ToldKind::Repeated)
+            ) {
+                self.verified.inputs += 1;
+            }
+            let sample = match self.follows {
+                Follows::Navigator => self.samples.compare(&did),
+                _ => None,
+            };
+            if bytes_of(told) != bytes_of(&did.told) || sample.is_some() {
+                self.differ(at_ns, told, &did.told, sample);
+            }
+            self.next_entry += 1;
+            if self.verified.first_command.is_some() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn differ(&mut self, at_ns: u64, told: &Told, now: &Told, sample: Option<SampleDifference>) {
+        let difference = Difference {
+            number: self.next_entry,
+            at_ns,
+            recorded: *told,
+            now: *now,
+            sample,
+        };
+        self.follows = Follows::Apart;
+        let is_command = |sample: &SampleDifference| sample.topic == samples::COMMANDS;
+        if difference.is_of_command() || difference.sample.as_ref().is_some_and(is_command) {
+            self.verified.first_command = Some(difference.clone());
+        }
+        self.verified.first.get_or_insert(difference);
+    }
+}

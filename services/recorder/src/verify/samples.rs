@@ -1,0 +1,197 @@
+//! The samples of a recording that a navigator has sent, kept until the entry comes from which they
+//! follow. They are published before it, so few wait at a time.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lager_journal::{Envelope, EnvelopeSchema};
+use lager_topics::{
+    Description, Event, Field, Make, MissionEvent, NavStatus, NavigatorStatus, Origin, Payload,
+    Sent, SteeringCommand, SteeringOrder, StructInfo, ToldInputs, Topic, bytes_of, describe,
+};
+
+use super::outcome::{Compared, OfTopic, SampleDifference, VerifyError};
+use super::rerun::Did;
+
+/// The topic of the orders.
+pub(super) const COMMANDS: &str = SteeringCommand::NAME;
+
+/// What is compared besides `nav/inputs`.
+pub(super) const TOPICS: [&str; 3] = [COMMANDS, NavStatus::NAME, MissionEvent::NAME];
+
+/// Refuses a topic of [`TOPICS`] whose samples this build lays out otherwise.
+pub(super) fn must_fit_as_compared(topic: &str, schema: &[u8]) -> Result<(), VerifyError> {
+    match topic {
+        COMMANDS => must_fit::<SteeringOrder>(COMMANDS, schema),
+        NavStatus::NAME => must_fit::<NavigatorStatus>(NavStatus::NAME, schema),
+        MissionEvent::NAME => must_fit::<Event>(MissionEvent::NAME, schema),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses samples that this build lays out otherwise.
+pub(super) fn must_fit<P: Payload>(topic: &'static str, schema: &[u8]) -> Result<(), VerifyError> {
+    let make = Make::Record(StructInfo::of::<P>());
+    let description = Description::parse(&describe(&make)).expect("our own description");
+    match EnvelopeSchema::of(&description).fits(schema) {
+        true => Ok(()),
+        false => Err(VerifyError::Layout { topic }),
+    }
+}
+
+/// A message of a topic.
+pub(super) fn read<P: Payload>(
+    topic: &'static str,
+    message: &[u8],
+) -> Result<Envelope<P>, VerifyError> {
+    serde_json::from_slice(message).map_err(|error| VerifyError::Message { topic, error })
+}
+
+/// Whether two payloads are the same, byte by byte.
+fn same<P: Field>(one: &P, other: &P) -> bool {
+    bytes_of(one) == bytes_of(other)
+}
+
+/// The samples of one topic that wait, by epoch and number.
+#[derive(Debug)]
+struct Waiting<P> {
+    topic: &'static str,
+    waiting: BTreeMap<(u64, u64), P>,
+    /// Epochs of navigators.
+    known: BTreeSet<u64>,
+    /// What the navigator sends next.
+    at: Sent,
+    count: OfTopic,
+}
+
+impl<P: Payload> Waiting<P> {
+    fn new(topic: &'static str) -> Self {
+        Self {
+            topic,
+            waiting: BTreeMap::new(),
+            known: BTreeSet::new(),
+            at: Sent::default(),
+            count: OfTopic::default(),
+        }
+    }
+
+    fn keep(&mut self, message: &[u8]) -> Result<(), VerifyError> {
+        let envelope = read::<P>(self.topic, message)?;
+        let key = (envelope.stamp.epoch, envelope.stamp.sequence);
+        self.waiting.insert(key, envelope.payload);
+        Ok(())
+    }
+
+    fn begin(&mut self, at: Sent) {
+        self.known.insert(at.epoch);
+        self.at = at;
+    }
+
+    /// Compares the next sample with what the navigator sends now; `as_sent` puts in what only its
+    /// shell knows.
+    fn compare(&mut self, mut now: P, as_sent: impl Fn(&mut P, &P)) -> Option<SampleDifference> {
+        let number = self.at.next;
+        self.at.next += 1;
+        self.count.sent += 1;
+        let recorded = self.waiting.remove(&(self.at.epoch, number))?;
+        as_sent(&mut now, &recorded);
+        if same(&recorded, &now) {
+            self.count.same += 1;
+            return None;
+        }
+        let as_text = |payload: &P| serde_json::to_string(payload).expect("a payload is JSON");
+        Some(SampleDifference {
+            topic: self.topic,
+            number,
+            recorded: as_text(&recorded),
+            now: as_text(&now),
+        })
+    }
+
+    fn finish(mut self, is_navigators: impl Fn(&P) -> bool) -> OfTopic {
+        let left = self.waiting.iter();
+        let left =
+            left.filter(|((epoch, _), sample)| self.known.contains(epoch) || is_navigators(sample));
+        self.count.unexplained = left.count() as u64;
+        self.count
+    }
+}
+
+/// The samples that wait.
+#[derive(Debug)]
+pub(super) struct Samples {
+    commands: Waiting<SteeringOrder>,
+    statuses: Waiting<NavigatorStatus>,
+    events: Waiting<Event>,
+}
+
+impl Default for Samples {
+    fn default() -> Self {
+        Self {
+            commands: Waiting::new(COMMANDS),
+            statuses: Waiting::new(NavStatus::NAME),
+            events: Waiting::new(MissionEvent::NAME),
+        }
+    }
+}
+
+impl Samples {
+    /// Keeps a sample of one of [`TOPICS`].
+    pub(super) fn keep(&mut self, topic: &str, message: &[u8]) -> Result<(), VerifyError> {
+        match topic {
+            COMMANDS => self.commands.keep(message),
+            NavStatus::NAME => self.statuses.keep(message),
+            MissionEvent::NAME => self.events.keep(message),
+            _ => Ok(()),
+        }
+    }
+
+    /// A navigator begins.
+    pub(super) fn begin(&mut self, piece: &ToldInputs) {
+        self.commands.begin(piece.commands);
+        self.statuses.begin(piece.statuses);
+        self.events.begin(piece.events);
+    }
+
+    /// A piece with entries begins. What is wrong if the navigator's shell had sent more or less by
+    /// then than the navigator has now.
+    pub(super) fn begin_piece(&self, piece: &ToldInputs) -> Option<SampleDifference> {
+        let told = [
+            (COMMANDS, self.commands.at, piece.commands),
+            (NavStatus::NAME, self.statuses.at, piece.statuses),
+            (MissionEvent::NAME, self.events.at, piece.events),
+        ];
+        let wrong = told.into_iter().find(|(_, now, then)| now != then);
+        wrong.map(|(topic, now, then)| SampleDifference {
+            topic,
+            number: then.next.min(now.next),
+            recorded: format!("{} sent so far", then.next),
+            now: format!("{} sent so far", now.next),
+        })
+    }
+
+    /// Compares what the navigator sends because of one entry.
+    pub(super) fn compare(&mut self, did: &Did) -> Option<SampleDifference> {
+        let mut first = None;
+        if let Some(command) = did.command {
+            first = first.or(self.commands.compare(command, |_, _| {}));
+        }
+        for event in &did.events {
+            first = first.or(self.events.compare(*event, |_, _| {}));
+        }
+        if let Some(status) = did.status {
+            first = first.or(self.statuses.compare(status, |now, recorded| {
+                now.frames_lost = recorded.frames_lost;
+            }));
+        }
+        first
+    }
+
+    /// What was compared.
+    pub(super) fn finish(self) -> Compared {
+        Compared {
+            commands: self.commands.finish(|order| order.origin == Origin::Logic),
+            statuses: self.statuses.finish(|_| false),
+            events: self.events.finish(|_| true),
+        }
+    }
+}

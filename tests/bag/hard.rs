@@ -1,0 +1,241 @@
+//! What a recorder stands: kills at any moment, a full disk beside a robot that drives, a queue that
+//! is too short, and ten thousand frames a second. `tests/soak bag` runs the first and the last for
+//! longer, and only there their bounds are held: they want the machine to themselves.
+
+use std::fs;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use lager_ports::{Cause, Clock};
+use lager_tests::{Domain, lager, wait_for};
+use lager_topics::{LineFrame, SensorLine};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::{Noisy, done, end, guest, read, recorder, said};
+
+/// What `kill -9` may take at the most.
+const LOST_BY_A_KILL: Duration = Duration::from_millis(300);
+
+/// What `tests/soak bag` asks for, if it runs.
+fn soak(what: &str) -> Option<u64> {
+    std::env::var(what).ok()?.parse().ok()
+}
+
+/// Waits until that moment, without giving the core away for long.
+fn until(moment: Instant) {
+    let left = moment.saturating_duration_since(Instant::now());
+    std::thread::sleep(left);
+}
+
+#[test]
+fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
+    let kills = soak("LAGER_SOAK_BAG_KILLS");
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let mut taken = Vec::new();
+    for kill in 0..kills.unwrap_or(3) {
+        let mut noisy = Noisy::new(&bus);
+        let file = format!("{kill}.mcap");
+        let mut recorder = recorder(&domain, &["--topic", "noise/now", &file]);
+        noisy.meet(&recorder);
+        // No two kills meet a flush, which comes every 200 ms, at the same place.
+        let end = Instant::now() + Duration::from_millis(450 + kill * 617 % 400);
+        let mut next = Instant::now();
+        while next < end {
+            noisy.send();
+            next += Duration::from_millis(2);
+            until(next);
+        }
+        let killed_ns = Clock::monotonic_ns();
+        recorder.signal(Signal::KILL);
+        recorder.wait();
+        let copy = format!("{kill}.copy.mcap");
+        done(&domain, &["bag", "recover", &file, "--output", &copy]);
+        let seen = read(&domain.folder().join(&copy));
+        let (_, last, ..) = seen.messages.last().expect("samples");
+        let lost = Duration::from_nanos(killed_ns - last.publish_time_ns);
+        assert!(last.sequence < noisy.sent);
+        taken.push(lost);
+        let _ = fs::remove_file(domain.folder().join(&file));
+        let _ = fs::remove_file(domain.folder().join(&copy));
+    }
+    taken.sort();
+    let longest = *taken.last().expect("kills");
+    println!(
+        "{} kills took {:.0} ms of samples at the median, {:.0} ms at the most",
+        taken.len(),
+        taken[taken.len() / 2].as_secs_f64() * 1e3,
+        longest.as_secs_f64() * 1e3
+    );
+    if kills.is_some() {
+        assert!(longest <= LOST_BY_A_KILL, "a kill took {longest:?}");
+    }
+    drop(bus);
+    wait_for("the killed ones to be swept", || {
+        let _ = domain.run(&["doctor", "--fix"]);
+        domain.leftovers().is_empty().then_some(())
+    });
+}
+
+/// Starts `lager bag record` with `args` onto a disk of its own with so many KiB, of which a copy is
+/// left as `full.mcap`. The disk is gone when it ends.
+pub(crate) fn record_on_a_small_disk(domain: &Domain, kib: u32, args: &[&str]) -> Child {
+    fs::create_dir(domain.folder().join("disk")).expect("a folder");
+    let script = format!(
+        "mount -t tmpfs -o size={kib}k none disk || exit 99; \"$@\"; code=$?; \
+         cp disk/full.mcap full.mcap; exit $code"
+    );
+    Command::new("unshare")
+        .args(["--map-root-user", "--mount", "sh", "-c", &script, "sh"])
+        .arg(lager())
+        .arg("--bus")
+        .arg(domain.bus_folder())
+        .args(["bag", "record", "disk/full.mcap"])
+        .args(args)
+        .current_dir(domain.folder())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("`unshare` is there")
+}
+
+#[test]
+fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
+    let domain = Domain::new();
+    let mut recorder = record_on_a_small_disk(&domain, 1_536, &["--wait"]);
+    let mut up = domain.start(&[
+        "up",
+        "--headless",
+        "--mission",
+        "1",
+        "--speed",
+        "2",
+        "--exit-when-done",
+        "--json",
+        "--no-station",
+    ]);
+    wait_for("the disk to be full", || {
+        recorder.try_wait().expect("a child")
+    });
+    // The robot has not come to the end yet: the recorder was with it.
+    assert!(up.is_running(), "{}", up.log());
+    let output = recorder.wait_with_output().expect("a child");
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("the disk is full"), "{told}");
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    assert_eq!(up.json()["delivered"], serde_json::json!([1]));
+    let checked = done(&domain, &["bag", "check", "full.mcap"]);
+    assert!(checked.contains("every number is right"), "{checked}");
+    let seen = read(&domain.folder().join("full.mcap"));
+    assert!(seen.messages.len() > 500, "{}", seen.messages.len());
+    domain.assert_clean();
+}
+
+#[test]
+fn what_finds_the_queue_full_is_told_live_and_in_the_file() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let mut noisy = Noisy::new(&bus);
+    let args = ["--topic", "noise/now", "--queue", "10", "slow.mcap"];
+    let recorder = recorder(&domain, &args);
+    noisy.meet(&recorder);
+    // Far more than ten within one flush.
+    for _ in 0..10 {
+        (0..40).for_each(|_| noisy.send());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    // The live line is written once a second.
+    let live = wait_for("the live line", || {
+        let said = recorder.output();
+        let progress: Value = serde_json::from_str(said.lines().last()?).ok()?;
+        progress["topics"][0]["dropped"]
+            .as_u64()
+            .filter(|dropped| *dropped > 0)
+    });
+    assert!(
+        recorder.log().contains("the disk is too slow"),
+        "{}",
+        recorder.log()
+    );
+    let told = end(recorder);
+    let count = &told["topics"][0];
+    let [received, lost, dropped] =
+        ["received", "lost", "dropped"].map(|what| count[what].as_u64().expect("a number"));
+    assert!(dropped >= live && dropped > 100, "{told}");
+
+    let seen = read(&domain.folder().join("slow.mcap"));
+    assert_eq!(seen.messages.len() as u64, received - dropped, "{told}");
+    let numbers: Vec<u64> = seen
+        .messages
+        .iter()
+        .map(|(_, stamp, ..)| stamp.sequence)
+        .collect();
+    let skipped = numbers
+        .windows(2)
+        .map(|pair| pair[1] - pair[0] - 1)
+        .sum::<u64>();
+    let behind = noisy.sent - 1 - numbers.last().expect("samples");
+    assert_eq!(skipped + behind, lost + dropped, "{told}");
+    let info = done(&domain, &["bag", "--json", "info", "slow.mcap"]);
+    let info: Value = serde_json::from_str(&info).expect("JSON");
+    assert_eq!(
+        info["topics"][0]["dropped"].as_u64(),
+        Some(dropped),
+        "{info}"
+    );
+    let checked = done(&domain, &["bag", "check", "slow.mcap"]);
+    assert!(
+        checked.contains(&format!("{dropped} dropped by it")),
+        "{checked}"
+    );
+    drop((noisy, bus));
+    domain.assert_clean();
+}
+
+#[test]
+fn ten_thousand_frames_a_second_are_all_recorded_or_counted() {
+    let seconds = soak("LAGER_SOAK_BAG_SECONDS");
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let lines = bus.publisher::<SensorLine>().expect("a topic");
+    let recorder = recorder(&domain, &["--topic", "sensor/line", "fast.mcap"]);
+    // The recorder finds this writer when it next looks.
+    std::thread::sleep(Duration::from_millis(300));
+    let frames = seconds.unwrap_or(2) * 10_000;
+    let begun = Instant::now();
+    for packet in 0..frames {
+        let line = LineFrame {
+            packet_id: (packet % 16) as u8,
+            ..LineFrame::default()
+        };
+        lines.send(Cause::OWN, line).expect("a sample");
+        let due = begun + Duration::from_micros((packet + 1) * 100);
+        // Two in a row at the most, whatever sleeping costs here.
+        if due > Instant::now() + Duration::from_micros(100) {
+            std::thread::sleep(Duration::from_micros(60));
+        }
+        while Instant::now() < due {
+            std::hint::spin_loop();
+        }
+    }
+    let took = begun.elapsed();
+    std::thread::sleep(Duration::from_millis(300));
+    end(recorder);
+    let info = done(&domain, &["bag", "--json", "info", "fast.mcap"]);
+    let info: Value = serde_json::from_str(&info).expect("JSON");
+    let topic = &info["topics"][0];
+    let [messages, lost, dropped] =
+        ["messages", "lost", "dropped"].map(|what| topic[what].as_u64().expect("a number"));
+    println!("{frames} frames in {took:?}: {messages} in the file, {lost} lost, {dropped} dropped");
+    assert_eq!(messages + lost + dropped, frames, "{info}");
+    let checked = done(&domain, &["bag", "check", "fast.mcap"]);
+    assert!(checked.contains("every number is right"), "{checked}");
+    if seconds.is_some() {
+        assert_eq!((lost, dropped), (0, 0), "{info}");
+    }
+    drop((lines, bus));
+    domain.assert_clean();
+}

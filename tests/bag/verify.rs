@@ -1,0 +1,348 @@
+//! `bag play --verify`: recordings of missions whose navigator is killed, with things in its way,
+//! are proved by a navigator in another process; what is not as it was is named.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use lager_journal::{Counts, Damage, EnvelopeSchema, Journal, Learnt, Message, Start, Visit, Walk};
+use lager_tests::{Domain, Running, pid, wait_for};
+use lager_topics::{MissionEvent, NavInputs, NavStatus, SteeringCommand, Topic};
+use rustix::process::{Signal, kill_process};
+use serde_json::Value;
+
+use crate::{end, recorder, said};
+
+/// How many missions are recorded and proved: 1 in `tests/run`, more in `tests/soak`.
+fn missions() -> u64 {
+    let asked = std::env::var("LAGER_SOAK_VERIFY").ok();
+    asked.and_then(|asked| asked.parse().ok()).unwrap_or(1)
+}
+
+/// What `bag play --verify --json` says of a recording, with its exit code.
+fn verified(domain: &Domain, file: &str, with: &[&str]) -> (Value, Option<i32>) {
+    let args = [&["bag", "--json", "play", "--verify", file], with].concat();
+    let output = domain.run(&args);
+    let told = serde_json::from_slice(&output.stdout);
+    let told = told.unwrap_or_else(|error| panic!("{error}: {}", said(&output)));
+    (told, output.status.code())
+}
+
+/// Records missions as [`record_mission`] does until the recorder has missed none of the inputs, which
+/// it does where others keep it from its core. Whatever it has is the same again.
+fn record_all_of_a_mission(domain: &Domain, seed: u64, file: &str) -> (Value, u64) {
+    for _ in 0..10 {
+        let killed = record_mission(domain, seed, file);
+        let (told, code) = verified(domain, file, &[]);
+        if !told["first"].is_null() {
+            let kept = std::env::temp_dir().join(format!("lager-differs-{seed}.mcap"));
+            fs::copy(domain.folder().join(file), &kept).expect("a copy");
+            panic!("seed {seed}: {told:#}; {} has it", kept.display());
+        }
+        let gaps = told["gaps"].as_array().expect("a list");
+        if gaps.is_empty() {
+            assert_eq!(
+                (code, &told["identical"]),
+                (Some(0), &Value::Bool(true)),
+                "{told:#}"
+            );
+            return (told, killed);
+        }
+        assert_eq!(
+            (code, &told["identical"]),
+            (Some(1), &Value::Bool(false)),
+            "{told:#}"
+        );
+        assert!(gaps.iter().all(|gap| gap["why"] == "missing"), "{told:#}");
+        println!("seed {seed}: inputs are missing, which is told: {gaps:?}");
+        fs::remove_file(domain.folder().join(file)).expect("a file");
+    }
+    panic!("this machine is too busy to record a mission");
+}
+
+/// Records a mission with two things that come and go, in which logic and bridge are killed in turn
+/// at moments that no two missions share. Returns how often logic was.
+fn record_mission(domain: &Domain, seed: u64, file: &str) -> u64 {
+    let recorder = recorder(domain, &[file]);
+    let seed_text = seed.to_string();
+    // A robot whose ways are all blocked waits for ten seconds, and not for a minute.
+    let config = domain.folder().join("robot.toml");
+    fs::write(&config, "[logic]\ntry_again_s = 10\n").expect("a file");
+    let config = config.to_str().expect("a path in UTF-8");
+    let mut up = domain.start(&[
+        "--config",
+        config,
+        "up",
+        "--headless",
+        "--no-station",
+        "--mission",
+        "1",
+        "--obstacles",
+        "2",
+        "--speed",
+        "4",
+        "--exit-when-done",
+        "--json",
+        "--seed",
+        &seed_text,
+    ]);
+    let mut killed = 0;
+    for (count, service) in ["logic", "bridge"].iter().cycle().take(4).enumerate() {
+        let pause = 900 + (seed * 811 + count as u64 * 617) % 1_500;
+        let over = Instant::now() + Duration::from_millis(pause);
+        wait_for("the moment of the kill", || {
+            (Instant::now() > over || !up.is_running()).then_some(())
+        });
+        if !kill(&up, service) {
+            break;
+        }
+        killed += u64::from(*service == "logic");
+    }
+    let code = up.wait();
+    // A mission that is given up is as good as one that is delivered, if it can be proved.
+    assert!(matches!(code, Some(0 | 3)), "{code:?}\n{}", up.log());
+    let told = end(recorder);
+    println!(
+        "seed {seed}: exit {code:?}, logic killed {killed} times, {} s",
+        told["seconds"]
+    );
+    killed
+}
+
+/// Kills a service of the robot, if it is there.
+fn kill(up: &Running, service: &str) -> bool {
+    let victim = up.service(service);
+    victim.is_some_and(|victim| kill_process(pid(victim), Signal::KILL).is_ok())
+}
+
+/// What is written of a message when a recording is written anew: the same, something else, or
+/// nothing.
+type Change<'a> = &'a mut dyn FnMut(&str, &mut Value) -> bool;
+
+/// Writes a recording anew, with changes that the recorder would never make.
+fn rewrite(from: &Path, to: &Path, change: Change<'_>) {
+    struct Rewriter<'a> {
+        change: Change<'a>,
+        journal: Journal,
+        channels: BTreeMap<u16, lager_journal::Channel>,
+    }
+    impl Visit for Rewriter<'_> {
+        fn message(&mut self, message: &Message<'_>) {
+            let mut value: Value = serde_json::from_slice(message.data).expect("JSON");
+            if !(self.change)(&message.topic.name, &mut value) {
+                return;
+            }
+            let schema = EnvelopeSchema {
+                name: message.topic.schema.clone(),
+                text: message.topic.schema_text.clone(),
+            };
+            let channel = *self.channels.entry(message.channel).or_insert_with(|| {
+                let added = self.journal.topic(&message.topic.name, &schema);
+                added.expect("a topic")
+            });
+            let data = serde_json::to_vec(&value).expect("JSON");
+            let written = self.journal.write(channel, message.times, 0, &data);
+            written.expect("a message");
+        }
+
+        fn note(&mut self, _name: &str, _texts: &BTreeMap<String, String>) {}
+
+        fn damage(&mut self, damage: Damage) {
+            panic!("{damage}");
+        }
+    }
+    let start = Start {
+        robot: "r1".to_owned(),
+        ..Start::default()
+    };
+    let mut rewriter = Rewriter {
+        change,
+        journal: Journal::begin(&start).expect("a file"),
+        channels: BTreeMap::new(),
+    };
+    let mut walk = Walk::knowing(Learnt::default());
+    walk.feed(&fs::read(from).expect("a readable file"), &mut rewriter);
+    walk.finish(&mut rewriter);
+    let mut journal = rewriter.journal;
+    let mut bytes = Vec::new();
+    journal.flush().expect("a chunk");
+    journal.take(&mut bytes);
+    bytes.append(&mut journal.end(&Counts::new()).expect("an end"));
+    fs::write(to, bytes).expect("a file");
+}
+
+#[test]
+fn missions_with_kills_and_things_in_the_way_are_identical() {
+    let (mut inputs, mut compared, mut unexplained) = (0, 0, 0);
+    for seed in 1..=missions() {
+        let domain = Domain::new();
+        let (told, killed) = record_all_of_a_mission(&domain, seed, "tour.mcap");
+        // What held logic up for too long was restarted as well.
+        assert!(told["navigators"].as_u64() > Some(killed), "{told:#}");
+        assert!(told["inputs"].as_u64() > Some(1_000), "{told:#}");
+        for topic in ["commands", "statuses", "events"] {
+            let of = |what: &str| told[topic][what].as_u64().expect("a number");
+            // A state is overwritten where many come at once, and a busy machine loses orders.
+            assert!(of("same") * 2 > of("sent"), "{topic}: {told:#}");
+            compared += of("same");
+            unexplained += of("unexplained");
+        }
+        inputs += told["inputs"].as_u64().expect("inputs");
+        domain.assert_clean();
+    }
+    println!(
+        "{} missions identical: {inputs} inputs, {compared} samples compared, {unexplained} samples \
+         of the last moments before a kill not",
+        missions()
+    );
+}
+
+#[test]
+fn what_is_not_as_it_was_is_named() {
+    let domain = Domain::new();
+    let (told, _) = record_all_of_a_mission(&domain, 77, "tour.mcap");
+    let lives = told["navigators"].as_u64().expect("a number");
+    let tour = domain.folder().join("tour.mcap");
+    let written = domain.folder().join("other.mcap");
+
+    // A navigator with another constant.
+    let with = ["--with", "sensor_ahead_mm=140.0"];
+    let (told, code) = verified(&domain, "tour.mcap", &with);
+    assert_eq!(code, Some(1), "{told:#}");
+    let command = &told["first_command"];
+    assert_ne!(command["expected"], command["got"], "{told:#}");
+    assert!(command["robot_time_ns"].as_u64() > Some(0), "{told:#}");
+    let first = told["first"]["input"].as_u64().expect("a number");
+    assert!(command["input"].as_u64() >= Some(first), "{told:#}");
+    let output = domain.run(&[&["bag", "play", "--verify", "tour.mcap"], &with[..]].concat());
+    let text = said(&output);
+    assert!(
+        text.contains("the first command that differs is at "),
+        "{text}"
+    );
+    let expected = format!(
+        "expected {}, got {}",
+        command["expected"].as_str().expect("a text"),
+        command["got"].as_str().expect("a text")
+    );
+    assert!(text.contains(&expected), "{text}");
+    // The same constant changes nothing, and there is none of another name.
+    let (told, code) = verified(&domain, "tour.mcap", &["--with", "sensor_ahead_mm=160.0"]);
+    assert_eq!(code, Some(0), "{told:#}");
+    let wrong = domain.run(&["bag", "play", "--verify", "tour.mcap", "--with", "sensor=1"]);
+    assert_eq!(wrong.status.code(), Some(2), "{}", said(&wrong));
+
+    // One sample of each topic is another one.
+    for (topic, field, key) in [
+        (SteeringCommand::NAME, "code", "first_command"),
+        (NavStatus::NAME, "travelled_mm", "first"),
+        (MissionEvent::NAME, "product", "first"),
+    ] {
+        let mut left = 5;
+        rewrite(&tour, &written, &mut |name, message| {
+            if name == topic {
+                left -= 1;
+                if left == 0 {
+                    let value = &mut message["payload"][field];
+                    *value = (value.as_i64().expect("a number") + 1).into();
+                }
+            }
+            true
+        });
+        assert!(left <= 0, "{topic} has too few samples");
+        let (told, code) = verified(&domain, "other.mcap", &[]);
+        assert_eq!(code, Some(1), "{topic}: {told:#}");
+        assert_eq!(told[key]["topic"], topic, "{told:#}");
+        assert_ne!(told[key]["expected"], told[key]["got"], "{told:#}");
+    }
+
+    // One input is another one, or is missing: what follows is proved from the next navigator on.
+    let mut seen = 0;
+    rewrite(&tour, &written, &mut |name, _| {
+        seen += u32::from(name == NavInputs::NAME);
+        !(name == NavInputs::NAME && seen == 40)
+    });
+    let (told, code) = verified(&domain, "other.mcap", &[]);
+    assert_eq!(code, Some(1), "{told:#}");
+    assert_eq!(told["identical"], false, "{told:#}");
+    assert_eq!(told["gaps"].as_array().map(Vec::len), Some(1), "{told:#}");
+    assert_eq!(told["gaps"][0]["samples"], 1, "{told:#}");
+    assert!(told["gaps"][0]["inputs"].as_u64() > Some(0), "{told:#}");
+    assert_eq!(told["navigators"].as_u64(), Some(lives), "{told:#}");
+    assert!(told["first"].is_null(), "{told:#}");
+    let text = said(&domain.run(&["bag", "play", "--verify", "other.mcap"]));
+    assert!(
+        text.contains("1 samples of nav/inputs are missing"),
+        "{text}"
+    );
+
+    let mut was_changed = false;
+    rewrite(&tour, &written, &mut |name, message| {
+        let entries = message["payload"]["entries"].as_array_mut();
+        for entry in entries.into_iter().flatten() {
+            if name == NavInputs::NAME && entry["kind"] == "DrivenByHand" && !was_changed {
+                entry["number"] = 123_456_789_012_345_u64.into();
+                was_changed = true;
+            }
+        }
+        true
+    });
+    assert!(was_changed);
+    let (told, code) = verified(&domain, "other.mcap", &[]);
+    assert_eq!(code, Some(1), "{told:#}");
+    assert!(!told["first"].is_null(), "{told:#}");
+
+    // A recording without the inputs proves nothing.
+    rewrite(&tour, &written, &mut |name, _| name != NavInputs::NAME);
+    let output = domain.run(&["bag", "play", "--verify", "other.mcap"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        said(&output).contains("it has no nav/inputs"),
+        "{}",
+        said(&output)
+    );
+    domain.assert_clean();
+}
+
+#[test]
+fn a_recording_from_the_middle_is_proved_from_the_next_navigator_on() {
+    let domain = Domain::new();
+    let up = domain.start(&["up", "--headless", "--no-station", "--mission", "1"]);
+    let observer = domain.observe("r1", 1.0);
+    let mut status = observer.subscriber::<NavStatus>().expect("a topic");
+    wait_for("the robot to drive", || {
+        let status = status.latest().expect("readable")?;
+        (status.frames > 200).then_some(())
+    });
+    let recorder = recorder(&domain, &["middle.mcap"]);
+    let inputs = |recorder: &Running| {
+        let said = recorder.output();
+        let progress: Value = serde_json::from_str(said.lines().last()?).ok()?;
+        let topics = progress["topics"].as_array()?;
+        let told = topics
+            .iter()
+            .find(|topic| topic["topic"] == NavInputs::NAME)?;
+        told["received"].as_u64()
+    };
+    let before = wait_for("inputs", || inputs(&recorder).filter(|count| *count > 5));
+    assert!(kill(&up, "logic"));
+    wait_for("inputs of the next one", || {
+        inputs(&recorder).filter(|count| *count > before + 20)
+    });
+    end(recorder);
+    drop((up, status, observer));
+    let (told, code) = verified(&domain, "middle.mcap", &[]);
+    assert_eq!(code, Some(1), "{told:#}");
+    assert_eq!(told["gaps"][0]["why"], "begun before", "{told:#}");
+    assert_eq!(told["navigators"], 1, "{told:#}");
+    assert!(told["inputs"].as_u64() > Some(50), "{told:#}");
+    assert!(told["first"].is_null(), "{told:#}");
+    let text = said(&domain.run(&["bag", "play", "--verify", "middle.mcap"]));
+    assert!(
+        text.contains("identical as far as it can be verified"),
+        "{text}"
+    );
+    assert!(text.contains("begun before the recording"), "{text}");
+    domain.assert_clean();
+}
