@@ -243,7 +243,7 @@ fn an_accessibility_checker_finds_nothing_serious() {
     check(&mut page, "stopped");
     scene.resume();
     let url = format!("{}/screen", scene.url.trim_end_matches('/'));
-    page.value(&format!("location.href = '{url}'"));
+    page.call("Page.navigate", &json!({ "url": url }));
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
     page.value(&axe);
     check(&mut page, "screen");
