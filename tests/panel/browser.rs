@@ -167,7 +167,14 @@ impl Drop for Browser {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
-        let _ = std::fs::remove_dir_all(&self.profile);
+        // Its other processes write a moment longer.
+        for _ in 0..100 {
+            let removed = std::fs::remove_dir_all(&self.profile);
+            if removed.is_ok() || !self.profile.exists() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 }
 

@@ -80,7 +80,8 @@ fn of_every_view() {
     page.click("#where-ask");
     view(&mut page, "where-it-stands");
     page.click("#where-later");
-    page.value("location.href = '/screen'");
+    let screen = format!("{}/screen", scene.url.trim_end_matches('/'));
+    page.call("Page.navigate", &serde_json::json!({ "url": screen }));
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
     view(&mut page, "screen");
     drop((page, other));

@@ -120,6 +120,24 @@ impl Scene {
             std::fs::read_to_string(folder.join("r1.csv")).ok()
         });
         assert!(table.starts_with("time,x,y,line_error,"), "{table}");
+        let (head, lines) = table.split_once('\n').expect("lines");
+        for key in [
+            "heading_deg",
+            "mode",
+            "next",
+            "line_bits",
+            "servos",
+            "loads",
+        ] {
+            assert!(head.split(',').any(|name| name == key), "{key}: {head}");
+        }
+        // Rows of numbers stand in quotation marks, so that each line has as many cells.
+        let cells = |line: &str| {
+            let outside: String = line.split('"').step_by(2).collect();
+            outside.matches(',').count()
+        };
+        let last = lines.lines().last().expect("a line");
+        assert_eq!(cells(last), cells(head), "{last}");
         page.click("#save-mcap");
         let file = folder.join("r1.mcap");
         wait_for("the recording", || file.exists().then_some(()));

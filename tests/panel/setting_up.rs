@@ -40,7 +40,7 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
         let text = std::fs::read_to_string(folder.join("warehouse.json")).ok()?;
         serde_json::from_str::<Value>(&text).ok()
     });
-    assert_eq!(before["size"], json!([2, 3]));
+    assert_eq!(before["size"], json!([2, 2]));
 
     // Size, corner and side by the form: what is typed is drawn once it is saved.
     fill(&mut page, "#warehouse [name=width]", "4");
@@ -74,7 +74,7 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
         "DOM.setFileInputFiles",
         &json!({ "files": [file], "nodeId": node }),
     );
-    page.wait_for("#map-text", "A warehouse of 2 by 3 squares");
+    page.wait_for("#map-text", "A warehouse of 2 by 2 squares");
     page.wait_until("document.querySelectorAll('#map .good').length === 3");
     std::fs::remove_file(file).expect("it is there");
     drop(page);
@@ -105,14 +105,6 @@ fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step() {
     page.wait_until("document.querySelectorAll('#calibration-sensors span.on').length > 0");
     page.wait_for("#calibration-said", "of the 11");
     page.wait_until("!document.querySelector('#calibrate').disabled");
-    let seen =
-        page.value("document.querySelector('#calibration-sensors').getAttribute('aria-label')");
-    assert!(
-        seen.as_str()
-            .expect("words")
-            .contains("have seen tape and floor"),
-        "{seen}"
-    );
     drop(page);
     scene.end();
 }
@@ -207,6 +199,20 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
     page.click("#language");
     page.wait_for("#doing", "sensorkortet hörs inte");
     page.wait_until("document.querySelector('#map .out-of-reach') === null");
+
+    // While it calibrates, each sensor that has seen tape and floor is marked.
+    page.click("#language");
+    page.click("#tab-setup");
+    page.click("#calibrate");
+    let seen = |page: &mut Page, words: &str| {
+        page.wait_until(&format!(
+            "document.querySelector('#calibration-sensors').getAttribute('aria-label').includes('{words}')"
+        ));
+    };
+    now("sensor_up=1 line_bits=00001110000");
+    seen(&mut page, "00001110000, of which 0 have");
+    now("sensor_up=1 line_bits=00000111000");
+    seen(&mut page, "00000111000, of which 2 have");
     drop((page, robot));
     stage.end();
 }
@@ -282,19 +288,16 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
     page.wait_for("#map-said", "there is no way");
     page.value(
         "(() => { const map = document.querySelector('#map'); \
-         const at = new DOMPoint(500, -1250).matrixTransform(map.getScreenCTM()); \
+         const at = new DOMPoint(500, -750).matrixTransform(map.getScreenCTM()); \
          map.dispatchEvent(new WheelEvent('wheel', { deltaY: -1, clientX: at.x, clientY: at.y, cancelable: true })); })()",
     );
     page.click("#fit");
-    // The middle of the fitted view is moved onto the way from (1, 2) upwards, key by key.
+    // The middle of the fitted view is moved onto the way from (1, 1) upwards, key by key.
     for _ in 0..40 {
         let [left, top, width, height] = view(&mut page)[..] else {
             panic!()
         };
-        let (off_x, off_y) = (
-            500.0 - (left + width / 2.0),
-            -1_250.0 - (top + height / 2.0),
-        );
+        let (off_x, off_y) = (500.0 - (left + width / 2.0), -750.0 - (top + height / 2.0));
         if off_x.abs() < 60.0 && off_y.abs() < 180.0 {
             break;
         }

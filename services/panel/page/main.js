@@ -49,9 +49,11 @@ async function meetEdge([x, y, way] = []) {
   if (!shown.truth) return tell("real_floor");
   if (x === undefined) return tell("no_way_here");
   const edge = `${x} ${y} ${way}`;
-  const put = await link.act(shown, `obstacle put ${edge}`);
-  const done = put.done ? "put" : (await link.act(shown, `obstacle take ${edge}`)).done ? "take" : null;
-  if (!done) return tell("refused", put.refused);
+  // Where one stands a second put changes nothing, so it is tried to be taken first.
+  const take = await link.act(shown, `obstacle take ${edge}`);
+  const put = take.done ? take : await link.act(shown, `obstacle put ${edge}`);
+  if (!put.done) return tell("refused", put.refused === "lost" ? say("lost") : put.refused);
+  const done = take.done ? "take" : "put";
   tell(done === "put" ? "obstacle_put" : "obstacle_taken");
   const undo = at("map-undo");
   undo.hidden = false;

@@ -16,6 +16,7 @@ export class Missions {
     this.taken = null;
     parts.fetch.addEventListener("submit", (event) => {
       event.preventDefault();
+      if (!parts.goods.value) return put(parts.said, say("no_map"));
       this.act(`order ${++this.order} ${parts.goods.value}`);
     });
     // It shows what the robot says, not what was wished.

@@ -1,9 +1,8 @@
 // Setting up: the warehouse with checks as one types, the line control's gains, the calibration.
 
+import { SENSORS, sensors } from "./strips.js";
 import { put, say } from "./words.js";
 
-/** Line sensors of a robot. */
-const SENSORS = 11;
 const SIDES = ["left", "up", "right", "down"];
 
 export class Setup {
@@ -117,11 +116,12 @@ export class Setup {
   }
 
   /** What the sensors see now, and which have seen both tape and floor. */
-  drawSensors(bits) {
+  drawSensors(state) {
+    const bits = sensors(state);
     let both = 0;
     this.sensors.forEach((bar, index) => {
       const bit = bits?.[index];
-      if (this.parts.calibrate.disabled && bit) this.seen[index].add(bit);
+      if (this.parts.calibrate.disabled && state?.line_bits) this.seen[index].add(bit);
       const isBoth = this.seen?.[index].size === 2;
       both += Number(isBoth);
       bar.classList.toggle("on", bit === "1");
@@ -133,7 +133,7 @@ export class Setup {
 
   /** The gains in force stand in the fields, unless somebody types there. */
   draw(robot) {
-    this.drawSensors(robot?.state.line_bits);
+    this.drawSensors(robot?.state);
     const { gain_p: p, gain_d: d } = robot?.state ?? {};
     this.gainsNow = p === undefined || d === undefined ? null : [p, d];
     put(this.parts.gainsNow, this.gainsNow ? say("gains_now", p, d) : say("gains_unset"));

@@ -15,8 +15,18 @@ const STRIPS = [
   ["battery", "V", 9, 13, ["battery"]],
   ["losses", "", 0, null, ["lost"]],
 ];
-const SENSORS = 11;
+export const SENSORS = 11;
 const DARK = matchMedia("(prefers-color-scheme: dark)");
+
+/**
+ * What each line sensor sees, the leftmost first, 1 for tape; null if the board is not heard. Where it
+ * tells only how far the line is off, the sensor above the middle of the tape does.
+ */
+export function sensors({ line_bits: bits, line_error: error } = {}) {
+  if (bits || error === undefined) return bits ?? null;
+  const middle = Math.round((SENSORS - 1) / 2 + Number(error) / 2);
+  return Array.from({ length: SENSORS }, (_, index) => (index === middle ? "1" : "0")).join("");
+}
 
 export class Strips {
   constructor(parent) {
@@ -46,10 +56,8 @@ export class Strips {
     }
     const { colours } = this;
     for (const strip of this.strips) strip.draw(robot, colours);
-    const { line_bits: bits, line_error: error } = robot?.state ?? {};
-    // Where the bits are not told, the sensor above the middle of the tape shows.
-    const middle = error === undefined ? null : Math.round((SENSORS - 1) / 2 + Number(error) / 2);
-    this.sensors.forEach((bar, index) => bar.classList.toggle("on", bits ? bits[index] === "1" : index === middle));
+    const seen = sensors(robot?.state);
+    this.sensors.forEach((bar, index) => bar.classList.toggle("on", seen?.[index] === "1"));
   }
 }
 
