@@ -1,6 +1,7 @@
 //! The waiting orders, as people see and change them, and after a kill of the service that keeps
 //! them.
 
+use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
@@ -48,12 +49,26 @@ fn robot(domain: &Domain) -> Running {
     up
 }
 
+/// A warehouse file of these tests.
+fn data(name: &str) -> String {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
+    data.join(name).to_string_lossy().into_owned()
+}
+
 #[test]
-fn a_mission_among_things_that_come_and_go_is_delivered_in_its_order_without_a_collision() {
+fn missions_among_things_that_come_and_go_are_delivered_in_their_order_without_a_collision() {
+    for warehouse in ["small", &data("hall.toml")] {
+        delivered_without_a_collision(warehouse);
+    }
+}
+
+fn delivered_without_a_collision(warehouse: &str) {
     let domain = Domain::new();
     let mut up = domain.start(&[
         "up",
         "--headless",
+        "--warehouse",
+        warehouse,
         "--mission",
         "3,1,2",
         "--obstacles",
@@ -76,6 +91,45 @@ fn a_mission_among_things_that_come_and_go_is_delivered_in_its_order_without_a_c
     assert_eq!(told["delivered"], serde_json::json!([3, 1, 2]), "{told}");
     assert_eq!(collisions, Some(0), "{}", up.log());
     drop((truth, bus));
+    domain.assert_clean();
+}
+
+#[test]
+fn goods_that_cannot_be_reached_end_the_mission_with_what_logic_calls_it() {
+    let domain = Domain::new();
+    // A thing stands on the edge of the goods.
+    let file = |name: &str, text: &str| {
+        let path = domain.folder().join(name);
+        std::fs::write(&path, text).expect("a file");
+        path.to_string_lossy().into_owned()
+    };
+    let warehouse = file(
+        "closed.toml",
+        "size = [2, 1]\nside_length_cm = 50\n\
+         [[product]]\nid = 1\nsquare = [0, 0]\nside = \"up\"\n\
+         [[obstacle]]\nbetween = [[0, 1], [1, 1]]\n",
+    );
+    let config = file("lager.toml", "[logic]\ntry_again_s = 2\n");
+    let mut up = domain.start(&[
+        "--config",
+        &config,
+        "up",
+        "--headless",
+        "--warehouse",
+        &warehouse,
+        "--mission",
+        "1",
+        "--speed",
+        "3",
+        "--exit-when-done",
+        "--json",
+    ]);
+    assert_eq!(up.wait(), Some(3), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], serde_json::json!([]), "{told}");
+    assert_eq!(told["failure_kind"], "Unreachable", "{told}");
+    let why = told["failure"].as_str().expect("a sentence");
+    assert!(why.contains("I cannot get from"), "{why}");
     domain.assert_clean();
 }
 

@@ -49,6 +49,21 @@ fn twenty_seeds_deliver_in_three_warehouses() {
 }
 
 #[test]
+fn missions_among_things_that_come_and_go_are_delivered_without_a_collision() {
+    let hall = concat!(env!("CARGO_MANIFEST_DIR"), "/data/hall.toml");
+    let mission = ["--seeds", "1..5", "--mission", "3,1,2", "--obstacles", "4"];
+    let warehouses = [&WAREHOUSES[..], &["--warehouse", hall]].concat();
+    let (runs, text) = simulate(&[&mission[..], &warehouses].concat());
+    assert_eq!(runs.len(), 20);
+    for run in &runs {
+        assert_eq!(run["delivered"].as_array().map(Vec::len), Some(3), "{run}");
+        assert_eq!(run["collisions"], 0, "{run}");
+    }
+    let blocked: u64 = runs.iter().filter_map(|run| run["blocked"].as_u64()).sum();
+    assert!(blocked > 0, "no way was found blocked: {text}");
+}
+
+#[test]
 fn the_same_seed_gives_the_same_run() {
     let args = [&["--seeds", "3..5"], &WAREHOUSES[..]].concat();
     let strip = |mut runs: Vec<Value>| {

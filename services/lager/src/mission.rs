@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 
 use lager_topics::{
     Ask, AskKind, Failure, FailureKind, Health, Mode, NavigatorStatus, Order, OrderQueue, Phase,
-    Remedy,
+    Remedy, Tag,
 };
 use serde::{Deserialize, Serialize};
 
@@ -74,6 +74,8 @@ pub struct Mission {
     counted: Option<u32>,
     /// Why it has been given up.
     failure: Option<String>,
+    /// What logic calls that, where it is logic that gives up.
+    failure_kind: Option<Tag<FailureKind>>,
 }
 
 impl Mission {
@@ -105,6 +107,11 @@ impl Mission {
             Some(why) => Some(Err(why)),
             None => (self.begun && self.open.is_empty()).then_some(Ok(())),
         }
+    }
+
+    /// What logic calls it that the mission was given up.
+    pub fn failure_kind(&self) -> Option<Tag<FailureKind>> {
+        self.failure_kind
     }
 
     /// Gives the mission up, unless it has ended already.
@@ -176,7 +183,9 @@ impl Watch {
             return None;
         }
         if let Some(why) = self.hopeless(now, &health, &status, &queue, seen) {
+            let (why, kind) = why;
             self.mission.give_up(&why);
+            self.mission.failure_kind = kind;
             return None;
         }
         if !self.mission.begun && is_whole(&health) && health.mode_chosen != 0 {
@@ -205,7 +214,7 @@ impl Watch {
         (has_room && knows_goods).then_some(Act::Order(Order { id, product }))
     }
 
-    /// Why the mission will not be delivered, if that is so.
+    /// Why the mission will not be delivered, if that is so, and what logic calls it.
     fn hopeless(
         &mut self,
         now: Duration,
@@ -213,9 +222,10 @@ impl Watch {
         status: &NavigatorStatus,
         queue: &OrderQueue,
         seen: &Seen,
-    ) -> Option<String> {
+    ) -> Option<(String, Option<Tag<FailureKind>>)> {
         if self.is_stuck(now, status) {
-            return Some(format!("logic waits for a person: {}", status.failure));
+            let why = &status.failure;
+            return Some((format!("logic waits for a person: {why}"), Some(why.kind)));
         }
         let phase = status.phase.get()?;
         let is_idle = matches!(phase, Phase::WaitingForMap | Phase::WaitingForOrder)
@@ -226,7 +236,10 @@ impl Watch {
             && is_idle
             && self.is_own(id, product)
         {
-            return Some(format!("logic has given the order up: {why}"));
+            return Some((
+                format!("logic has given the order up: {why}"),
+                Some(why.kind),
+            ));
         }
         let is_forgotten = is_idle && self.mission.begun && takes_orders(health);
         if !is_forgotten || health.stopped != 0 {
@@ -236,8 +249,8 @@ impl Watch {
         let since = *self.idle_since.get_or_insert(now);
         let open = &self.mission.open;
         (now - since >= IDLE).then(|| match phase {
-            Phase::WaitingForMap => "nobody tells the robot its warehouse".into(),
-            _ => format!("nobody orders {open:?} any more"),
+            Phase::WaitingForMap => ("nobody tells the robot its warehouse".into(), None),
+            _ => (format!("nobody orders {open:?} any more"), None),
         })
     }
 

@@ -1,5 +1,6 @@
 //! How a mission ended: the one JSON line, or the sentence, at the end of `lager up`.
 
+use lager_topics::{FailureKind, Tag};
 use serde::Serialize;
 
 /// How a mission ended.
@@ -20,6 +21,9 @@ pub struct Outcome {
     /// Why the mission was not delivered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
+    /// What logic calls that, where it is logic that gave up.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure_kind: Option<Tag<FailureKind>>,
 }
 
 impl Outcome {

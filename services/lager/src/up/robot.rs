@@ -192,6 +192,7 @@ impl Robot {
             lost: self.figures.lost + self.figures.lost_elsewhere,
             restarts: self.supervisor.restarts(),
             failure,
+            failure_kind: mission.failure_kind(),
         };
         if json {
             self.terminal.finish();

@@ -8,7 +8,7 @@ use lager_logic::node::Node;
 use lager_logic::{Input, LogicConfig, Navigator, Output};
 use lager_topics::{
     BlockedWays, EventKind, MapProduct, Mode, NavigatorStatus, Order, OrderQueue, Phase, Pick,
-    Remedy, Side, WarehouseMap,
+    Side, WarehouseMap,
 };
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 
@@ -90,7 +90,6 @@ fn is_news(before: &NavigatorStatus, after: &NavigatorStatus) -> bool {
 pub(crate) struct Trial {
     config: LogicConfig,
     pub(crate) published: WarehouseMap,
-    exit: Exit,
     pub(crate) body: Body,
     pub(crate) navigator: Navigator,
     pub(crate) status: NavigatorStatus,
@@ -124,7 +123,6 @@ impl Trial {
         let mut trial = Self {
             config,
             published,
-            exit,
             body,
             status: navigator.status(),
             told: navigator.status(),
@@ -289,30 +287,6 @@ impl Trial {
 
     pub(crate) fn is_home(&self) -> bool {
         self.phase() == Phase::WaitingForOrder && self.navigator.status().waiting == 0
-    }
-
-    /// As [`Self::deliver`], but a robot that stands and says why, and what would end that, will do
-    /// as well. A reset then ends it.
-    pub(crate) fn deliver_or_say_why(&mut self, count: u32) {
-        let limit = Duration::from_secs(400) * count;
-        self.run_until(limit, |trial| {
-            (trial.status.delivered == count && trial.is_home()) || trial.phase() == Phase::Stuck
-        });
-        if self.phase() != Phase::Stuck {
-            return self.deliver(count);
-        }
-        let failure = self.navigator.status().failure;
-        assert!(!failure.is_none(), "{}", self.story());
-        eprintln!("not delivered: {failure}");
-        assert!(self.count(EventKind::Failed) > 0, "{}", self.story());
-        assert_eq!(failure.remedy.get(), Some(Remedy::Reset), "{failure}");
-        self.run_for(STEP * 200);
-        let start = Body::new(&self.published, self.exit, Trouble::NONE, 3);
-        (self.body.x, self.body.y, self.body.angle) = (start.x, start.y, start.angle);
-        self.tell(Input::Reset);
-        let delivered = self.status.delivered;
-        self.order(99, 1);
-        self.deliver(delivered + 1);
     }
 
     /// Runs until `count` products are delivered and the robot is back; panics with its thoughts
