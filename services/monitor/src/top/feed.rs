@@ -145,7 +145,7 @@ impl<'a> Feed<'a> {
             model.head.queue = Some(*queue);
         }
         if let Some(path) = self.path.latest()? {
-            model.head.path = Some(*path);
+            model.head.take_path(*path);
         }
         Ok(())
     }

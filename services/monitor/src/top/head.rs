@@ -50,6 +50,13 @@ impl Head {
         self.health = Some(health);
     }
 
+    /// Takes the path's latencies; those of a second without commands say nothing.
+    pub(crate) fn take_path(&mut self, path: PathLatency) {
+        if path.total.count > 0 {
+            self.path = Some(path);
+        }
+    }
+
     pub(crate) fn mode(&self) -> String {
         let mode = self.health.as_ref().and_then(|health| health.mode.get());
         mode.map_or("no bridge".to_owned(), |mode| {

@@ -155,7 +155,11 @@ impl Recorded {
             }
             NavStatus::NAME => head.status = of(payload).or(head.status),
             MissionQueue::NAME => head.queue = of(payload).or(head.queue),
-            LatencyPath::NAME => head.path = of(payload).or(head.path),
+            LatencyPath::NAME => {
+                if let Some(path) = of(payload) {
+                    head.take_path(path);
+                }
+            }
             _ => {}
         }
     }

@@ -381,7 +381,7 @@ fn cell(text: &str, width: usize, place: usize) -> String {
 }
 
 fn writer(row: &Row) -> String {
-    let Some(first) = row.authors.first() else {
+    let Some(first) = row.author() else {
         return "-".to_owned();
     };
     let role = first
@@ -389,7 +389,7 @@ fn writer(row: &Row) -> String {
         .map_or("stranger".to_owned(), |role| role.to_string());
     let more = match row.authors.len() {
         1 => String::new(),
-        n => format!("+{}", n - 1),
+        n => format!(" +{}", n - 1),
     };
     format!("{role} {}{more}", first.pid)
 }
