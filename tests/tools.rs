@@ -545,7 +545,8 @@ fn traces_of_a_mission_are_few_and_have_their_spans() {
     for span in ["service", "start", "link"] {
         assert!(!begun(span).is_empty(), "no span `{span}`: {traces:#?}");
     }
-    assert_eq!(begun("mission").len(), 1);
+    // The station may hand the second order over when the first one is done.
+    assert!((1..=2).contains(&begun("mission").len()), "{traces:#?}");
     let orders = begun("order");
     let products: Vec<_> = orders
         .iter()
@@ -558,7 +559,7 @@ fn traces_of_a_mission_are_few_and_have_their_spans() {
         .iter()
         .map(|span| span["name"].as_str().expect("a name"))
         .collect();
-    assert_eq!(around, ["service", "mission"]);
+    assert_eq!(around[..2], ["service", "mission"]);
 }
 
 #[test]

@@ -111,7 +111,7 @@ const OPEN_ICEORYX2: &[&str] = &["lager-ports", "lager-benches"];
 const CIRCLES_LEFT: &[(&str, &str)] = &[
     (
         "bus/ports",
-        "{bus, clock, config, doorbell, error, found, introspect, keeper, kept, lock, mend, \
+        "{any, bus, clock, config, doorbell, error, found, introspect, keeper, kept, lock, mend, \
          name, patience, place, publisher, request, service, shortage, stop, \
          storage, subscriber, sweep, transport, untyped, waiter}",
     ),

@@ -128,7 +128,7 @@ impl<W: Write> Tools<'_, W> {
         let mut sent = 0;
         if self.rest(&publisher, MEET) {
             let began = Instant::now();
-            while !what.limits.are_reached(began, sent) {
+            while !what.limits.are_reached(began, sent) && !self.shutdown.is_requested() {
                 if let Some(rate) = what.rate {
                     let due = began + Duration::from_secs_f64(sent as f64 / rate);
                     let left = due.saturating_duration_since(Instant::now());

@@ -86,17 +86,6 @@ impl Page<'_> {
         self.spans(&[(text.to_owned(), style)]);
     }
 
-    /// Writes at the right end of the next line.
-    fn mark(&mut self, text: &str, style: Style) {
-        let length = text.chars().count();
-        let x = usize::from(self.area.right()).saturating_sub(length);
-        let y = self.area.y + self.line;
-        if self.line < self.area.height {
-            self.to.set_stringn(x as u16, y, text, length, style);
-        }
-        self.line += 1;
-    }
-
     fn spans(&mut self, spans: &[(String, Style)]) {
         if self.line < self.area.height {
             let mut x = self.area.x;
@@ -324,6 +313,9 @@ fn fitting(width: usize) -> Vec<&'static Column> {
 
 fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
     let columns = fitting(page.area.width.into());
+    let rows = model.shown();
+    let room = usize::from(bottom.saturating_sub(page.line + 1)).max(1);
+    let hidden = rows.len().saturating_sub(room);
     let mut head = String::from(" ");
     for (place, column) in columns.iter().enumerate() {
         let mark = match column.sort == Some(model.view.sort) {
@@ -331,12 +323,16 @@ fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
             true => "v",
             false => "",
         };
-        head += &cell(&format!("{mark}{}", column.head), column.width, place);
+        let more = match place {
+            0 if hidden > 0 => format!(" (+{hidden} more)"),
+            _ => String::new(),
+        };
+        let name = format!("{mark}{}{more}", column.head);
+        head += &cell(&name, column.width, place);
     }
     let width = usize::from(page.area.width);
     let head_style = Style::new().add_modifier(Modifier::REVERSED);
     page.put(&format!("{head:width$}"), head_style);
-    let rows = model.shown();
     if rows.is_empty() {
         let why = match model.view.filter.is_empty() {
             true => "no topic of this robot is open",
@@ -345,16 +341,9 @@ fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
         return page.put(&format!("  {why}"), dim());
     }
     // The chosen row is always in sight.
-    let room = usize::from(bottom.saturating_sub(page.line)).max(1);
     let chosen = model.view.chosen.as_ref();
     let at = chosen.and_then(|name| rows.iter().position(|row| row.name == *name));
     let first = at.map_or(0, |at| (at + 1).saturating_sub(room));
-    let hidden = rows.len().saturating_sub(room);
-    if hidden > 0 {
-        // In the table's head, where there is always room.
-        page.line -= 1;
-        page.mark(&format!(" {hidden} more "), head_style);
-    }
     for (place, row) in rows.iter().enumerate().skip(first).take(room) {
         let trouble = row.trouble(model.now_ns);
         let mark = match trouble {
@@ -392,7 +381,7 @@ fn cell(text: &str, width: usize, place: usize) -> String {
 }
 
 fn writer(row: &Row) -> String {
-    let Some(first) = row.authors.first() else {
+    let Some(first) = row.author() else {
         return "-".to_owned();
     };
     let role = first
@@ -400,7 +389,7 @@ fn writer(row: &Row) -> String {
         .map_or("stranger".to_owned(), |role| role.to_string());
     let more = match row.authors.len() {
         1 => String::new(),
-        n => format!("+{}", n - 1),
+        n => format!(" +{}", n - 1),
     };
     format!("{role} {}{more}", first.pid)
 }
@@ -487,7 +476,7 @@ fn footer(model: &Model) -> (String, Style) {
         false => format!("[{}] ", states.join(", ")),
     };
     let text = format!(
-        "{states}?:help /:filter <>:sort {} Space:close p:pause f:freeze l:path q:quit",
+        "{states}?:help /:filter <>:sort {} Space:close p:pause f:freeze q:quit",
         view.sort.name()
     );
     (text, dim())

@@ -87,6 +87,8 @@ pub(crate) struct Row {
     lost_at_ns: Option<u64>,
     pub(crate) samples: u64,
     pub(crate) last_ns: Option<u64>,
+    /// The process that wrote it.
+    last_writer: u32,
     pub(crate) figures: Figures,
     window: Window,
 }
@@ -122,6 +124,7 @@ impl Row {
             lost_at_ns: None,
             samples: 0,
             last_ns: None,
+            last_writer: 0,
             figures: Figures::default(),
             window: Window::default(),
         }
@@ -158,6 +161,7 @@ impl Row {
         window.samples += 1;
         self.samples += 1;
         self.last_ns = Some(published);
+        self.last_writer = stamp.writer;
     }
 
     /// Is not looked at for a while: what is known of rates and ages is void.
@@ -220,6 +224,13 @@ impl Row {
             delay_p99_ns: window.delays.at(99.0),
             delay_max_ns: window.delays.max(),
         };
+    }
+
+    /// The process that wrote last, or any that could.
+    pub(crate) fn author(&self) -> Option<&Author> {
+        let wrote = |author: &&Author| author.pid == self.last_writer;
+        let last = self.authors.iter().find(wrote);
+        last.or(self.authors.first())
     }
 
     /// How old the last sample is.
