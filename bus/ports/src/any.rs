@@ -3,7 +3,7 @@
 
 use core::fmt;
 
-use lager_topics::{Description, Stamp, Topic, TopicVisitor, bytes, visit};
+use lager_topics::{Description, Stamp, Topic, TopicVisitor, bytes_of, visit};
 
 use crate::bus::Bus;
 use crate::cause::Cause;
@@ -99,7 +99,7 @@ impl TopicVisitor for Open<'_> {
         Ok(AnyPublisher {
             name: T::NAME.to_owned(),
             description: Description::of::<T::Payload>(),
-            blank: bytes(&T::Payload::default()).into(),
+            blank: bytes_of(&T::Payload::default()).into(),
             end: Box::new(Publisher::<T>::new(self.bus)?),
         })
     }
