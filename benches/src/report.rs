@@ -354,8 +354,8 @@ mod tests {
             "p50_ns": 9_999, "p99_ns": 10_000, "p999_ns": 1_234_567,
             "ratio_to": "iceoryx2/event", "ratio_p50": 0.8, "ratio_p99": 1.6,
             "ratios": [
-                {"to": "iceoryx2/event", "p50": 0.8, "p99": 1.6},
-                {"to": "futex", "p50": 1.1, "p99": 2.2},
+                {"to": "iceoryx2/event", "p50": 0.8, "p99": 1.6, "runs": [[0.8, 1.6]]},
+                {"to": "futex", "p50": 1.1, "p99": 2.2, "runs": [[1.1, 2.2]]},
             ],
         });
         assert_eq!(json["machine"], "a machine");
