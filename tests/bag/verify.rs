@@ -213,8 +213,8 @@ fn what_is_not_as_it_was_is_named() {
     let command = &told["first_command"];
     assert_ne!(command["expected"], command["got"], "{told:#}");
     assert!(command["robot_time_ns"].as_u64() > Some(0), "{told:#}");
-    let first = told["first"]["input"].as_u64().expect("a number");
-    assert!(command["input"].as_u64() >= Some(first), "{told:#}");
+    let first = told["first"]["at_ns"].as_u64().expect("a number");
+    assert!(command["at_ns"].as_u64() >= Some(first), "{told:#}");
     let output = domain.run(&[&["bag", "play", "--verify", "tour.mcap"], &with[..]].concat());
     let text = said(&output);
     assert!(

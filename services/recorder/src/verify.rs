@@ -87,7 +87,8 @@ enum Follows {
     Nothing,
     /// A navigator's whose pieces came one after the other from its begin.
     Navigator,
-    /// The same, after something differed: only its first command that differs is looked for.
+    /// The same, after something differed: only its first command that differs is looked for, and if
+    /// none does, that of the next navigator.
     Apart,
 }
 
@@ -115,10 +116,6 @@ impl Follower<'_> {
         let at_ns = times.log.saturating_sub(self.begin_ns);
         let is_new = self.stream != Some((stamp.writer, stamp.epoch));
         if is_new {
-            if self.follows == Follows::Apart {
-                // No command differs in the life of the navigator that differs.
-                return Ok(false);
-            }
             self.stream = Some((stamp.writer, stamp.epoch));
             (self.next_sample, self.next_entry) = (0, 0);
             self.follows = Follows::Navigator;

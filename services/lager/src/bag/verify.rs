@@ -173,7 +173,7 @@ fn differs(first: &Difference, command: Option<&Difference>, processor: &str) ->
         }
         None => lines.push("it differs, though no command does".to_owned()),
     }
-    if command.is_none_or(|command| command.number != first.number) {
+    if command != Some(first) {
         lines.push(match &first.sample {
             Some(sample) => format!(
                 "the first difference is in {} {} at {}: expected {}, got {}",
