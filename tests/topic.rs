@@ -88,12 +88,15 @@ fn what_a_person_writes_is_published_on_a_topic_of_his_own() {
         "--rate",
         "50",
     ];
-    let told = said(&domain.run(&[&thrice[..], &["--count", "3"]].concat()));
+    // A reader meets a writer when it looks, so it looks while the tool runs.
+    let mut tool = domain.start(&[&thrice[..], &["--count", "3"]].concat());
+    let heard = hear(&mut weather, 3);
+    assert_eq!(tool.wait(), Some(0), "{}", tool.log());
+    let told = tool.output();
     assert!(
         told.contains("3 samples published on weather/now"),
         "{told}"
     );
-    let heard = hear(&mut weather, 3);
     for (number, (weather, stamp)) in heard.iter().enumerate() {
         // Nobody told the blank values of a topic that is in no table.
         assert_eq!((weather.wind, weather.from), (3_200, 0));
@@ -117,10 +120,10 @@ fn what_a_person_writes_is_published_on_a_topic_of_his_own() {
     )
     .expect("a pipe");
     drop(input);
+    let winds: Vec<u32> = hear(&mut weather, 3).iter().map(|(w, _)| w.wind).collect();
     let output = tool.wait_with_output().expect("a child");
     assert!(output.status.success(), "{}", said(&output));
     assert!(said(&output).contains("\"samples\":3"), "{}", said(&output));
-    let winds: Vec<u32> = hear(&mut weather, 3).iter().map(|(w, _)| w.wind).collect();
     assert_eq!(winds, [1, 2, 3]);
 
     for (payload, sentence) in [

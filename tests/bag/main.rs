@@ -428,33 +428,29 @@ fn a_recording_is_split_by_time_into_files_that_are_whole() {
     let args = ["--topic", "noise/now", "--split-time", "0.5", "noise.mcap"];
     let recorder = recorder(&domain, &args);
     noisy.meet(&recorder);
-    let file = |part: u32| match part {
-        0 => domain.folder().join("noise.mcap"),
-        part => domain.folder().join(format!("noise-{part:03}.mcap")),
-    };
     wait_for("the third file", || {
         noisy.send();
-        file(2).is_file().then_some(())
+        let third = domain.folder().join("noise-002.mcap");
+        third.is_file().then_some(())
     });
     let told = end(recorder);
     let files = told["files"].as_array().expect("files");
     assert!(files.len() >= 3, "{told}");
     let mut numbers = Vec::new();
-    for part in 0..files.len() as u32 {
-        let path = file(part);
-        let path = path.to_str().expect("a path in UTF-8");
+    for (part, path) in files.iter().enumerate() {
+        let path = path.as_str().expect("a path");
         let checked = done(&domain, &["bag", "check", path]);
         assert!(checked.contains("every number is right"), "{checked}");
         let info = done(&domain, &["bag", "info", path, "--json"]);
         let info: Value = serde_json::from_str(&info).expect("JSON");
-        assert_eq!(info["part"].as_u64(), Some(part.into()), "{info}");
+        assert_eq!(info["part"].as_u64(), Some(part as u64), "{info}");
         assert_eq!(info["topics"][0]["type"], "Noise", "{info}");
         // All but the last one have been written to for as long as was asked for, as far as chunks
         // end on time: a chunk takes 200 ms.
-        let is_last = part as usize + 1 == files.len();
+        let is_last = part + 1 == files.len();
         let seconds = info["seconds"].as_f64().expect("a time");
         assert!(is_last || seconds > 0.2, "{info}");
-        numbers.extend(noise_numbers(&file(part)));
+        numbers.extend(noise_numbers(&domain.folder().join(path)));
     }
     assert!(numbers.windows(2).all(|pair| pair[0] + 1 == pair[1]));
     drop((noisy, bus));

@@ -122,7 +122,7 @@ pub struct GlobalArgs {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run everything on this machine: the robot's body and all services, until Ctrl-C
-    Up(UpArgs),
+    Up(Box<UpArgs>),
     /// Run the whole robot in one process in virtual time: deterministic, no bus
     Simulate(SimulateArgs),
     /// See the whole robot on one screen: its links, its mission, and every topic's rate and losses

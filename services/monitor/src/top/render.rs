@@ -423,7 +423,7 @@ fn measured(row: &Row, value: f64) -> String {
 /// A number in six letters.
 fn number(value: f64) -> String {
     match value {
-        v if v == 0.0 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         v if v < 10.0 => format!("{v:.2}"),
         v if v < 1_000.0 => format!("{v:.1}"),
         v => format!("{v:.0}"),
