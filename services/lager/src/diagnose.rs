@@ -42,7 +42,8 @@ fn damage(mut segments: Vec<PathBuf>) -> Option<String> {
         more => format!(", and so are {more} more of the bus"),
     };
     Some(format!(
-        "{first} is damaged (emptied, or another user's){more}; `lager doctor --fix` removes what nobody uses, and `lager doctor` says who uses the rest"
+        "{first} is damaged (emptied, or another user's){more}; `lager doctor --fix` removes what \
+         nobody uses, and `lager doctor` says who uses the rest"
     ))
 }
 

@@ -23,6 +23,9 @@ const ANSWER: Duration = Duration::from_millis(2_500);
 /// How often the wish to end is looked at in a pause.
 const LOOK: Duration = Duration::from_millis(10);
 
+/// What ends a tool that is given up.
+type End = Box<dyn FnOnce(GivenUp) + Send>;
+
 /// What one tool needs in order not to hang.
 #[derive(Clone, Debug)]
 pub struct Patience {
@@ -48,7 +51,7 @@ impl Patience {
     fn with(
         config: &Config,
         shutdown: &Shutdown,
-        start: impl FnOnce(Duration, &Shutdown, Box<dyn FnOnce(GivenUp) + Send>) -> io::Result<Watchdog>,
+        start: impl FnOnce(Duration, &Shutdown, End) -> io::Result<Watchdog>,
     ) -> Result<Self> {
         cut_short::say_so()?;
         let looked_at = config.clone();
