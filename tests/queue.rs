@@ -176,7 +176,12 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     // The robot has not got the goods of product 1 yet.
     let under_way = listed(&domain);
     let number = under_way.split([' ', ':']).nth(1).expect("a number");
-    domain.done(&["queue", "cancel", number]);
+    domain.done(&["cancel", number]);
+    let map = said(&domain.run(&["map"]));
+    assert!(
+        map.starts_with("2 x 2 squares of 50 cm; delivery at (0, 0)\nproduct 1: "),
+        "{map}"
+    );
     assert_eq!(listed(&domain), "no order is under way or waits");
     let again = said(&domain.run(&["queue", "add", "2"]));
     assert_eq!(again, "logic fetches product 2 next");

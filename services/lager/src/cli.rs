@@ -169,6 +169,19 @@ pub enum Command {
         #[arg(allow_negative_numbers = true, value_parser = values::product)]
         product: i32,
     },
+    /// Take an order back, as `queue cancel` does
+    #[command(after_help = "Examples:
+  lager queue                 the orders with their numbers
+  lager cancel 4711           fetch order 4711 no more")]
+    Cancel {
+        /// The order's number
+        #[arg(value_name = "ORDER")]
+        id: u32,
+    },
+    /// Show the warehouse, its goods and the ways that are blocked
+    #[command(after_help = "Examples:
+  lager map                   the floor, where each product stands, and what is in the way")]
+    Map,
     /// Show the orders, add one, take one back, or have one carried out earlier
     #[command(after_help = "Examples:
   lager queue                 the orders with their numbers, the next one first

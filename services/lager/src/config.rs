@@ -49,6 +49,12 @@ const CRUISES_MM_PER_S: RangeInclusive<f32> = 10.0..=1_000.0;
 /// a node as soon as they see it, and farther than the smallest square's side they are past the
 /// next one.
 const SENSORS_AHEAD_MM: RangeInclusive<f32> = 20.0..=400.0;
+/// The same for turns on the spot, in degrees per second.
+const TURNS_DEG_PER_S: RangeInclusive<f32> = 5.0..=180.0;
+/// The same for the tape's width: wider, a crossing is no mark any more.
+const TAPES_MM: RangeInclusive<f32> = 5.0..=50.0;
+/// The same for the ranger's place.
+const RANGERS_AHEAD_MM: RangeInclusive<f32> = 0.0..=400.0;
 
 /// Everything a process of the robot needs to know at start.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -187,6 +193,12 @@ pub struct LogicSection {
     pub cruise_mm_per_s: f32,
     /// How far the line sensors are ahead of the wheels' axle, in mm.
     pub sensor_ahead_mm: f32,
+    /// Degrees per second of a turn on the spot at that duty.
+    pub turn_deg_per_s: f32,
+    /// Width of the tape, in mm.
+    pub tape_mm: f32,
+    /// How far the ranger is ahead of the wheels' axle, in mm.
+    pub ranger_ahead_mm: f32,
     /// Battery, in tenths of a volt, below which the robot stands at the next crossing; 0 = none.
     pub low_battery_decivolts: u8,
     /// How far the ranger sees, in cm; 0 = there is none, and no way is looked at.
@@ -292,6 +304,9 @@ impl Default for LogicSection {
         Self {
             cruise_mm_per_s: config.cruise_mm_per_s,
             sensor_ahead_mm: config.sensor_ahead_mm,
+            turn_deg_per_s: config.turn_deg_per_s,
+            tape_mm: config.tape_mm,
+            ranger_ahead_mm: config.ranger_ahead_mm,
             low_battery_decivolts: config.low_battery_decivolts,
             ranger_cm: 80,
             try_again_s: config.try_again.as_secs() as u32,
@@ -375,6 +390,13 @@ impl Config {
                 self.logic.sensor_ahead_mm,
                 SENSORS_AHEAD_MM,
             ),
+            ("turn_deg_per_s", self.logic.turn_deg_per_s, TURNS_DEG_PER_S),
+            ("tape_mm", self.logic.tape_mm, TAPES_MM),
+            (
+                "ranger_ahead_mm",
+                self.logic.ranger_ahead_mm,
+                RANGERS_AHEAD_MM,
+            ),
         ] {
             if !range.contains(&value) {
                 bail!(
@@ -437,6 +459,9 @@ impl Config {
         lager_logic::LogicConfig {
             cruise_mm_per_s: self.logic.cruise_mm_per_s,
             sensor_ahead_mm: self.logic.sensor_ahead_mm,
+            turn_deg_per_s: self.logic.turn_deg_per_s,
+            tape_mm: self.logic.tape_mm,
+            ranger_ahead_mm: self.logic.ranger_ahead_mm,
             low_battery_decivolts: self.logic.low_battery_decivolts,
             ranger_cm: self.logic.ranger_cm,
             try_again: Duration::from_secs(self.logic.try_again_s.into()),
@@ -550,6 +575,9 @@ mod tests {
             ("[logic]\nsensor_ahead_mm = 0.0", "20 to 400"),
             ("[logic]\nsensor_ahead_mm = inf", "sensor_ahead_mm is inf"),
             ("[logic]\nsensor_ahead_mm = 160000.0", "sensor_ahead_mm"),
+            ("[logic]\nturn_deg_per_s = 0.0", "turn_deg_per_s is 0"),
+            ("[logic]\ntape_mm = 90.0", "5 to 50"),
+            ("[logic]\nranger_ahead_mm = -1.0", "ranger_ahead_mm is -1"),
             ("[logic]\nranger_cm = 1", "ranger_cm is 1;"),
             ("[logic]\nranger_cm = 10", "11 to 255"),
         ] {

@@ -281,6 +281,8 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             ModeName::Autonomous => Mode::Autonomous,
         })?,
         Command::Fetch { product } => operator()?.fetch(product)?,
+        Command::Cancel { id } => operator()?.cancel(id)?,
+        Command::Map => operator()?.map()?,
         Command::Queue { change } => {
             let operator = operator()?;
             match change {

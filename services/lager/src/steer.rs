@@ -23,6 +23,7 @@ use crate::patience::Patience;
 use crate::runtime::RuntimeFolder;
 use crate::stop;
 
+mod map;
 mod queue;
 mod world;
 

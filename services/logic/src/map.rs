@@ -36,7 +36,7 @@ pub const MIN_SIDE_CM: u16 = 40;
 
 /// A place where a product is picked: the middle of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Station {
+pub struct PickStation {
     /// The product's number.
     pub product: i32,
     /// The nodes it lies between, the one nearer to the origin first.
@@ -45,7 +45,7 @@ pub struct Station {
     pub into: Heading,
 }
 
-impl Station {
+impl PickStation {
     /// The heading along the station's edge from one of its ends, `None` elsewhere.
     pub fn heading_from(&self, node: Node) -> Option<Heading> {
         let other = self.other_end(node)?;
@@ -79,7 +79,7 @@ pub struct Map {
     height: u8,
     side_mm: f32,
     delivery: Node,
-    stations: heapless::Vec<Station, MAX_STATIONS>,
+    stations: heapless::Vec<PickStation, MAX_STATIONS>,
 }
 
 impl Map {
@@ -138,7 +138,7 @@ impl Map {
     }
 
     /// The edge a side of a square is (AMB-37), seen as a pick station.
-    fn station_at(&self, product: i32, square: Node, side: Option<Side>) -> Option<Station> {
+    fn station_at(&self, product: i32, square: Node, side: Option<Side>) -> Option<PickStation> {
         let Node { x, y } = square;
         if x >= self.width || y >= self.height {
             return None;
@@ -149,7 +149,7 @@ impl Map {
             Side::Right => ((x + 1, y), (x + 1, y + 1), Heading::Left),
             Side::Down => ((x, y), (x + 1, y), Heading::Up),
         };
-        Some(Station {
+        Some(PickStation {
             product,
             ends: [Node::new(first.0, first.1), Node::new(second.0, second.1)],
             into,
@@ -245,7 +245,7 @@ impl Map {
     }
 
     /// Where a product is picked.
-    pub fn station(&self, product: i32) -> Option<&Station> {
+    pub fn station(&self, product: i32) -> Option<&PickStation> {
         self.stations
             .iter()
             .find(|station| station.product == product)

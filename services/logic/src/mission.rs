@@ -40,7 +40,7 @@ use crate::judge::Edge;
 use crate::manoeuvre::{
     Ahead, ArmSequence, Follow, Look, Manoeuvre, Outcome, Search, Spot, Task, Turn, Until,
 };
-use crate::map::{Map, Station};
+use crate::map::{Map, PickStation};
 use crate::marks::Sides;
 use crate::node::Node;
 use crate::output::Output;
@@ -379,7 +379,7 @@ impl Mission {
     /// once more from that side.
     fn go_past_station(&mut self, out: &mut Output) {
         let along = Some(self.place.heading);
-        let behind = |station: &Station| {
+        let behind = |station: &PickStation| {
             let mut ends = station.ends.into_iter();
             ends.find(|end| station.heading_from(*end) == along)
         };
@@ -522,7 +522,7 @@ impl Mission {
     }
 
     /// Where the product of the order is picked.
-    fn station(&self) -> Option<&Station> {
+    fn station(&self) -> Option<&PickStation> {
         self.map.as_ref()?.station(self.order.product)
     }
 

@@ -19,6 +19,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "resume",
             "mode",
             "fetch",
+            "cancel",
             "queue",
             "pick",
             "picked",
@@ -33,7 +34,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "gag",
         ],
     ),
-    ("Look at it", &["top", "topic", "bag"]),
+    ("Look at it", &["map", "top", "topic", "bag"]),
     ("Measure", &["bench"]),
     ("Set up and mend", &["doctor", "config", "completions"]),
     (

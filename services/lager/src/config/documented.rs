@@ -120,6 +120,12 @@ gripper_closed = {gripper_closed}
 cruise_mm_per_s = {cruise:?}
 # How far the line sensors are ahead of the wheels' axle, in mm.
 sensor_ahead_mm = {ahead:?}
+# Degrees per second of a turn on the spot at that duty.
+turn_deg_per_s = {turn:?}
+# Width of the tape, in mm.
+tape_mm = {tape:?}
+# How far the ranger at the front is ahead of the wheels' axle, in mm.
+ranger_ahead_mm = {ranger_ahead:?}
 # Battery, in tenths of a volt, below which the robot stands at the next crossing until it is
 # charged or a person has put it down anew; 0 = never.
 low_battery_decivolts = {low_battery}
@@ -228,6 +234,9 @@ debounce_ms = {debounce}
             cruise = self.logic.cruise_mm_per_s,
             ahead = self.logic.sensor_ahead_mm,
             low_battery = self.logic.low_battery_decivolts,
+            turn = self.logic.turn_deg_per_s,
+            tape = self.logic.tape_mm,
+            ranger_ahead = self.logic.ranger_ahead_mm,
             ranger = self.logic.ranger_cm,
             try_again = self.logic.try_again_s,
             pick = unset("pick", self.logic.pick.map(PickBy::key)),

@@ -9,7 +9,7 @@ use super::{Mission, Tables};
 use crate::blocks::{Block, Blocks};
 use crate::heading::Compass;
 use crate::manoeuvre::Outcome;
-use crate::map::{Map, Station};
+use crate::map::{Map, PickStation};
 use crate::node::Node;
 use crate::output::Output;
 use crate::place::Place;
@@ -295,7 +295,7 @@ impl Mission {
     }
 
     /// Whether nothing stands on the edge of a station.
-    pub(super) fn is_open(&self, station: &Station) -> bool {
+    pub(super) fn is_open(&self, station: &PickStation) -> bool {
         let [node, _] = station.ends;
         self.map.as_ref().is_some_and(|map| {
             station

@@ -1,0 +1,123 @@
+//! `lager map`: the warehouse and what is blocked in it, as logic goes by them.
+
+use std::fmt::Write;
+
+use anyhow::Result;
+use lager_topics::{BlockSource, BlockedWays, Heading, NavBlocks, NavMap, Side, Tag, WarehouseMap};
+
+use super::{Operator, first};
+
+impl Operator {
+    /// `lager map`: the floor, its goods, and the ways on which something stands.
+    ///
+    /// # Errors
+    /// When nobody publishes the map.
+    pub fn map(&self) -> Result<String> {
+        let map = first(
+            &mut self.bus.subscriber::<NavMap>()?,
+            &self.bus,
+            &self.patience,
+        )?;
+        let ways = first(
+            &mut self.bus.subscriber::<NavBlocks>()?,
+            &self.bus,
+            &self.patience,
+        )?;
+        Ok(described(&map, &ways))
+    }
+}
+
+/// The warehouse in lines: the floor, each of its goods, each blocked way.
+fn described(map: &WarehouseMap, ways: &BlockedWays) -> String {
+    let WarehouseMap {
+        width,
+        height,
+        delivery_x,
+        delivery_y,
+        side_length_cm,
+        ..
+    } = map;
+    let mut text = format!(
+        "{width} x {height} squares of {side_length_cm} cm; delivery at ({delivery_x}, {delivery_y})"
+    );
+    // Writing to a String cannot fail.
+    for product in map.products() {
+        let side = side(product.side);
+        let (id, x, y) = (product.id, product.x, product.y);
+        let _ = write!(text, "\nproduct {id}: at the {side} of square ({x}, {y})");
+    }
+    for way in ways.ways() {
+        let leads = leads(way.heading);
+        let who = match way.source.get() {
+            Some(BlockSource::Person) => "a person says so",
+            _ => "the robot has seen it",
+        };
+        let (x, y) = (way.x, way.y);
+        let _ = write!(text, "\nblocked: from ({x}, {y}) {leads}; {who}");
+    }
+    if ways.ways().is_empty() {
+        text.push_str("\nno way is blocked");
+    }
+    text
+}
+
+fn side(side: Tag<Side>) -> &'static str {
+    match side.get() {
+        Some(Side::Left) => "left",
+        Some(Side::Up) => "upper side",
+        Some(Side::Right) => "right",
+        Some(Side::Down) => "lower side",
+        None => "unknown side",
+    }
+}
+
+fn leads(heading: Tag<Heading>) -> &'static str {
+    match heading.get() {
+        Some(Heading::Left) => "to the left",
+        Some(Heading::Up) => "upwards",
+        Some(Heading::Right) => "to the right",
+        Some(Heading::Down) => "downwards",
+        None => "somewhere",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_topics::{BlockedWay, MapProduct};
+
+    use super::*;
+
+    #[test]
+    fn goods_and_blocked_ways_stand_in_lines_of_their_own() {
+        let mut map = WarehouseMap {
+            width: 2,
+            height: 1,
+            side_length_cm: 50,
+            product_count: 1,
+            ..WarehouseMap::default()
+        };
+        map.products[0] = MapProduct {
+            id: 7,
+            x: 1,
+            side: Side::Up.into(),
+            ..MapProduct::default()
+        };
+        let floor = "2 x 1 squares of 50 cm; delivery at (0, 0)\n\
+                     product 7: at the upper side of square (1, 0)\n";
+        let mut ways = BlockedWays::default();
+        let told = described(&map, &ways);
+        assert_eq!(told, format!("{floor}no way is blocked"));
+        ways.count = 1;
+        ways.ways[0] = BlockedWay {
+            x: 2,
+            heading: Heading::Left.into(),
+            source: BlockSource::Person.into(),
+            ..BlockedWay::default()
+        };
+        let told = described(&map, &ways);
+        assert_eq!(
+            told,
+            format!("{floor}blocked: from (2, 0) to the left; a person says so")
+        );
+    }
+}
