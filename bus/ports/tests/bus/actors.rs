@@ -422,3 +422,50 @@ fn a_large_payload_is_not_copied() {
         assert_eq!((sample.pixels[15][15][31], sample.stamp().sequence), (9, 0));
     }
 }
+
+payload! {
+    /// Wind of somebody else's.
+    pub struct Gust: 8 bytes {
+        /// In mm/s.
+        pub wind: u64,
+    }
+}
+
+struct Draught;
+
+impl Topic for Draught {
+    const NAME: &'static str = "weather/draught";
+    type Payload = Gust;
+    const QOS: Qos = Qos::stream(16).waking(&[Role::Guest]);
+    const SUMMARY: &'static str = "A topic that is in no table.";
+}
+
+#[test]
+fn a_tool_that_does_not_know_a_topic_serves_its_actors_too() {
+    let domain = Domain::new();
+    let mut observer = domain.open(Role::Observer).subscriber::<Draught>().unwrap();
+    let tool = domain.open(Role::Operator);
+    let writer = tool.any_publisher(Draught::NAME).unwrap().unwrap();
+    writer.send(&1_u64.to_ne_bytes()).unwrap();
+    assert_eq!(observer.receive().unwrap().unwrap().wind, 1);
+
+    let guest = domain.open(Role::Guest);
+    let waiter = guest.waiter(Policy::Block).unwrap();
+    let mut actor = guest.subscriber::<Draught>().unwrap();
+    writer.tick();
+    writer.send(&2_u64.to_ne_bytes()).unwrap();
+    assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
+    for reader in [&mut actor, &mut observer] {
+        let sample = reader.receive().unwrap().unwrap();
+        assert_eq!((sample.wind, sample.stamp().sequence), (2, 1));
+        drop(sample);
+        assert_eq!(reader.lost(), 0);
+    }
+    // Also one that was there before the tool.
+    let tool = domain.open(Role::Recorder);
+    let writer = tool.any_publisher(Draught::NAME).unwrap().unwrap();
+    writer.send(&3_u64.to_ne_bytes()).unwrap();
+    assert_eq!(actor.receive().unwrap().unwrap().wind, 3);
+    let seen = domain.open(Role::Observer).topics().unwrap().remove(0);
+    assert_eq!((seen.publishers, seen.subscribers), (2, 2));
+}
