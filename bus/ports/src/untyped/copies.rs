@@ -93,8 +93,8 @@ impl Copies {
         // SAFETY: the loan is ours and has room for a payload of the service's size.
         unsafe {
             lent.payload()
-                .copy_from_nonoverlapping(from, self.payload.len())
-        };
+                .copy_from_nonoverlapping(from, self.payload.len());
+        }
         lent.send(self.stamp.get())
     }
 
