@@ -44,7 +44,7 @@ fn encode(packets: Vec<Packet>) {
     }
 }
 
-/// A publisher of line frames and its subscribers, all in this process.
+/// A publisher of line frames, the actor who reads them, and observers, all in this process.
 struct Meeting {
     publisher: Publisher<SensorLine>,
     subscribers: Vec<Subscriber<SensorLine>>,
@@ -52,6 +52,7 @@ struct Meeting {
     // Dropped after its ports.
     _bridge: Bus,
     _logic: Bus,
+    _observer: Bus,
     domain: Domain,
 }
 
@@ -75,15 +76,18 @@ fn meeting(subscribers: usize) -> Meeting {
     let logic = Bus::open(&config, Role::Logic).unwrap();
     let waiter = logic.waiter(Policy::Block).unwrap();
     let publisher = bridge.publisher().unwrap();
-    let subscribers = (0..subscribers)
-        .map(|_| logic.subscriber().unwrap())
-        .collect();
+    // The first acts, the others look on.
+    let observer = Bus::open(&config, Role::Observer).unwrap();
+    let observers = (1..subscribers).map(|_| observer.subscriber().unwrap());
+    let subscribers = [logic.subscriber().unwrap()].into_iter();
+    let subscribers = subscribers.chain(observers).collect();
     let mut meeting = Meeting {
         publisher,
         subscribers,
         waiter,
         _bridge: bridge,
         _logic: logic,
+        _observer: observer,
         domain,
     };
     // More than any queue holds, so that every queue and every chunk has been used.

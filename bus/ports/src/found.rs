@@ -6,7 +6,7 @@ use lager_topics::{Described, Description, Stamp};
 
 use crate::bus::Bus;
 use crate::error::{PortError, ReceiveError};
-use crate::service;
+use crate::service::{self, Side};
 use crate::untyped::{Reader, Taken};
 
 /// The reading end of a topic that is only known by its name; stays in the thread that made it.
@@ -19,7 +19,8 @@ pub struct Found {
 impl Found {
     /// `None` if no process has the topic open.
     pub(crate) fn new(bus: &Bus, name: &str) -> Result<Option<Self>, PortError> {
-        let Some((service, description)) = service::found(bus, bus.robot(), name)? else {
+        let found = service::found(bus, bus.robot(), name, Side::Public)?;
+        let Some((service, description)) = found else {
             return Ok(None);
         };
         Ok(Some(Self {

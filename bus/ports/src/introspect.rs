@@ -15,7 +15,7 @@ use crate::error::IntrospectError;
 use crate::fault::TransportFault;
 use crate::mend;
 use crate::name::{self, RobotName};
-use crate::service::{self, TopicService};
+use crate::service::{self, Side, TopicService};
 use crate::sweep;
 use crate::transport::Ipc;
 use crate::untyped::Kind;
@@ -104,17 +104,29 @@ impl TopicInfo {
 }
 
 impl TopicInfo {
-    fn look_at_ends(&mut self, service: &TopicService) {
-        let ends = service.dynamic_config();
-        ends.list_publishers(|details| {
-            self.writers.push(Peer::of(details.publisher_name.as_str()));
-            CallbackProgression::Continue
-        });
-        ends.list_subscribers(|details| {
-            self.readers
-                .push(Peer::of(details.subscriber_name.as_str()));
-            CallbackProgression::Continue
-        });
+    /// Counts the ends at all services of a topic. A reader reads one of them; a writer writes to
+    /// all, so what one process has there is the most that it has at any of them.
+    fn look_at_ends<'a>(&mut self, services: impl IntoIterator<Item = &'a TopicService>) {
+        let mut writers: Vec<(u128, Peer)> = Vec::new();
+        for service in services {
+            let ends = service.dynamic_config();
+            let mut counted = writers.clone();
+            ends.list_publishers(|details| {
+                let peer = Peer::of(details.publisher_name.as_str());
+                let writer = (details.node_id.value(), peer);
+                match counted.iter().position(|known| *known == writer) {
+                    Some(known) => drop(counted.swap_remove(known)),
+                    None => writers.push(writer),
+                }
+                CallbackProgression::Continue
+            });
+            ends.list_subscribers(|details| {
+                self.readers
+                    .push(Peer::of(details.subscriber_name.as_str()));
+                CallbackProgression::Continue
+            });
+        }
+        self.writers = writers.into_iter().map(|(_, peer)| peer).collect();
         self.publishers = self.writers.len();
         self.subscribers = self.readers.len();
         let observes = |peer: &&Peer| peer.role.is_some_and(Role::is_observer);
@@ -209,14 +221,16 @@ pub(crate) fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
         if matches!(
             details.messaging_pattern(),
             MessagingPattern::PublishSubscribe(_)
-        ) && let Some((robot, topic)) = name::parse_service(details.name().as_str())
+        ) && let Some((robot, service)) = name::parse_service(details.name().as_str())
         {
+            let topic = name::topic_of(service);
             in_use.push((robot, place(topic), topic.to_owned()));
         }
         CallbackProgression::Continue
     })
     .map_err(TransportFault::from)?;
     in_use.sort();
+    in_use.dedup();
     Ok(in_use
         .iter()
         .map(|(robot, _, topic)| look(bus, robot, topic))
@@ -243,12 +257,14 @@ fn look(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
 }
 
 fn look_at_other(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
-    let Ok(Some((service, description))) = service::found(bus, robot, topic) else {
+    let Ok(Some((public, description))) = service::found(bus, robot, topic, Side::Public) else {
         return TopicInfo::without_ends(robot, topic, Layout::Unknown);
     };
+    let actors = service::found(bus, robot, topic, Side::Actors);
+    let actors = actors.ok().flatten().map(|(service, _)| service);
     let mut info = TopicInfo::without_ends(robot, topic, Layout::Described);
     info.description = Some(description);
-    info.look_at_ends(&service);
+    info.look_at_ends([&public].into_iter().chain(&actors));
     info
 }
 
@@ -262,13 +278,22 @@ impl TopicVisitor for Look<'_> {
 
     fn visit<T: Topic>(self) -> TopicInfo {
         let without_ends = |layout| TopicInfo::without_ends(self.robot, T::NAME, layout);
-        let service = match service::existing_topic(self.bus, self.robot, &Kind::of::<T>()) {
-            Ok(Some(service)) => service,
-            Ok(None) => return without_ends(Layout::Unused),
+        let sides: &[Side] = match T::QOS.serves_actors_first() {
+            true => &[Side::Public, Side::Actors],
+            false => &[Side::Public],
+        };
+        let open = |side: &Side| {
+            service::existing_topic(self.bus, self.robot, &Kind::of::<T>(), *side).transpose()
+        };
+        let services: Vec<TopicService> = match sides.iter().filter_map(open).collect() {
+            Ok(services) => services,
             Err(_) => return without_ends(Layout::Other),
         };
+        if services.is_empty() {
+            return without_ends(Layout::Unused);
+        }
         let mut info = without_ends(Layout::Ours);
-        info.look_at_ends(&service);
+        info.look_at_ends(&services);
         for actor in T::QOS.actors {
             let pids = doorbell::woken(self.bus.place(), self.robot, *actor);
             info.woken.extend(pids.into_iter().map(|pid| Peer {

@@ -30,8 +30,11 @@
 //!
 //! * Streams overwrite. A subscriber that falls behind loses the oldest samples and never blocks
 //!   the publisher; [`Subscriber::lost`] says exactly how many samples it missed.
-//! * A service that acts on a topic is woken through its [`Waiter`]. Observers are never woken;
-//!   they poll.
+//! * A service that acts on a topic is served first, from a service of iceoryx2 of its own, and is
+//!   woken through its [`Waiter`]. Everybody else then gets a copy with the same stamp. Observers
+//!   are never woken; they poll.
+//! * A program of plain iceoryx2 reads the service under the topic's name, where samples that it
+//!   writes reach observers only. To be acted upon, it writes to `<name>:actors` too.
 //! * What a killed process left behind is removed at the next [`Bus::open`] and by [`Bus::sweep`].
 //!
 //! **Invariant:** the public interface shows no type of iceoryx2. This crate decides nothing about

@@ -85,6 +85,32 @@ impl FromStr for RobotName {
     }
 }
 
+/// What the name of the actors' service has behind the topic's.
+const ACTORS: &str = ":actors";
+
+/// Whether a topic may have this name: it has no colon, which names of other services do.
+pub(crate) const fn may_be_topic(name: &str) -> bool {
+    let bytes = name.as_bytes();
+    let mut at = 0;
+    while at < bytes.len() {
+        if bytes[at] == b':' {
+            return false;
+        }
+        at += 1;
+    }
+    true
+}
+
+/// The name of the service that a topic's actors read.
+pub(crate) fn of_actors(topic: &str) -> String {
+    format!("{topic}{ACTORS}")
+}
+
+/// The topic whose service, public or the actors', has that name.
+pub(crate) fn topic_of(service: &str) -> &str {
+    service.strip_suffix(ACTORS).unwrap_or(service)
+}
+
 /// The full name of a topic, request or wake service.
 pub(crate) fn service(robot: &RobotName, name: &str) -> String {
     format!("{FAMILY}/{robot}/{name}")
@@ -159,6 +185,15 @@ mod tests {
             parse_port(&port(Role::Observer, 9)),
             Some((Role::Observer, 9))
         );
+    }
+
+    #[test]
+    fn no_topic_has_the_name_of_actors() {
+        let actors = of_actors("sensor/line");
+        assert_eq!(actors, "sensor/line:actors");
+        assert!(may_be_topic("sensor/line") && !may_be_topic(&actors));
+        assert_eq!(topic_of(&actors), "sensor/line");
+        assert_eq!(topic_of("sensor/line"), "sensor/line");
     }
 
     #[test]

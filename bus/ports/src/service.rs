@@ -1,8 +1,11 @@
 //! Opening services: names, limits, the layout check, and what each refusal means.
 //!
-//! A topic admits 64 observers, twice its actors and 8 further subscribers
+//! The public service of a topic admits 64 observers, twice its actors and 8 further subscribers
 //! ([`Qos::max_subscribers`]). So keepers and restarted services get a place even when observers
-//! have taken all of theirs; the 65th observer is counted and refused.
+//! have taken all of theirs; the 65th observer is counted and refused. The actors' own service,
+//! where a topic has one, admits actors only ([`Qos::max_acting`]). Both have the same layout,
+//! queue and history, and a process that has the actors' service open has the public one open too.
+//! So a tool that knows the topic's name finds the topic as long as anybody uses it.
 
 use iceoryx2::prelude::{PortFactory, Service, ServiceName};
 use iceoryx2::service::builder::event::EventOpenOrCreateError;
@@ -11,7 +14,7 @@ use iceoryx2::service::builder::request_response::RequestResponseOpenOrCreateErr
 use iceoryx2::service::messaging_pattern::MessagingPattern;
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
-use lager_topics::Description;
+use lager_topics::{Description, Qos};
 
 use crate::bus::Bus;
 use crate::error::PortError;
@@ -45,15 +48,42 @@ pub(crate) type RequestService = request_response::PortFactory<Ipc, Bytes, Heade
 
 pub(crate) type EventService = event::PortFactory<Ipc>;
 
-/// Opens the service of a topic, or creates it with the limits of the table.
-pub(crate) fn topic(bus: &Bus, kind: &Kind) -> Result<TopicService, PortError> {
+/// One of a topic's services.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// The one under the topic's name.
+    Public,
+    /// The one that the actors read, of a topic that serves them first.
+    Actors,
+}
+
+impl Side {
+    fn name(self, topic: &str) -> String {
+        match self {
+            Self::Public => topic.to_owned(),
+            Self::Actors => name::of_actors(topic),
+        }
+    }
+
+    /// Places for subscribers.
+    pub(crate) const fn places(self, qos: &Qos) -> usize {
+        match self {
+            Self::Public => qos.max_subscribers(),
+            Self::Actors => qos.max_acting(),
+        }
+    }
+}
+
+/// Opens a service of a topic, or creates it with the limits of the table.
+pub(crate) fn topic(bus: &Bus, kind: &Kind, side: Side) -> Result<TopicService, PortError> {
+    let name = side.name(kind.name);
     patiently(bus, kind.name, || {
         let qos = kind.qos;
         let nodes = qos.max_nodes();
         let limited = || {
-            Ok(builder(bus, bus.robot(), kind.name, &(kind.payload)())?
+            Ok(builder(bus, bus.robot(), &name, &(kind.payload)())?
                 .max_publishers(qos.max_publishers())
-                .max_subscribers(qos.max_subscribers())
+                .max_subscribers(side.places(&qos))
                 .max_nodes(nodes)
                 .subscriber_max_buffer_size(qos.buffer)
                 .subscriber_max_borrowed_samples(MAX_HELD)
@@ -69,14 +99,16 @@ pub(crate) fn topic(bus: &Bus, kind: &Kind) -> Result<TopicService, PortError> {
     })
 }
 
-/// Opens the service of a robot's topic if it exists. Never creates it.
+/// Opens a service of a robot's topic if it exists. Never creates it.
 pub(crate) fn existing_topic(
     bus: &Bus,
     robot: &RobotName,
     kind: &Kind,
+    side: Side,
 ) -> Result<Option<TopicService>, PortError> {
+    let name = side.name(kind.name);
     patiently(bus, kind.name, || {
-        match builder(bus, robot, kind.name, &(kind.payload)())?
+        match builder(bus, robot, &name, &(kind.payload)())?
             .open_with_attributes(&required(kind.layout))
         {
             Ok(service) => Ok(Some(service)),
@@ -89,13 +121,19 @@ pub(crate) fn existing_topic(
     })
 }
 
-/// Opens the service of a topic that this process need not know, with the description that its
+/// Opens a service of a topic that this process need not know, with the description that its
 /// creator gave, if it exists.
 pub(crate) fn found(
     bus: &Bus,
     robot: &RobotName,
-    name: &str,
+    topic: &str,
+    side: Side,
 ) -> Result<Option<(TopicService, Description)>, PortError> {
+    if !name::may_be_topic(topic) {
+        return Ok(None);
+    }
+    let service = side.name(topic);
+    let name = service.as_str();
     let differs = |difference| {
         let topic = name.to_owned();
         Fault::Lasting(PortError::OtherLayout { topic, difference })

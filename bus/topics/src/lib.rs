@@ -40,9 +40,10 @@ pub use role::{Role, UnknownRole};
 pub use schema::{Field, FieldInfo, Make, Payload, Schema, StructInfo, bytes_of};
 pub use stamp::Stamp;
 pub use table::{
-    BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder,
-    MissionQueue, NavBlocks, NavInputs, NavMap, NavRoute, NavStatus, OBSERVERS, OperatorInput, Qos,
-    Request, SERVICE_SLOTS, SensorDistance, SensorLine, SteeringCommand, SteeringState, TOPICS,
-    Topic, TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest, by_id, id, visit,
+    BridgeRequest, LARGEST_COPY, LatencyCommand, LatencyPath, LinkHealth, LogThought, MissionEvent,
+    MissionOrder, MissionQueue, NavBlocks, NavInputs, NavMap, NavRoute, NavStatus, OBSERVERS,
+    OperatorInput, Qos, Request, SERVICE_SLOTS, SensorDistance, SensorLine, SteeringCommand,
+    SteeringState, TOPICS, Topic, TopicEntry, TopicVisitor, TruthPose, UnknownTopic, WorldRequest,
+    by_id, id, visit,
 };
 pub use tag::{Coded, Tag};

@@ -2,6 +2,11 @@
 //!
 //! Names are relative: on the bus each stands behind `lager/<robot>/`.
 //!
+//! A topic with actors is two services, so that those who watch do not delay those who act. Actors
+//! read `<name>:actors`, which has few places. Everybody else, stock iceoryx2 included, reads
+//! `<name>`, where the writer puts a copy with the same stamp after it has rung the actors. A
+//! payload of more than 4 KiB is not copied; its topic keeps one service ([`Qos::copied`]).
+//!
 //! Line and distance frames queue 256 samples, other streams 16 or 64. The real images send a
 //! thousand of each frame a second, ten times what the simulated robot sends, and an ordinary
 //! machine may keep a service from its core for a quarter of a second. The longer queues cost 3 MiB
@@ -25,6 +30,9 @@ pub const OBSERVERS: usize = 64;
 /// keeps its last value, a restarted writer that reads it back, the station's display.
 pub const SERVICE_SLOTS: usize = 8;
 
+/// The largest payload that is copied, in bytes.
+pub const LARGEST_COPY: usize = 4096;
+
 /// Quality of service of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Qos {
@@ -38,6 +46,10 @@ pub struct Qos {
     pub actors: &'static [Role],
     /// Whether late joiners get the history also while nothing new is published.
     pub republish: bool,
+    /// Whether actors have a service of their own and everybody else gets copies, made after the
+    /// actors were rung. Otherwise all read one service, which a payload of more than
+    /// [`LARGEST_COPY`] bytes must. It says nothing where there are no actors.
+    pub copied: bool,
 }
 
 impl Qos {
@@ -49,6 +61,7 @@ impl Qos {
             publishers: 1,
             actors: &[],
             republish: false,
+            copied: true,
         }
     }
 
@@ -66,10 +79,29 @@ impl Qos {
         Self { actors, ..self }
     }
 
-    /// Subscriber places: 64 observers, each actor twice (a killed one and its successor), and
-    /// [`SERVICE_SLOTS`].
+    /// The same with one service for all, for payloads of more than [`LARGEST_COPY`] bytes.
+    pub const fn uncopied(self) -> Self {
+        Self {
+            copied: false,
+            ..self
+        }
+    }
+
+    /// Whether actors have a service of their own, and are served before everybody else.
+    pub const fn serves_actors_first(&self) -> bool {
+        self.copied && !self.actors.is_empty()
+    }
+
+    /// Places on the service under the topic's name: 64 observers, each actor twice (a killed one
+    /// and its successor), and [`SERVICE_SLOTS`].
     pub const fn max_subscribers(&self) -> usize {
-        OBSERVERS + 2 * self.actors.len() + SERVICE_SLOTS
+        OBSERVERS + self.max_acting()
+    }
+
+    /// Places on the actors' own service: each actor twice, and [`SERVICE_SLOTS`] for roles that
+    /// several processes have.
+    pub const fn max_acting(&self) -> usize {
+        2 * self.actors.len() + SERVICE_SLOTS
     }
 
     /// Publisher places: each writer twice (a killed one and its successor), and two for keepers
@@ -232,77 +264,89 @@ topics! {
     // reports.
     SensorLine = "sensor/line", LineFrame,
     "The line under the robot, as the sensor board classifies it.",
-    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false }, every 10 ms;
+    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false,
+      copied: true }, every 10 ms;
 
     SensorDistance = "sensor/distance", DistanceFrame,
     "The distance to what is in front of the robot.",
-    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false }, every 10 ms;
+    { buffer: 256, history: 0, publishers: 1, actors: &[Role::Logic], republish: false,
+      copied: true }, every 10 ms;
 
     SteeringCommand = "steering/command", SteeringOrder,
     "Orders to the arbiter in the bridge.",
-    { buffer: 16, history: 0, publishers: 8, actors: &[Role::Bridge], republish: false };
+    { buffer: 16, history: 0, publishers: 8, actors: &[Role::Bridge], republish: false,
+      copied: true };
 
     SteeringState = "steering/state", SteeringReport,
     "What the steering board does, with the arm's servos.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false }, every 5 ms;
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Logic], republish: false,
+      copied: true }, every 5 ms;
 
     LinkHealth = "link/health", Health,
     "Both serial links and who may steer.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[Role::Logic], republish: true }, every 100 ms;
+    { buffer: 1, history: 1, publishers: 1, actors: &[Role::Logic], republish: true,
+      copied: true }, every 100 ms;
 
     NavStatus = "nav/status", NavigatorStatus,
     "Where the robot is and what it is doing.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 50 ms;
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true,
+      copied: false }, every 50 ms;
 
     NavMap = "nav/map", WarehouseMap,
     "The warehouse and where its products stand.",
-    { buffer: 1, history: 1, publishers: 4, actors: &[Role::Logic], republish: true };
+    { buffer: 1, history: 1, publishers: 4, actors: &[Role::Logic], republish: true, copied: true };
 
     NavRoute = "nav/route", Route,
     "The nodes the robot means to pass.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true, copied: false };
 
     NavBlocks = "nav/blocks", BlockedWays,
     "The ways on which something stands.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true, copied: false };
 
     // Some forty samples a second, a hundred and fifty at a chip's rates: who misses one has to wait
     // for the next navigator.
     NavInputs = "nav/inputs", ToldInputs,
     "What the navigator was told, in pieces, with proofs of what it did: for `bag play --verify`.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[], republish: false };
+    { buffer: 64, history: 0, publishers: 1, actors: &[], republish: false, copied: false };
 
     MissionOrder = "mission/order", Order,
     "Products to fetch.",
-    { buffer: 16, history: 0, publishers: 4, actors: &[Role::Logic], republish: false };
+    { buffer: 16, history: 0, publishers: 4, actors: &[Role::Logic], republish: false,
+      copied: true };
 
     MissionQueue = "mission/queue", OrderQueue,
     "The order under way and those that wait for their turn.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true };
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true, copied: false };
 
     MissionEvent = "mission/event", Event,
     "What happened on a mission.",
-    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Comm], republish: false };
+    { buffer: 64, history: 0, publishers: 1, actors: &[Role::Comm], republish: false,
+      copied: true };
 
     OperatorInput = "operator/input", Input,
     "Buttons and acknowledgements of a person.",
-    { buffer: 16, history: 0, publishers: 8, actors: &[Role::Logic, Role::Bridge], republish: false };
+    { buffer: 16, history: 0, publishers: 8, actors: &[Role::Logic, Role::Bridge], republish: false,
+      copied: true };
 
     LogThought = "log/thought", Thought,
     "What the services think, for people to read.",
-    { buffer: 64, history: 0, publishers: 8, actors: &[], republish: false };
+    { buffer: 64, history: 0, publishers: 8, actors: &[], republish: false, copied: false };
 
     LatencyPath = "latency/path", PathLatency,
     "How long sensor frames take until logic has decided, stage by stage, once a second.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 1000 ms;
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true,
+      copied: false }, every 1000 ms;
 
     LatencyCommand = "latency/command", CommandLatency,
     "How long logic's orders take from the frame they rest on to the wire, once a second.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 1000 ms;
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true,
+      copied: false }, every 1000 ms;
 
     TruthPose = "truth/pose", Truth,
     "The simulated world as it really is.",
-    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true }, every 20 ms;
+    { buffer: 1, history: 1, publishers: 1, actors: &[], republish: true,
+      copied: false }, every 20 ms;
 }
 
 /// `bridge/request`: changes of the mode and of settings, answered by the bridge.
@@ -406,10 +450,25 @@ mod tests {
     }
 
     #[test]
+    fn actors_are_served_first_where_there_are_any_and_the_payload_is_small() {
+        for entry in TOPICS {
+            let is_small = entry.layout.size <= LARGEST_COPY;
+            let expected = !entry.qos.actors.is_empty() && is_small;
+            assert_eq!(entry.qos.copied, expected, "{}", entry.name);
+            assert_eq!(entry.qos.serves_actors_first(), expected);
+        }
+        assert!(!Qos::stream(1).serves_actors_first(), "nobody acts");
+        assert!(Qos::stream(1).waking(&[Role::Guest]).serves_actors_first());
+        let large = Qos::stream(1).waking(&[Role::Guest]).uncopied();
+        assert!(!large.serves_actors_first());
+    }
+
+    #[test]
     fn observers_and_actors_have_places_beside_each_other() {
         for entry in TOPICS {
             let qos = entry.qos;
             assert!(qos.max_subscribers() >= OBSERVERS + 2 * qos.actors.len());
+            assert!(qos.max_acting() >= 2 * qos.actors.len());
             assert!(qos.max_publishers() > qos.publishers);
             assert!(qos.max_nodes() >= qos.max_subscribers() + qos.max_publishers());
             assert!(qos.actors.iter().all(|actor| !actor.is_observer()));

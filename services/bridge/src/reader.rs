@@ -159,6 +159,7 @@ impl<'a> Reader<'a> {
             if ring {
                 self.ringer.ring();
             }
+            self.sensor.catch_up();
             let now = self.clock.now();
             let due = self.clock.real(listener.next_due().saturating_sub(now));
             let count = port.read(&mut buffer, due.min(LOOK))?;
@@ -271,7 +272,7 @@ impl SensorOut {
         let sent = ports.line.loan().and_then(|mut loan| {
             *loan = frame;
             loan.cause(Cause::event(at_ns));
-            loan.send()
+            loan.send_ahead()
         });
         if let Err(error) = sent {
             self.complain(&error);
@@ -286,8 +287,20 @@ impl SensorOut {
         let sent = ports.distance.loan().and_then(|mut loan| {
             *loan = frame;
             loan.cause(Cause::event(at_ns));
-            loan.send()
+            loan.send_ahead()
         });
+        if let Err(error) = sent {
+            self.complain(&error);
+        }
+    }
+
+    /// Hands the frames of the last read to observers. Until then they would have been in the way
+    /// of the frames behind them.
+    fn catch_up(&mut self) {
+        let Some(ports) = &self.ports else {
+            return;
+        };
+        let sent = ports.line.catch_up().and(ports.distance.catch_up());
         if let Err(error) = sent {
             self.complain(&error);
         }

@@ -1,26 +1,26 @@
-//! The writing end of a topic that is only known by its name: bytes in, laid out as its creator says.
+//! The writing end of a topic that is only known by its name: bytes in, laid out as its creator
+//! says.
 
-use core::cell::Cell;
+use core::cell::{Cell, OnceCell};
 
-use iceoryx2::port::LoanError;
-use iceoryx2::port::publisher::PublisherCreateError;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
 use lager_topics::{Description, Role, Stamp, id};
 
-use super::writer::{Port, new_epoch};
-use super::{Here, behind};
+use super::outlet::Outlet;
+use super::writer::new_epoch;
 use crate::bus::Bus;
 use crate::doorbell::Rope;
 use crate::error::{PortError, SendError};
-use crate::service::{self, Fault, MAX_LOANS, patiently};
+use crate::service::{self, Side};
 
 /// A writer of somebody else's topic. The processes that act on such a topic are guests, so it
 /// rings guests.
 pub(crate) struct Foreign {
-    port: Here<Port>,
+    bus: Bus,
+    name: String,
+    outlet: Outlet,
+    /// The actors' service, since somebody has it open.
+    actors: OnceCell<Outlet>,
     size: usize,
-    align: usize,
     rope: Rope,
     pub(crate) next_sequence: Cell<u64>,
     pub(crate) epoch: u64,
@@ -30,75 +30,77 @@ impl Foreign {
     /// `None` if no process has the topic open.
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, name: &str) -> Result<Option<(Self, Description)>, PortError> {
-        let Some((service, description)) = service::found(bus, bus.robot(), name)? else {
+        let Some((service, description)) = service::found(bus, bus.robot(), name, Side::Public)?
+        else {
             return Ok(None);
         };
-        let limit = service.static_config().max_publishers();
-        let port = patiently(bus, name, || {
-            service
-                .publisher_builder()
-                .name(bus.port_name())
-                .max_loaned_samples(MAX_LOANS)
-                // As a writer of the table's topics: it never waits.
-                .backpressure_strategy(BackpressureStrategy::DiscardData)
-                .create()
-                .map_err(|error| match error {
-                    PublisherCreateError::ExceedsMaxSupportedPublishers => {
-                        let topic = name.to_owned();
-                        Fault::Full(PortError::TooManyWriters { topic, limit })
-                    }
-                    other => service::no_resources(name, other),
-                })
-        })?;
-        let details = service.static_config().message_type_details();
         let writer = Self {
-            port: Here::new(port),
+            bus: bus.clone(),
+            name: name.to_owned(),
+            outlet: Outlet::on(bus, name, service)?,
+            actors: OnceCell::new(),
             size: description.size(),
-            align: details.payload.alignment(),
             rope: Rope::to(bus, Role::Guest, id(name))?,
             next_sequence: Cell::new(0),
             // Taken after the port exists, as a typed writer does.
             epoch: new_epoch(),
         };
+        writer.look_for_actors()?;
         Ok(Some((writer, description)))
     }
 
-    /// Sends a payload with that stamp, and rings those who act on it.
+    /// Opens the actors' service, if the topic has one by now and it is not open yet. Nobody says
+    /// whether it ever will.
+    fn look_for_actors(&self) -> Result<(), PortError> {
+        if self.actors.get().is_none()
+            && let Some((service, description)) =
+                service::found(&self.bus, self.bus.robot(), &self.name, Side::Actors)?
+            && description.size() == self.size
+        {
+            let _ = self.actors.set(Outlet::on(&self.bus, &self.name, service)?);
+        }
+        Ok(())
+    }
+
+    /// Sends a payload with that stamp: to those who act on it, who are rung, and then to everybody
+    /// else.
     ///
     /// # Panics
     /// When there are not as many bytes as a payload has.
     #[inline(never)]
     pub(crate) fn deliver(&self, payload: &[u8], stamp: Stamp) -> Result<(), SendError> {
         assert_eq!(payload.len(), self.size, "a payload's bytes");
-        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
-        let sample = unsafe { self.port.loan_custom_payload(1) };
-        let sample = sample.map_err(|error| match error {
-            LoanError::ExceedsMaxLoans => SendError::TooManyLoans { limit: MAX_LOANS },
-            other => SendError::Transport(other.into()),
-        })?;
-        // SAFETY: memory that others have written is initialised, and bytes are all that it is
-        // taken for here.
-        let mut sample = unsafe { sample.assume_init() };
-        let header = core::ptr::NonNull::from(sample.user_header_mut());
-        let at = behind(header, size_of::<Stamp>(), self.align);
-        // SAFETY: `service::found` has made sure that header and payload are so large. The loan is
-        // ours, and `payload` is our own memory.
-        unsafe {
-            header.cast::<Stamp>().write(stamp);
-            at.as_ptr()
-                .copy_from_nonoverlapping(payload.as_ptr(), payload.len());
+        let acting = self.actors.get();
+        let acted = acting.map_or(Ok(()), |outlet| put(outlet, payload, stamp));
+        if acting.is_some() {
+            self.rope.ring();
         }
-        let sent = sample.send();
-        self.rope.ring();
-        match sent {
-            Ok(_) => Ok(()),
-            Err(error) => Err(SendError::Transport(error.into())),
+        let sent = put(&self.outlet, payload, stamp);
+        if acting.is_none() {
+            self.rope.ring();
         }
+        acted.and(sent)
     }
 
-    /// Connects to readers that have come, and gives them their history.
+    /// Connects to readers that have come, and gives them their history. Samples reach actors that
+    /// have come first from now on.
     pub(crate) fn tick(&self) {
-        // A reader that cannot be connected now is tried again with the next change.
-        let _ = self.port.update_connections();
+        // What cannot be opened now is tried again at the next tick.
+        let _ = self.look_for_actors();
+        self.outlet.tick();
+        if let Some(actors) = self.actors.get() {
+            actors.tick();
+        }
     }
+}
+
+fn put(outlet: &Outlet, payload: &[u8], stamp: Stamp) -> Result<(), SendError> {
+    let lent = outlet.lend()?;
+    // SAFETY: `service::found` has made sure that a payload is so large. The loan is ours, and
+    // `payload` is our own memory.
+    unsafe {
+        let to = lent.payload().as_ptr();
+        to.copy_from_nonoverlapping(payload.as_ptr(), payload.len());
+    }
+    lent.send(stamp)
 }

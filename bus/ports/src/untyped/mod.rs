@@ -22,7 +22,9 @@
 )]
 
 mod asking;
+mod copies;
 mod foreign;
+mod outlet;
 mod reader;
 mod writer;
 
@@ -34,14 +36,17 @@ use iceoryx2::node::Node;
 use iceoryx2::service::marker::{CustomHeaderMarker, CustomPayloadMarker};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use iceoryx2_bb_elementary_traits::type_name::TypeName;
-use lager_topics::{Field, Make, Qos, Request, Role, Schema, Stamp, Topic};
+use lager_topics::{Field, LARGEST_COPY, Make, Qos, Request, Role, Schema, Stamp, Topic};
 
+use crate::name;
+use crate::service::{Side, TopicService};
 use crate::transport::Ipc;
 
 pub(crate) use asking::{Answerer, Asker};
 pub(crate) use foreign::Foreign;
+pub(crate) use outlet::{Lent, republish_states};
 pub(crate) use reader::{Reader, Taken};
-pub(crate) use writer::{Lent, Ring, Writer, republish_states};
+pub(crate) use writer::{To, Writer};
 
 /// What a payload is to the transport.
 pub(crate) type Bytes = [CustomPayloadMarker];
@@ -64,6 +69,16 @@ pub(crate) struct Kind {
 
 impl Kind {
     pub(crate) const fn of<T: Topic>() -> Self {
+        const {
+            assert!(
+                name::may_be_topic(T::NAME),
+                "a topic's name has no colon; names of the bus's own services have one"
+            );
+            assert!(
+                !T::QOS.serves_actors_first() || size_of::<T::Payload>() <= LARGEST_COPY,
+                "a payload so large is not copied for observers: end the QOS with `.uncopied()`"
+            );
+        }
         Self {
             name: T::NAME,
             id: T::ID,
@@ -71,6 +86,15 @@ impl Kind {
             payload: detail::<T::Payload>,
             make: T::Payload::MAKE,
             layout: [T::Payload::HASH, Stamp::HASH],
+        }
+    }
+
+    /// The service from which a process of that role reads.
+    pub(crate) fn side(&self, role: Role) -> Side {
+        if self.qos.serves_actors_first() && self.qos.actors.contains(&role) {
+            Side::Actors
+        } else {
+            Side::Public
         }
     }
 
@@ -155,7 +179,7 @@ macro_rules! ends_here {
 }
 use ends_here;
 
-ends_here!(Node<Ipc>);
+ends_here!(Node<Ipc>, TopicService);
 
 impl<T: Ends> Here<T> {
     pub(crate) fn new(value: T) -> Self {

@@ -15,7 +15,7 @@ use crate::bus::Bus;
 use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError};
 use crate::name;
-use crate::service::{self, Fault, MAX_HELD, TopicService, patiently};
+use crate::service::{self, Fault, MAX_HELD, Side, TopicService, patiently};
 use crate::streams::{Newest, Streams};
 use crate::transport::Ipc;
 
@@ -27,6 +27,9 @@ pub(crate) struct Reader {
     newest: Newest,
     /// Writers that could not be connected to.
     unreached: Arc<AtomicU32>,
+    /// The public service, which an actor does not read, but keeps for those who look for the
+    /// topic.
+    _public: Option<Here<TopicService>>,
 }
 
 type Port = Subscriber<Ipc, Bytes, Header>;
@@ -44,10 +47,17 @@ pub(crate) struct Taken {
 impl Reader {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
-        Self::of(bus, kind.name, &service::topic(bus, kind)?)
+        let public = service::topic(bus, kind, Side::Public)?;
+        match kind.side(bus.role()) {
+            Side::Public => Self::of(bus, kind.name, &public),
+            Side::Actors => Ok(Self {
+                _public: Some(Here::new(public)),
+                ..Self::of(bus, kind.name, &service::topic(bus, kind, Side::Actors)?)?
+            }),
+        }
     }
 
-    /// A reader of the topic called `name`, whose service this is.
+    /// A reader of the topic called `name`, of which this is a service.
     #[inline(never)]
     pub(crate) fn of(bus: &Bus, name: &str, service: &TopicService) -> Result<Self, PortError> {
         let limits = service.static_config();
@@ -85,6 +95,7 @@ impl Reader {
             streams: Streams::new(Clock::monotonic_ns()),
             newest: Newest::default(),
             unreached,
+            _public: None,
         })
     }
 

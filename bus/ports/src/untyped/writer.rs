@@ -1,30 +1,28 @@
-//! The writing end of a topic.
+//! The writing end of a topic: actors first, everybody else after they were rung.
 
-use core::cell::{Cell, RefCell};
-use core::ptr::NonNull;
-use std::rc::{Rc, Weak};
+use core::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use iceoryx2::port::LoanError;
-use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
-use iceoryx2::sample_mut::SampleMut;
 use lager_topics::Stamp;
 
-use super::{Bytes, Header, Here, Kind, behind, ends_here};
+use super::copies::Copies;
+use super::outlet::{Lent, Outlet};
+use super::{Here, Kind, ends_here};
 use crate::bus::Bus;
 use crate::cause::Cause;
 use crate::clock::Clock;
 use crate::doorbell::{Rope, StandardListeners};
 use crate::error::{PortError, SendError};
-use crate::service::{self, Fault, MAX_LOANS, patiently};
-use crate::transport::Ipc;
+use crate::service::Side;
 
 /// [`crate::Publisher`] without the payload's type.
 pub(crate) struct Writer {
-    port: Rc<Here<Port>>,
-    payload_align: usize,
+    /// Where the actors read: their own service, or the topic's only one.
+    outlet: Outlet,
+    /// Where everybody else does, if the actors have their own.
+    copies: Option<Copies>,
+    /// Everybody else has not got the last sample yet.
+    behind: Cell<bool>,
     standard: Here<StandardListeners>,
     ropes: Box<[Rope]>,
     next_sequence: Cell<u64>,
@@ -32,38 +30,18 @@ pub(crate) struct Writer {
     writer: u32,
 }
 
-pub(super) type Port = Publisher<Ipc, Bytes, Header>;
-type Loaned = SampleMut<Ipc, Bytes, Header>;
+ends_here!(StandardListeners);
 
-ends_here!(Port, Loaned, StandardListeners);
-
-thread_local! {
-    /// The ports of this thread that write states.
-    static STATES: RefCell<Vec<Weak<Here<Port>>>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Gives readers that have come since to the states of this thread their history.
-pub(crate) fn republish_states() {
-    // A thread that is ending has no states any more.
-    let _ = STATES.try_with(|states| {
-        for port in states.borrow().iter().filter_map(Weak::upgrade) {
-            // As in `tick`.
-            let _ = port.update_connections();
-        }
-    });
-}
-
-/// A sample on loan; dropped unsent it leaves no trace.
-pub(crate) struct Lent {
-    sample: Here<Loaned>,
-    payload: NonNull<u8>,
-}
-
-/// Which processes are rung for a sample.
+/// Who gets a sample at once.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ring {
+pub(crate) enum To {
+    /// First the actors, who are rung, then everybody else.
+    All,
+    /// The same without the ring.
+    AllQuietly,
+    /// The actors, who are rung. Everybody else gets it when the writer is asked to catch up, sends
+    /// again or ends.
     Actors,
-    Nobody,
 }
 
 impl Writer {
@@ -76,40 +54,19 @@ impl Writer {
             .map(|actor| Rope::to(bus, *actor, kind.id))
             .collect::<Result<_, _>>()?;
         let standard = StandardListeners::of(bus, kind)?;
-        let service = service::topic(bus, kind)?;
-        let port = patiently(bus, kind.name, || {
-            service
-                .publisher_builder()
-                .name(bus.port_name())
-                .max_loaned_samples(MAX_LOANS)
-                // With overflow there is always room; whatever else happens, never wait.
-                .backpressure_strategy(BackpressureStrategy::DiscardData)
-                .create()
-                .map_err(|error| match error {
-                    PublisherCreateError::ExceedsMaxSupportedPublishers => {
-                        Fault::Full(PortError::TooManyWriters {
-                            topic: kind.name.to_owned(),
-                            limit: kind.qos.max_publishers(),
-                        })
-                    }
-                    other => service::no_resources(kind.name, other),
-                })
-        })?;
-        let details = service.static_config().message_type_details();
-        let port = Rc::new(Here::new(port));
-        if kind.qos.republish {
-            STATES.with_borrow_mut(|states| {
-                states.retain(|state| state.strong_count() > 0);
-                states.push(Rc::downgrade(&port));
-            });
-        }
+        let (copies, side) = if kind.qos.serves_actors_first() {
+            (Some(Copies::new(bus, kind)?), Side::Actors)
+        } else {
+            (None, Side::Public)
+        };
         Ok(Self {
-            port,
-            payload_align: details.payload.alignment(),
+            outlet: Outlet::new(bus, kind, side)?,
+            copies,
+            behind: Cell::new(false),
             standard: Here::new(standard),
             ropes,
             next_sequence: Cell::new(0),
-            // Taken after the port exists: a subscriber that is older than the epoch was there for
+            // Taken after the ports exist: a subscriber that is older than the epoch was there for
             // every sample, and may count its losses from 0 on.
             epoch: new_epoch(),
             writer: std::process::id(),
@@ -119,16 +76,7 @@ impl Writer {
     /// Takes a sample. Its payload is whatever was there before.
     #[inline(never)]
     pub(crate) fn lend(&self) -> Result<Lent, SendError> {
-        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
-        let sample = unsafe { self.port.loan_custom_payload(1) }.map_err(refused)?;
-        // SAFETY: memory that others have written is initialised, and bytes are all that it is
-        // taken for here.
-        let mut sample = unsafe { sample.assume_init() };
-        let header = NonNull::from(sample.user_header_mut());
-        Ok(Lent {
-            payload: behind(header, size_of::<Stamp>(), self.payload_align),
-            sample: Here::new(sample),
-        })
+        self.outlet.lend()
     }
 
     /// Sends a sample that follows from `cause`, as published at that time.
@@ -138,7 +86,7 @@ impl Writer {
         lent: Lent,
         cause: Cause,
         publish_time_ns: u64,
-        ring: Ring,
+        to: To,
     ) -> Result<(), SendError> {
         let sequence = self.next_sequence.get();
         self.next_sequence.set(sequence + 1);
@@ -149,7 +97,7 @@ impl Writer {
             writer: self.writer,
             ..Stamp::default()
         });
-        self.hand_over(lent, stamp, ring)
+        self.hand_over(lent, stamp, to)
     }
 
     /// Sends a sample with that stamp.
@@ -158,34 +106,49 @@ impl Writer {
         &self,
         lent: Lent,
         stamp: Stamp,
-        ring: Ring,
+        to: To,
     ) -> Result<(), SendError> {
-        self.hand_over(lent, stamp, ring)
+        self.hand_over(lent, stamp, to)
     }
 
     #[inline(always)]
-    fn hand_over(&self, mut lent: Lent, stamp: Stamp, ring: Ring) -> Result<(), SendError> {
-        let header = NonNull::from(lent.sample.user_header_mut()).cast::<Stamp>();
-        // SAFETY: the service's header is a `Stamp` (`Kind::header`), and the loan is ours.
-        unsafe { header.write(stamp) };
-        let sent = lent.sample.take().send();
-        if ring == Ring::Actors {
+    fn hand_over(&self, lent: Lent, stamp: Stamp, to: To) -> Result<(), SendError> {
+        let before = self.catch_up();
+        if let Some(copies) = &self.copies {
+            copies.take(&stamp, lent.payload());
+        }
+        let sent = lent.send(stamp);
+        if to != To::AllQuietly {
             for rope in &self.ropes {
                 rope.ring();
             }
         }
-        self.standard.notify();
-        match sent {
-            Ok(_) => Ok(()),
-            Err(error) => Err(SendError::Transport(error.into())),
+        self.behind.set(true);
+        let after = match to {
+            To::All | To::AllQuietly => self.catch_up(),
+            To::Actors => Ok(()),
+        };
+        sent.and(before).and(after)
+    }
+
+    /// Hands the last sample to everybody but the actors, if that is still to be done.
+    #[inline]
+    pub(crate) fn catch_up(&self) -> Result<(), SendError> {
+        if !self.behind.replace(false) {
+            return Ok(());
         }
+        let copied = self.copies.as_ref().map_or(Ok(()), Copies::publish);
+        self.standard.notify();
+        copied
     }
 
     /// Connects to readers that have come, and gives them their history.
     #[inline(never)]
     pub(crate) fn tick(&self) {
-        // A reader that cannot be connected now is tried again with the next change.
-        let _ = self.port.update_connections();
+        self.outlet.tick();
+        if let Some(copies) = &self.copies {
+            copies.tick();
+        }
     }
 
     /// Start of this writer's life.
@@ -199,17 +162,10 @@ impl Writer {
     }
 }
 
-impl Lent {
-    /// Where the payload is, aligned and large enough for one; valid as long as this is.
-    pub(crate) fn payload(&self) -> NonNull<u8> {
-        self.payload
-    }
-}
-
-fn refused(error: LoanError) -> SendError {
-    match error {
-        LoanError::ExceedsMaxLoans => SendError::TooManyLoans { limit: MAX_LOANS },
-        other => SendError::Transport(other.into()),
+impl Drop for Writer {
+    fn drop(&mut self) {
+        // Who reads the public service counts a copy that failed as lost.
+        let _ = self.catch_up();
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView;
+use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::{
     AttributeVerifier, CallbackProgression, FilePath, Node, NodeBuilder, NodeState, PortFactory,
     SemanticString, Service, ServiceName, SignalHandlingMode, ipc,
@@ -12,7 +13,7 @@ use iceoryx2::prelude::{
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
 use iceoryx2::service::port_factory::event;
-use lager_ports::{Cause, Clock, Difference, Policy, PortError, Wake};
+use lager_ports::{Cause, Clock, Difference, Peer, Policy, PortError, Wake};
 use lager_topics::{
     Answer, Ask, BridgeRequest, LineFrame, NavStatus, NavigatorStatus, Qos, Request, Role, Schema,
     SensorLine, Stamp, Topic,
@@ -45,8 +46,16 @@ fn name(relative: &str) -> ServiceName {
     ServiceName::new(&format!("lager/r1/{relative}")).unwrap()
 }
 
+/// The service that everybody but the actors reads.
 fn line(node: &Node<ipc::Service>) -> Builder<LineFrame, Stamp, ipc::Service> {
-    node.service_builder(&name(SensorLine::NAME))
+    line_service(node, SensorLine::NAME)
+}
+
+fn line_service(
+    node: &Node<ipc::Service>,
+    service: &str,
+) -> Builder<LineFrame, Stamp, ipc::Service> {
+    node.service_builder(&name(service))
         .publish_subscribe::<LineFrame>()
         .user_header::<Stamp>()
 }
@@ -94,34 +103,45 @@ fn a_stock_subscriber_gets_our_samples_with_their_stamps() {
 }
 
 #[test]
-fn our_subscriber_gets_the_samples_of_a_stock_publisher() {
+fn our_subscribers_get_the_samples_of_a_stock_publisher_on_their_service() {
     let domain = Domain::new();
     let node = stock(&domain);
-    let bus = domain.open(Role::Logic);
-    let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
-    let publisher = line(&node)
-        .open_with_attributes(&schema::<LineFrame, Stamp>())
-        .unwrap()
-        .publisher_builder()
-        .create()
-        .unwrap();
+    let mut readers = [Role::Logic, Role::Observer]
+        .map(|role| domain.open(role).subscriber::<SensorLine>().unwrap());
+    // A stock program that is to be acted upon writes to the actors' service too: no program moves
+    // the robot by writing to what others only watch.
+    let publishers = ["sensor/line:actors", SensorLine::NAME].map(|service| {
+        let service = line_service(&node, service)
+            .open_with_attributes(&schema::<LineFrame, Stamp>())
+            .unwrap();
+        service.publisher_builder().create().unwrap()
+    });
     for number in 0..500 {
-        let mut sample = publisher.loan().unwrap();
-        *sample.payload_mut() = frame(number);
-        *sample.user_header_mut() = Stamp {
-            // Every third is missing.
-            sequence: u64::from(number) * 3 / 2,
-            epoch: 1,
-            writer: 7,
-            ..Stamp::default()
-        };
-        assert_eq!(sample.send().unwrap(), 1);
-        let received = subscriber.receive().unwrap().unwrap();
-        assert_eq!(*received, frame(number));
-        assert_eq!(received.stamp().writer, 7);
+        for side in 0..2 {
+            let mut sample = publishers[side].loan().unwrap();
+            *sample.payload_mut() = frame(number);
+            *sample.user_header_mut() = Stamp {
+                // Every third is missing.
+                sequence: u64::from(number) * 3 / 2,
+                epoch: 1,
+                writer: 7,
+                ..Stamp::default()
+            };
+            assert_eq!(sample.send().unwrap(), 1);
+            let received = readers[side].receive().unwrap().unwrap();
+            assert_eq!(*received, frame(number));
+            assert_eq!(received.stamp().writer, 7);
+            drop(received);
+            assert!(readers[1 - side].receive().unwrap().is_none());
+        }
     }
-    assert_eq!(subscriber.received(), 500);
-    assert_eq!(subscriber.lost(), 249);
+    for reader in &readers {
+        assert_eq!((reader.received(), reader.lost()), (500, 249));
+    }
+    // It is one writer, as it is one program.
+    let line = domain.open(Role::Observer).topics().unwrap().remove(0);
+    assert_eq!((line.publishers, line.subscribers), (1, 2));
+    assert_eq!(line.writers, [Peer { role: None, pid: 0 }]);
 }
 
 #[test]
@@ -228,6 +248,15 @@ fn line_events(node: &Node<ipc::Service>) -> event::PortFactory<ipc::Service> {
         .event()
         .open_or_create()
         .unwrap()
+}
+
+/// A stock listener there, with the node that keeps it.
+pub(crate) fn stock_listener_of_line(
+    domain: &Domain,
+) -> (Node<ipc::Service>, Listener<ipc::Service>) {
+    let node = stock(domain);
+    let listener = line_events(&node).listener_builder().create().unwrap();
+    (node, listener)
 }
 
 #[test]

@@ -249,7 +249,7 @@ fn description_of_line(domain: &Domain) -> PathBuf {
         .find(|path| {
             path.extension().is_some_and(|end| end == "service")
                 && std::fs::read_to_string(path).is_ok_and(|text| {
-                    text.contains("sensor/line") && text.contains("PublishSubscribe")
+                    text.contains("sensor/line\"") && text.contains("PublishSubscribe")
                 })
         })
         .expect("the topic's description lies in the folder")

@@ -2,6 +2,7 @@
 //!
 //! Every test has a bus of its own and checks at its end that nothing is left of it.
 
+mod actors;
 mod bells;
 mod damage;
 mod domain;

@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig, Cause, Policy};
 use lager_topics::{
-    Answer, BridgeRequest, NavStatus, NavigatorStatus, Outcome, Role, SensorLine, SteeringCommand,
+    Answer, BridgeRequest, Health, LinkHealth, NavStatus, NavigatorStatus, Outcome, Role,
+    SensorLine, SteeringCommand,
 };
 
 use crate::domain::{Domain, frame};
@@ -104,6 +105,36 @@ fn player() {
             let publisher = bus.publisher::<SensorLine>().unwrap();
             for number in 0..10 {
                 publisher.send(Cause::OWN, frame(number)).unwrap();
+            }
+            ready();
+            until_parent_ends();
+        }
+        "line-writer-ahead" => {
+            let bus = open(Role::Bridge);
+            let publisher = bus.publisher::<SensorLine>().unwrap();
+            for number in 0..10 {
+                let mut loan = publisher.loan().unwrap();
+                *loan = frame(number);
+                loan.send_ahead().unwrap();
+            }
+            ready();
+            until_parent_ends();
+        }
+        "line-actor" => {
+            let bus = open(Role::Logic);
+            let _subscriber = bus.subscriber::<SensorLine>().unwrap();
+            ready();
+            until_parent_ends();
+        }
+        "health-writer" => {
+            let bus = open(Role::Bridge);
+            let publisher = bus.publisher::<LinkHealth>().unwrap();
+            for bus_lost in 0..=7 {
+                let health = Health {
+                    bus_lost,
+                    ..Health::default()
+                };
+                publisher.send(Cause::event(1234), health).unwrap();
             }
             ready();
             until_parent_ends();

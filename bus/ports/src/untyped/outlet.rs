@@ -1,0 +1,154 @@
+//! A writer's port on one of a topic's services, and what is on loan from it.
+
+use core::cell::RefCell;
+use core::ptr::NonNull;
+use std::rc::{Rc, Weak};
+
+use iceoryx2::port::LoanError;
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
+use iceoryx2::sample_mut::SampleMut;
+use lager_topics::Stamp;
+
+use super::{Bytes, Header, Here, Kind, behind, ends_here};
+use crate::bus::Bus;
+use crate::error::{PortError, SendError};
+use crate::service::{self, Fault, MAX_LOANS, Side, TopicService, patiently};
+use crate::transport::Ipc;
+
+/// The port, with the service that it is on.
+pub(crate) struct Outlet {
+    port: Rc<Here<Port>>,
+    service: Here<TopicService>,
+    payload_align: usize,
+}
+
+type Port = Publisher<Ipc, Bytes, Header>;
+type Loaned = SampleMut<Ipc, Bytes, Header>;
+
+ends_here!(Port, Loaned);
+
+thread_local! {
+    /// The ports of this thread that write states.
+    static STATES: RefCell<Vec<Weak<Here<Port>>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Gives readers that have come since to the states of this thread their history.
+pub(crate) fn republish_states() {
+    // A thread that is ending has no states any more.
+    let _ = STATES.try_with(|states| {
+        for port in states.borrow().iter().filter_map(Weak::upgrade) {
+            // As in `tick`.
+            let _ = port.update_connections();
+        }
+    });
+}
+
+/// A sample on loan; dropped unsent it leaves no trace.
+pub(crate) struct Lent {
+    sample: Here<Loaned>,
+    payload: NonNull<u8>,
+}
+
+impl Outlet {
+    /// On a service of a topic of this process.
+    pub(crate) fn new(bus: &Bus, kind: &Kind, side: Side) -> Result<Self, PortError> {
+        let outlet = Self::on(bus, kind.name, service::topic(bus, kind, side)?)?;
+        if kind.qos.republish {
+            STATES.with_borrow_mut(|states| {
+                states.retain(|state| state.strong_count() > 0);
+                states.push(Rc::downgrade(&outlet.port));
+            });
+        }
+        Ok(outlet)
+    }
+
+    /// On a service of the topic called `name`.
+    pub(crate) fn on(bus: &Bus, name: &str, service: TopicService) -> Result<Self, PortError> {
+        let limits = service.static_config();
+        let port = patiently(bus, name, || {
+            service
+                .publisher_builder()
+                .name(bus.port_name())
+                .max_loaned_samples(MAX_LOANS)
+                // With overflow there is always room; whatever else happens, never wait.
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+                .map_err(|error| match error {
+                    PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                        Fault::Full(PortError::TooManyWriters {
+                            topic: name.to_owned(),
+                            limit: limits.max_publishers(),
+                        })
+                    }
+                    other => service::no_resources(name, other),
+                })
+        })?;
+        Ok(Self {
+            port: Rc::new(Here::new(port)),
+            payload_align: limits.message_type_details().payload.alignment(),
+            service: Here::new(service),
+        })
+    }
+
+    /// Takes a sample. Its payload is whatever was there before.
+    #[inline(always)]
+    pub(crate) fn lend(&self) -> Result<Lent, SendError> {
+        // SAFETY: a payload of a fixed size is one element, and the transport counts it.
+        let sample = unsafe { self.port.loan_custom_payload(1) }.map_err(refused)?;
+        // SAFETY: memory that others have written is initialised, and bytes are all that it is
+        // taken for here.
+        let mut sample = unsafe { sample.assume_init() };
+        let header = NonNull::from(sample.user_header_mut());
+        Ok(Lent {
+            payload: behind(header, size_of::<Stamp>(), self.payload_align),
+            sample: Here::new(sample),
+        })
+    }
+
+    /// Whether the service has a reader. A killed one counts until it is swept.
+    #[inline(always)]
+    pub(crate) fn is_read(&self) -> bool {
+        self.service.dynamic_config().number_of_subscribers() > 0
+    }
+
+    /// The size of a payload in bytes.
+    pub(crate) fn payload_size(&self) -> usize {
+        let details = self.service.static_config().message_type_details();
+        details.payload.size()
+    }
+
+    /// Connects to readers that have come, and gives them their history; lets go of those that have
+    /// left.
+    pub(crate) fn tick(&self) {
+        // A reader that cannot be connected now is tried again with the next change.
+        let _ = self.port.update_connections();
+    }
+}
+
+impl Lent {
+    /// Where the payload is, aligned and large enough for one; valid as long as this is.
+    pub(crate) fn payload(&self) -> NonNull<u8> {
+        self.payload
+    }
+
+    /// Sends it with that stamp.
+    #[inline(always)]
+    pub(crate) fn send(mut self, stamp: Stamp) -> Result<(), SendError> {
+        let header = NonNull::from(self.sample.user_header_mut()).cast::<Stamp>();
+        // SAFETY: the service's header is a `Stamp` (`Kind::header`), and the loan is ours.
+        unsafe { header.write(stamp) };
+        match self.sample.take().send() {
+            Ok(_) => Ok(()),
+            Err(error) => Err(SendError::Transport(error.into())),
+        }
+    }
+}
+
+fn refused(error: LoanError) -> SendError {
+    match error {
+        LoanError::ExceedsMaxLoans => SendError::TooManyLoans { limit: MAX_LOANS },
+        other => SendError::Transport(other.into()),
+    }
+}
