@@ -547,7 +547,7 @@ class Health(Layout):
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0xA00DE0A8674C5A1C
+    _hash_ = 0x75263013B255ADC2
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -567,7 +567,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0xEC3DAA975B12C40B
+    _hash_ = 0x414DBF7AFDA3ABFA
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -856,7 +856,7 @@ class OrderQueue(Layout):
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0x97B514E2194F9694
+    _hash_ = 0x49F20980C3D1C902
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -897,7 +897,7 @@ class Input(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0xAEFEEB2EAEC89D59
+    _hash_ = 0x0F333177D01A9294
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

@@ -125,6 +125,7 @@ class FailureKind(enum.IntEnum):
     Unreachable = 28
     MarkUnseen = 29
     CornerUnseen = 30
+    LineUnseen = 31
 
 class Remedy(enum.IntEnum):
     None_ = 0
@@ -140,6 +141,7 @@ class Remedy(enum.IntEnum):
     Resume = 10
     Mode = 11
     Link = 12
+    Calibrate = 13
 
 class Phase(enum.IntEnum):
     WaitingForMap = 0
@@ -314,6 +316,7 @@ class ThoughtKind(enum.IntEnum):
     CornerMissed = 55
     PicksByHand = 56
     PicksByItself = 57
+    OrderKept = 58
 
 class Joint(enum.IntEnum):
     Base = 0

@@ -474,15 +474,12 @@ fn a_clean_stop_leaves_the_robot_in_standby() {
                 .is_some_and(|state| state.left_duty == 100)
         });
     robot.hands.give(operator(1, FORWARD));
+    robot.steering.with(|board| board.halted = false);
     robot.bridge.take().unwrap().stop();
-    let (moves, failsafe, last) = robot.steering.with(|board| {
-        (
-            board.moves(),
-            board.failsafe,
-            *board.executed.last().unwrap(),
-        )
-    });
-    assert!(!moves && !failsafe);
+    let (moves, halted, last) = robot
+        .steering
+        .with(|board| (board.moves(), board.halted, *board.executed.last().unwrap()));
+    assert!(!moves && !halted);
     assert_eq!(last, STANDBY.code());
     let health = robot.hands.health.look().unwrap();
     assert_eq!(health.current_code, 0);

@@ -231,7 +231,7 @@ fn what_loses_samples_stands_first_and_is_marked() {
 fn rows_are_sorted_by_what_one_asks_for() {
     let mut model = driving();
     press(&mut model, ">");
-    assert_eq!(topics(&model)[0], "latency/path");
+    assert_eq!(topics(&model)[0], "latency/command");
     press(&mut model, ">");
     assert_eq!(topics(&model)[0], "steering/state");
     press(&mut model, "I");

@@ -28,6 +28,8 @@ pub(crate) struct SteeringBoard {
     pub(crate) ups: usize,
     /// The age limit has struck.
     pub(crate) failsafe: bool,
+    /// It has struck while the wheels turned.
+    pub(crate) halted: bool,
     /// It reports nothing; all else works.
     pub(crate) mute: bool,
     /// How often a packet with a command came.
@@ -55,6 +57,7 @@ impl SteeringBoard {
             restarts: 0,
             ups: 0,
             failsafe: false,
+            halted: false,
             mute: false,
             commands: 0,
             reset: ResetCause::PowerOn,
@@ -228,6 +231,7 @@ impl Peer for SteeringBoard {
     fn step(&mut self, now_us: u32, out: &mut Vec<u8>) {
         if now_us.wrapping_sub(self.heard_us) > AGE_LIMIT_US && self.last_seq.is_some() {
             self.failsafe = true;
+            self.halted |= self.moves();
             self.end(SteerFlags::ABORTED);
             self.code = WheelCommand::Standby.code();
         }
