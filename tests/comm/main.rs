@@ -129,13 +129,13 @@ fn a_gag_at_a_station_has_goods_fetched() {
         "--station",
         &address,
         "--speed",
-        "2",
+        "4",
         "--warehouse",
         file,
         "--mission",
         "1",
     ]);
-    let bus = domain.observe("r1", 2.0);
+    let bus = domain.observe("r1", 4.0);
     let mut events = bus.subscriber::<MissionEvent>().expect("a topic");
     let mut delivered = move |product| {
         wait_for("a delivery", || {
