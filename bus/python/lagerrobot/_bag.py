@@ -249,5 +249,7 @@ def _fill_list(into: Any, values: Any, topic: str) -> None:
     for index, value in enumerate(values):
         if isinstance(into[index], Layout):
             fill(into[index], value, topic)
+        elif isinstance(into[index], ctypes.Array):
+            _fill_list(into[index], value, topic)
         else:
             into[index] = value
