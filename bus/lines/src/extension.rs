@@ -124,6 +124,6 @@ pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
 pub use listed::{Block, Edge, Listed, Queued};
 pub use order::{Action, ActionError, LeaseMs, Mode, Order, Pick, Put};
-pub use report::{Event, EventKind, Latency, Report, Truth};
+pub use report::{Event, EventKind, Latency, Report, TruePose};
 pub use state::State;
 pub use thinks::Thinks;

@@ -21,7 +21,7 @@ const PERIOD_NS: u64 = 1_000_000_000;
 
 /// Boundaries of the stages of one order's way, in ns of `CLOCK_MONOTONIC`: the frame read, the
 /// order published, the order received by the bridge.
-type Way = [u64; 3];
+type Times = [u64; 3];
 
 /// Counts the ways of orders that rest on sensor frames.
 #[derive(Clone, Debug, Default)]
@@ -29,7 +29,7 @@ pub(crate) struct CommandMeter {
     counted: CommandLatency,
     /// How long the orders of this turn took to the bridge, in ns.
     received: Vec<u64, { SteeringCommand::QOS.buffer }>,
-    under_way: Option<(OrderKey, Way)>,
+    under_way: Option<(OrderKey, Times)>,
     told_ns: u64,
 }
 
@@ -92,7 +92,7 @@ impl CommandMeter {
 
 /// The way of an order that rests on a sensor frame; `None` for any other, and for one whose times
 /// cannot be true.
-fn way(stamp: &Stamp, received_ns: u64) -> Option<Way> {
+fn way(stamp: &Stamp, received_ns: u64) -> Option<Times> {
     if ![SensorLine::ID, SensorDistance::ID].contains(&stamp.cause_topic) {
         return None;
     }

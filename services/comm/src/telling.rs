@@ -6,12 +6,12 @@
 
 use lager_lines::extension::{
     Block, Degrees, Edge, Event, EventKind, Latency, Listed, Loads, Mode, Pick, Queued, Report,
-    Servos, State, Thinks, Truth,
+    Servos, State, Thinks, TruePose,
 };
 use lager_lines::{Coord, Name, ProductId, Text};
 use lager_topics::{
     BlockedWays, BoardHealth, Coded, Durations, Failure, LineFrame, Mode as BusMode, OrderQueue,
-    Pick as BusPick, Remedy, Route, Tag, Thought, Truth as BusTruth,
+    Pick as BusPick, Remedy, Route, Tag, Thought, Truth,
 };
 use lager_wire::{Binary, LineBits};
 
@@ -354,8 +354,8 @@ fn latency(counted: &Durations) -> Report {
     })
 }
 
-fn truth(truth: &BusTruth) -> Report {
-    Report::Truth(Truth {
+fn truth(truth: &Truth) -> Report {
+    Report::Truth(TruePose {
         x_mm: truth.x_mm.round() as i32,
         y_mm: truth.y_mm.round() as i32,
         // The world counts counter-clockwise from the right.

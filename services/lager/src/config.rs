@@ -19,7 +19,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use lager_plant::{MOST_OBSTACLES, Warehouse};
 use lager_ports::{BusConfig, Policy, RobotName};
-use lager_wire::ArmProfile;
+use lager_wire::{ArmProfile, SERVO_MAX};
 use serde::{Deserialize, Serialize};
 
 pub use buttons::ButtonsSection;
@@ -205,6 +205,11 @@ pub struct LogicSection {
     pub ranger_cm: u8,
     /// After how many seconds ways that were found blocked are tried again.
     pub try_again_s: u32,
+    /// The shoulder's servo when the claw is around goods in front of the robot, in units of 0.29
+    /// degrees.
+    pub reach_shoulder: u16,
+    /// The elbow's servo for that.
+    pub reach_elbow: u16,
     /// Who picks the goods up; none = as usual with the body ([`Config::pick`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pick: Option<PickBy>,
@@ -310,6 +315,8 @@ impl Default for LogicSection {
             low_battery_decivolts: config.low_battery_decivolts,
             ranger_cm: 80,
             try_again_s: config.try_again.as_secs() as u32,
+            reach_shoulder: config.reach_shoulder,
+            reach_elbow: config.reach_elbow,
             pick: None,
         }
     }
@@ -406,6 +413,16 @@ impl Config {
                 );
             }
         }
+        for (key, value) in [
+            ("reach_shoulder", self.logic.reach_shoulder),
+            ("reach_elbow", self.logic.reach_elbow),
+        ] {
+            if value > SERVO_MAX {
+                bail!(
+                    "[logic] {key} is {value}; a servo's position is from 0 to {SERVO_MAX}: step the arm to the goods with `lager arm`, and look with `lager topic echo steering/state`"
+                );
+            }
+        }
         let margin = self.navigator().ranger_margin_cm;
         if (1..=margin).contains(&self.logic.ranger_cm) {
             bail!(
@@ -465,6 +482,8 @@ impl Config {
             low_battery_decivolts: self.logic.low_battery_decivolts,
             ranger_cm: self.logic.ranger_cm,
             try_again: Duration::from_secs(self.logic.try_again_s.into()),
+            reach_shoulder: self.logic.reach_shoulder,
+            reach_elbow: self.logic.reach_elbow,
             pick: self.pick().into(),
             arm: self.arm,
             waiting: self.bus.policy(),
@@ -576,6 +595,7 @@ mod tests {
             ("[logic]\nsensor_ahead_mm = inf", "sensor_ahead_mm is inf"),
             ("[logic]\nsensor_ahead_mm = 160000.0", "sensor_ahead_mm"),
             ("[logic]\nturn_deg_per_s = 0.0", "turn_deg_per_s is 0"),
+            ("[logic]\nreach_elbow = 1024", "reach_elbow is 1024"),
             ("[logic]\ntape_mm = 90.0", "5 to 50"),
             ("[logic]\nranger_ahead_mm = -1.0", "ranger_ahead_mm is -1"),
             ("[logic]\nranger_cm = 1", "ranger_cm is 1;"),

@@ -78,6 +78,11 @@ pub struct LogicConfig {
     /// How far a joint may be from the carry pose while the robot drives with goods, in servo
     /// units of 0.29 degrees.
     pub carry_tolerance: u16,
+    /// Where the shoulder's servo is when the claw is around goods that stand as they should in front
+    /// of the robot, in servo units.
+    pub reach_shoulder: u16,
+    /// The elbow's servo for that.
+    pub reach_elbow: u16,
     /// How long goods must have been in the claw for the grip to be believed.
     pub grip_proof: Duration,
     /// How far the claw must be kept from closing to be holding something, in servo units.
@@ -151,6 +156,9 @@ impl Default for LogicConfig {
             pick: Pick::Manual,
             arm: ArmProfile::default(),
             carry_tolerance: 20,
+            // 250 mm ahead of the axle.
+            reach_shoulder: 311,
+            reach_elbow: 488,
             grip_proof: Duration::from_secs(6),
             held_margin: 40,
             low_battery_decivolts: 100,

@@ -14,13 +14,13 @@ const PERIOD_NS: u64 = 1_000_000_000;
 const TURN: usize = SensorLine::QOS.buffer + SensorDistance::QOS.buffer;
 
 /// Times of one frame, in ns of `CLOCK_MONOTONIC`: read, published, received.
-type Way = [u64; 3];
+type Times = [u64; 3];
 
 /// Counts the ways of frames.
 #[derive(Debug, Default)]
 pub(crate) struct FrameMeter {
     /// The frames of the present turn.
-    taken: Vec<Way, TURN>,
+    taken: Vec<Times, TURN>,
     counted: PathLatency,
     told_ns: u64,
 }

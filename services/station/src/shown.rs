@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use lager_lines::extension::{Block, Event, Latency, Listed, Queued, Report, State, Thinks, Truth};
+use lager_lines::extension::{
+    Block, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
+};
 use lager_lines::{Coord, Text};
 
 /// A value that a robot has told, and when.
@@ -27,7 +29,7 @@ pub struct Shown {
     /// What it is doing, twenty times a second.
     pub state: Option<Seen<State>>,
     /// Where a simulated one really is.
-    pub truth: Option<Seen<Truth>>,
+    pub truth: Option<Seen<TruePose>>,
     /// The nodes of its way. Of this and what follows only changes are told.
     pub route: Option<Seen<Listed<Coord>>>,
     /// The ways that it does not take.

@@ -49,7 +49,7 @@ pub enum Report {
     /// How long it takes to react.
     Latency(Latency),
     /// Where a simulated robot really is.
-    Truth(Truth),
+    Truth(TruePose),
 }
 
 /// What has happened on a mission (C8).
@@ -139,7 +139,7 @@ pub struct Latency {
 
 /// Where a simulated robot really is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Truth {
+pub struct TruePose {
     /// Middle of the axle, in mm to the right of node (0, 0).
     pub x_mm: i32,
     /// Middle of the axle, in mm up from node (0, 0).
@@ -179,7 +179,7 @@ impl Report {
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
             "latency" => |reader: &mut Reader<'_>| Latency::read(reader).map(Self::Latency),
-            "truth" => |reader: &mut Reader<'_>| Truth::read(reader).map(Self::Truth),
+            "truth" => |reader: &mut Reader<'_>| TruePose::read(reader).map(Self::Truth),
             _ => return None,
         };
         Some(read(&mut reader).and_then(|report| reader.end().map(|()| report)))
@@ -234,7 +234,7 @@ impl Latency {
     }
 }
 
-impl Truth {
+impl TruePose {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
         let mut way = || {
             let (least, most) = (i64::from(i32::MIN), i64::from(i32::MAX));
@@ -314,7 +314,7 @@ impl fmt::Display for Latency {
     }
 }
 
-impl fmt::Display for Truth {
+impl fmt::Display for TruePose {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             x_mm,

@@ -4,7 +4,7 @@ use lager_lines::command::Wheels;
 use lager_lines::conversation::{RobotLine, StationLine};
 use lager_lines::extension::{
     Action, Block, Degrees, Edge, Event, EventKind, Hello, Latency, LeaseMs, Listed, Loads, Mode,
-    Order, Pick, Put, Queued, Report, Servos, State, Thinks, Truth,
+    Order, Pick, Put, Queued, Report, Servos, State, Thinks, TruePose,
 };
 use lager_lines::gag::{Answer, ListWord, Query, Request, Telemetry};
 use lager_lines::strings::{Good, Goods, map_string, read_map};
@@ -258,7 +258,7 @@ fn report() -> impl Strategy<Value = Report> {
         }),
         (any::<i32>(), any::<i32>(), degrees(), of(product_id())).prop_map(
             |(x_mm, y_mm, heading, carrying)| {
-                Report::Truth(Truth {
+                Report::Truth(TruePose {
                     x_mm,
                     y_mm,
                     heading,

@@ -135,6 +135,10 @@ ranger_cm = {ranger}
 # After how many seconds ways that the robot has found blocked are tried again, before it calls a goal
 # unreachable.
 try_again_s = {try_again}
+# Where shoulder and elbow are when the claw is around goods that stand as they should in front of the
+# robot, in units of 0.29 degrees. A robot that picks by itself steps them there.
+reach_shoulder = {reach_shoulder}
+reach_elbow = {reach_elbow}
 # Who picks the goods up: \"manual\" (a person moves the arm and says when it is done) or \"auto\" (the
 # robot by itself). Unset, a person does on real boards, unless `--script` has it drive by itself, and
 # simulated and emulated robots do it by themselves.
@@ -239,6 +243,8 @@ debounce_ms = {debounce}
             ranger_ahead = self.logic.ranger_ahead_mm,
             ranger = self.logic.ranger_cm,
             try_again = self.logic.try_again_s,
+            reach_shoulder = self.logic.reach_shoulder,
+            reach_elbow = self.logic.reach_elbow,
             pick = unset("pick", self.logic.pick.map(PickBy::key)),
             seed = self.simulator.seed,
             obstacles = self.simulator.obstacles,

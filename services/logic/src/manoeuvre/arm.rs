@@ -16,11 +16,12 @@
 use core::time::Duration;
 
 use lager_topics::{FailureKind, Finish};
-use lager_wire::{ArmCommand, ArmProfile, Command};
+use lager_wire::{ArmCommand, Command};
 
 use super::helm::{Helm, Pause, STANDBY};
 use super::outcome::Outcome;
 use crate::arm::{ArmSeen, BASE, ELBOW, SHOULDER};
+use crate::config::LogicConfig;
 
 /// A joint is where it should be when no further step would bring it nearer.
 const NEAR: i32 = 2;
@@ -29,10 +30,6 @@ const MOST_STEPS: u16 = 400;
 /// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either
 /// side.
 const AIMS: [i16; 5] = [0, 21, -21, 42, -42];
-/// Where the claw is around goods that stand as they should, 250 mm ahead of the axle.
-const REACH_ELBOW: u16 = 488;
-/// The shoulder for that.
-const REACH_SHOULDER: u16 = 311;
 /// Moves of one attempt.
 const MOVES: u8 = 9;
 
@@ -215,7 +212,7 @@ impl ArmSequence {
             .is_some();
         let before = self.moves;
         while self.moves < MOVES {
-            match next_move(self.moves, AIMS[usize::from(self.attempt)], profile) {
+            match next_move(self.moves, AIMS[usize::from(self.attempt)], helm.config) {
                 Move::Once(command) => {
                     self.give(command, helm);
                     return None;
@@ -259,13 +256,13 @@ impl ArmSequence {
 }
 
 /// The moves of an attempt in their order: to the goods, and to where they are carried.
-fn next_move(done: u8, aim: i16, profile: &ArmProfile) -> Move {
-    let carry = &profile.carry;
+fn next_move(done: u8, aim: i16, config: &LogicConfig) -> Move {
+    let carry = &config.arm.carry;
     match done {
         0 => Move::Bring(&BASE_JOINT, carry.base.saturating_add_signed(aim)),
         1 => Move::Once(ArmCommand::Release),
-        2 => Move::Bring(&ELBOW_JOINT, REACH_ELBOW),
-        3 => Move::Bring(&SHOULDER_JOINT, REACH_SHOULDER),
+        2 => Move::Bring(&ELBOW_JOINT, config.reach_elbow),
+        3 => Move::Bring(&SHOULDER_JOINT, config.reach_shoulder),
         4 => Move::Once(ArmCommand::Squeeze),
         5 => Move::Bring(&SHOULDER_JOINT, carry.shoulder),
         6 => Move::Hold,
