@@ -181,7 +181,7 @@ fn a_bag_of_a_mission_has_what_the_bus_has_numbered() {
         "--mission",
         "1",
         "--speed",
-        "8",
+        "5",
         "--exit-when-done",
         "--no-station",
     ]);
