@@ -159,7 +159,7 @@ fn a_robot_delivers_while_its_station_sends_what_it_should_not() {
         "up",
         "--headless",
         "--speed",
-        "2",
+        "4",
         "--warehouse",
         file.to_str().expect("UTF-8"),
         "--station",

@@ -15,7 +15,7 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
         "up",
         "--headless",
         "--speed",
-        "2",
+        "4",
         "--listen",
         "127.0.0.1:0",
         "--gag",

@@ -138,7 +138,7 @@ fn a_robert_of_strangers_has_goods_fetched() {
         "up",
         "--headless",
         "--speed",
-        "2",
+        "4",
         "--warehouse",
         warehouse,
         "--station",
