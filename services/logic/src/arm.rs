@@ -16,25 +16,34 @@ const CLAW: usize = 7;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArmSeen {
     position: [u16; 8],
+    /// Which of them were heard in this life of the link.
+    heard: [bool; 8],
     claw_load: i16,
+    life: Option<u32>,
 }
 
 impl Default for ArmSeen {
     fn default() -> Self {
         Self {
             position: [SERVO_UNKNOWN; 8],
+            heard: [false; 8],
             claw_load: 0,
+            life: None,
         }
     }
 }
 
 impl ArmSeen {
-    /// A bridge that has just started knows no servo. What was known before still holds, since only
-    /// the bridge can move the arm.
+    /// A bridge that has just started knows no servo. What was known before is still believed of
+    /// an arm at rest, since only the bridge can move it; but see [`heard`](Self::heard).
     pub(crate) fn take(&mut self, report: &SteeringReport) {
-        for (known, heard) in self.position.iter_mut().zip(report.servo_position) {
-            if heard != SERVO_UNKNOWN {
-                *known = heard;
+        if self.life != Some(report.link_epoch) {
+            (self.life, self.heard) = (Some(report.link_epoch), [false; 8]);
+        }
+        let known = self.position.iter_mut().zip(&mut self.heard);
+        for ((known, is_heard), position) in known.zip(report.servo_position) {
+            if position != SERVO_UNKNOWN {
+                (*known, *is_heard) = (position, true);
             }
         }
         if report.servo_position[CLAW] != SERVO_UNKNOWN {
@@ -45,6 +54,17 @@ impl ArmSeen {
     /// Where a servo stands, if it has been heard.
     pub(crate) fn position(&self, servo: usize) -> Option<u16> {
         Some(self.position[servo]).filter(|position| *position != SERVO_UNKNOWN)
+    }
+
+    /// Where a servo stands, if it was heard in this life of the link. A board that has restarted
+    /// may have let the arm sag.
+    pub(crate) fn heard(&self, servo: usize) -> Option<u16> {
+        self.position(servo).filter(|_| self.heard[servo])
+    }
+
+    /// Which life of the link to the steering board the last report came from.
+    pub(crate) fn life(&self) -> Option<u32> {
+        self.life
     }
 
     /// The first joint that is not where `pose` has it, where it is, and where it should be.

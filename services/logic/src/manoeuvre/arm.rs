@@ -12,6 +12,10 @@
 //!
 //! The robot stands while the arm works. Its progress is published, so that a successor goes on
 //! with the same attempt; it repeats a move that may already have been made.
+//!
+//! When the steering board or the bridge has restarted, nobody knows where the arm is: without
+//! torque it sags. Then the attempt is made again and not counted: from its begin, or, so that the
+//! goods are not let go in the air, from the closing of the claw.
 
 use core::time::Duration;
 
@@ -32,6 +36,8 @@ const MOST_STEPS: u16 = 400;
 const AIMS: [i16; 5] = [0, 21, -21, 42, -42];
 /// Moves of one attempt.
 const MOVES: u8 = 9;
+/// The one that closes the claw.
+const SQUEEZE: u8 = 4;
 
 /// One move of an attempt.
 enum Move {
@@ -70,7 +76,7 @@ impl Joint {
     /// The command that brings it nearer, `None` when it is there. A servo that has not reported
     /// yet is not waited for: the first step makes it report.
     fn step_towards(&self, to: u16, arm: &ArmSeen) -> Option<ArmCommand> {
-        let Some(position) = arm.position(self.servo) else {
+        let Some(position) = arm.heard(self.servo) else {
             return Some(self.raise);
         };
         match i32::from(to) - i32::from(position) {
@@ -103,6 +109,8 @@ pub(crate) struct ArmSequence {
     step: Option<ArmCommand>,
     /// When the claw was closed.
     gripped_at: Option<Duration>,
+    /// The life of the link in which its moves were made.
+    life: Option<u32>,
     /// How often the step at hand has been begun anew.
     pub(crate) tries: u8,
     pub(crate) pause: Pause,
@@ -118,6 +126,7 @@ impl ArmSequence {
             steps: 0,
             step: None,
             gripped_at: None,
+            life: None,
             tries: 0,
             pause: Pause::Wanted,
         }
@@ -207,6 +216,11 @@ impl ArmSequence {
     /// Gives the next step of the attempt, or judges it.
     fn pick(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
         let (profile, arm) = (&helm.config.arm, helm.senses.arm);
+        let life = core::mem::replace(&mut self.life, arm.life());
+        if life.is_some() && life != self.life {
+            self.moves = if self.moves > SQUEEZE { SQUEEZE } else { 0 };
+            (self.steps, self.gripped_at) = (0, None);
+        }
         let is_empty = arm
             .claw_is_empty(profile, helm.config.held_margin)
             .is_some();
@@ -263,7 +277,7 @@ fn next_move(done: u8, aim: i16, config: &LogicConfig) -> Move {
         1 => Move::Once(ArmCommand::Release),
         2 => Move::Bring(&ELBOW_JOINT, config.reach_elbow),
         3 => Move::Bring(&SHOULDER_JOINT, config.reach_shoulder),
-        4 => Move::Once(ArmCommand::Squeeze),
+        SQUEEZE => Move::Once(ArmCommand::Squeeze),
         5 => Move::Bring(&SHOULDER_JOINT, carry.shoulder),
         6 => Move::Hold,
         7 => Move::Bring(&ELBOW_JOINT, carry.elbow),

@@ -9,7 +9,9 @@ use std::time::Duration;
 
 use lager_control::pd::{Gains, Pd};
 use lager_control::sides::Sides;
-use lager_topics::{Finish, Heading, Origin, SteeringOrder, SteeringReport, WarehouseMap};
+use lager_topics::{
+    Finish, Heading, Origin, SERVO_UNKNOWN, SteeringOrder, SteeringReport, WarehouseMap,
+};
 use lager_wire::{ArmCommand, Command, LineState, SteerFlags, WheelCommand};
 
 use crate::floor::{Exit, Floor, Obstacle, Point};
@@ -101,9 +103,15 @@ pub(crate) struct Body {
     /// Positions of the servos, and the load of the claw.
     pub(crate) servos: [u16; 8],
     pub(crate) claw_load: i16,
+    /// Servos that have not been heard since the board started.
+    unheard: [bool; 8],
+    /// Lives of the link to the steering board.
+    life: u32,
     pub(crate) battery: u8,
     /// Where the base has to aim for the claw to close on the goods.
     pub(crate) goods_at: Option<u16>,
+    /// The claw has closed on them.
+    holds: bool,
     /// A duty the operator drives with in manual mode.
     pub(crate) manual_duty: f64,
     /// What the bridge has summed of it: duty × µs of both motors.
@@ -144,8 +152,11 @@ impl Body {
             silent: false,
             servos: CARRYING,
             claw_load: -311,
+            unheard: [false; 8],
+            life: 1,
             battery: 111,
             goods_at: None,
+            holds: false,
             manual_duty: 0.0,
             driven_by_hand: 0,
             begun: Vec::new(),
@@ -365,9 +376,29 @@ impl Body {
         };
     }
 
+    /// The steering board starts anew: what it did is cut short, and the arm sags. It hears of a
+    /// servo only when it moves it.
+    pub(crate) fn restart_board(&mut self) {
+        self.end_work(Finish::Aborted);
+        self.life += 1;
+        self.unheard = [true; 8];
+        (self.servos[1], self.servos[3]) = (self.servos[1] - 30, self.servos[3] - 30);
+        self.claw_load = 0;
+    }
+
     /// One step of the arm has been made.
     fn move_arm(&mut self, step: ArmCommand) {
         let [base, shoulder, elbow, claw] = [0, 1, 3, 7];
+        let moved = match step {
+            ArmCommand::Left | ArmCommand::Right => base,
+            ArmCommand::Up | ArmCommand::Down => shoulder,
+            ArmCommand::Out | ArmCommand::In => elbow,
+            _ => claw,
+        };
+        self.unheard[moved] = false;
+        let aimed = |at: u16| at.abs_diff(self.servos[base]) <= 10;
+        let low = self.servos[shoulder] < 320 && self.servos[elbow] > 480;
+        let at_the_goods = low && self.goods_at.is_some_and(aimed);
         match step {
             ArmCommand::Left => self.servos[base] += 4,
             ArmCommand::Right => self.servos[base] -= 4,
@@ -375,12 +406,18 @@ impl Body {
             ArmCommand::Down => self.servos[shoulder] -= 4,
             ArmCommand::Out => self.servos[elbow] += 4,
             ArmCommand::In => self.servos[elbow] -= 4,
-            ArmCommand::Release => (self.servos[claw], self.claw_load) = (512, 0),
+            ArmCommand::Release => {
+                if self.holds && !at_the_goods {
+                    // They fall to the floor.
+                    self.goods_at = None;
+                }
+                self.holds = false;
+                (self.servos[claw], self.claw_load) = (512, 0);
+            }
             ArmCommand::Squeeze => {
-                let aimed = |at: u16| at.abs_diff(self.servos[base]) <= 10;
-                let low = self.servos[shoulder] < 320 && self.servos[elbow] > 480;
-                let holds = low && self.goods_at.is_some_and(aimed);
-                (self.servos[claw], self.claw_load) = if holds { (399, -311) } else { (210, -20) };
+                self.holds |= at_the_goods;
+                let closed = if self.holds { (399, -311) } else { (210, -20) };
+                (self.servos[claw], self.claw_load) = closed;
             }
             _ => {}
         }
@@ -444,7 +481,12 @@ impl Body {
         if self.duties.1 < 0.0 {
             flags.insert(SteerFlags::RIGHT_REVERSE);
         }
+        let heard = |servo: usize| match self.unheard[servo] {
+            true => SERVO_UNKNOWN,
+            false => self.servos[servo],
+        };
         SteeringReport {
+            link_epoch: self.life,
             finished_id: self.finished.0,
             finish: self.finished.1.into(),
             finished_origin: Origin::Logic.into(),
@@ -455,7 +497,7 @@ impl Body {
             flags: flags.0,
             battery_decivolts: self.battery,
             age_ms: 0,
-            servo_position: self.servos,
+            servo_position: std::array::from_fn(heard),
             servo_load: [0, 0, 0, 0, 0, 0, 0, self.claw_load],
             ..SteeringReport::default()
         }

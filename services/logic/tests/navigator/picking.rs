@@ -139,6 +139,22 @@ fn picking_survives_a_kill_at_any_moment() {
 }
 
 #[test]
+fn picking_survives_a_restart_of_the_steering_board_at_any_moment() {
+    let mut trial = at_the_goods(Some(533));
+    let mut restarts = 0;
+    while trial.phase() == Phase::Picking {
+        let mut fork = trial.clone();
+        fork.body.restart_board();
+        fork.thoughts
+            .push(format!("(board restarted at {:?})", trial.body.now));
+        fork.deliver(1);
+        restarts += 1;
+        trial.run_for(Duration::from_millis(105));
+    }
+    assert!(restarts > 50, "only {restarts} moments");
+}
+
+#[test]
 fn refused_and_aborted_steps_are_given_again() {
     let mut trial = at_the_goods(Some(512));
     trial.run_for(SECOND);
