@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use simavr_ffi as ffi;
 
-use super::serial::{UBRRH, UBRRL, UCSRA, UCSRB, UCSRC, UDR, UsartId};
+use super::usarts::{UBRRH, UBRRL, UCSRA, UCSRB, UCSRC, UDR, UsartId};
 use super::{Chip, WriteHandler, chip};
 
 impl Chip {

@@ -30,6 +30,7 @@ mod queue;
 mod run;
 mod serial;
 mod usart;
+mod usarts;
 
 use core::cell::{Cell, RefCell};
 use core::ffi::{c_char, c_int, c_void};
@@ -40,8 +41,9 @@ use simavr_ffi as ffi;
 pub use image::{EEPROM, FLASH, Image, ImageError};
 pub use interrupts::{InterruptStatistics, VectorStatistics};
 pub use pins::{Level, Pin, Wire, wire};
-pub use serial::{Sent, UsartId};
+pub use serial::Sent;
 pub(crate) use usart::sampled;
+pub use usarts::UsartId;
 
 use corrections::Peripherals;
 use interrupts::Interrupts;

@@ -7,7 +7,7 @@ use core::cell::{Cell, RefCell};
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::serial::UsartId;
+use super::usarts::UsartId;
 
 /// One thing to happen. `life` makes an event of a peripheral void when that was reset meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,46 +15,7 @@ use simavr_ffi as ffi;
 use super::Chip;
 use super::queue::Event;
 use super::usart::{Format, Usart, control, sampled, status};
-
-/// One of the chip's two USARTs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum UsartId {
-    /// RXD0 and TXD0.
-    Zero,
-    /// RXD1 and TXD1.
-    One,
-}
-
-impl UsartId {
-    pub(super) const BOTH: [Self; 2] = [Self::Zero, Self::One];
-
-    const fn index(self) -> usize {
-        self as usize
-    }
-
-    /// The address of UCSRnA; the others follow it.
-    pub(super) const fn base(self) -> u8 {
-        match self {
-            Self::Zero => 0xC0,
-            Self::One => 0xC8,
-        }
-    }
-
-    pub(super) fn of(address: u16) -> Self {
-        if address < u16::from(Self::One.base()) {
-            Self::Zero
-        } else {
-            Self::One
-        }
-    }
-}
-
-pub(super) const UCSRA: u8 = 0;
-pub(super) const UCSRB: u8 = 1;
-pub(super) const UCSRC: u8 = 2;
-pub(super) const UBRRL: u8 = 4;
-pub(super) const UBRRH: u8 = 5;
-pub(super) const UDR: u8 = 6;
+use super::usarts::{UBRRH, UBRRL, UCSRA, UCSRB, UCSRC, UsartId};
 
 /// A frame that has wholly left a chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
