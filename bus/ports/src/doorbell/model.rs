@@ -1,5 +1,7 @@
-//! The protocol of `word.rs` under every interleaving that the memory model allows with at most
-//! three preemptions: switches between threads where the running one could have gone on.
+//! The protocol of `word.rs` with one waiter and at most two ringers, three threads in all, under
+//! every interleaving that the memory model allows with at most three preemptions: switches between
+//! threads where the running one could have gone on. What takes more of either is not shown here;
+//! `tests/bus/stress.rs` tries that with real processes.
 //!
 //! The word is loom's, and so is the futex: a queue behind a lock, which compares and puts to sleep
 //! in one step, as the kernel's does. A waiter has a time-out only where the model gives it one, so
@@ -18,7 +20,7 @@ use super::word::{self, Ended, Sleeper, Word};
 /// they know of with two or three; without a bound a run takes hours.
 const PREEMPTIONS: usize = 3;
 
-fn under_all_interleavings(run: impl Fn() + Sync + Send + 'static) {
+fn under_bounded_interleavings(run: impl Fn() + Sync + Send + 'static) {
     let mut builder = loom::model::Builder::new();
     builder.preemption_bound = Some(PREEMPTIONS);
     builder.check(run);
@@ -131,7 +133,7 @@ fn two_ringers(modelled: &Arc<Modelled>) -> [thread::JoinHandle<()>; 2] {
 
 #[test]
 fn no_ring_of_two_ringers_is_lost() {
-    under_all_interleavings(|| {
+    under_bounded_interleavings(|| {
         let modelled = Modelled::new();
         let sleeper = Sleeper::new(&*modelled);
         let ringers = two_ringers(&modelled);
@@ -144,7 +146,7 @@ fn no_ring_of_two_ringers_is_lost() {
 
 #[test]
 fn a_ringer_that_rings_again_and_again_is_heard_each_time() {
-    under_all_interleavings(|| {
+    under_bounded_interleavings(|| {
         let modelled = Modelled::new();
         let sleeper = Sleeper::new(&*modelled);
         let ringer = thread::spawn({
@@ -162,7 +164,7 @@ fn a_ringer_that_rings_again_and_again_is_heard_each_time() {
 
 #[test]
 fn a_sleep_that_ends_by_its_time_out_loses_nothing() {
-    under_all_interleavings(|| {
+    under_bounded_interleavings(|| {
         let modelled = Modelled::new();
         modelled.impatient.store(true, Ordering::Relaxed);
         let sleeper = Sleeper::new(&*modelled);
@@ -176,7 +178,7 @@ fn a_sleep_that_ends_by_its_time_out_loses_nothing() {
 
 #[test]
 fn a_ringer_killed_before_its_wake_does_not_silence_the_next() {
-    under_all_interleavings(|| {
+    under_bounded_interleavings(|| {
         let modelled = Modelled::new();
         let sleeper = Sleeper::new(&*modelled);
         let killed = thread::spawn({
@@ -197,7 +199,7 @@ fn a_ringer_killed_before_its_wake_does_not_silence_the_next() {
 
 #[test]
 fn a_waiter_killed_asleep_leaves_a_word_its_successor_can_use() {
-    under_all_interleavings(|| {
+    under_bounded_interleavings(|| {
         let modelled = Modelled::new();
         modelled.word.store(6 | word::SLEEPING, Ordering::Relaxed);
         let ringers = two_ringers(&modelled);

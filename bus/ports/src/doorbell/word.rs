@@ -22,8 +22,8 @@
 //! line that the addition needs anyway. A ringer that is killed before its addition leaves a reason
 //! that the next wake finds.
 //!
-//! It is generic over the atomics, so that `model.rs` can run this very source under every
-//! interleaving.
+//! It is generic over the atomics, so that `model.rs` can run this very source: one waiter and at
+//! most two ringers, under every interleaving with at most three preemptions.
 //!
 //! **Invariant:** `S` is set only by the one waiter of the word and only while it is in
 //! [`Sleeper::sleep`]. A waiter that does not look for 2^31 rings may miss them all.
