@@ -1,6 +1,5 @@
 //! A process's membership on the bus.
 
-use core::time::Duration;
 use std::fmt;
 use std::sync::Arc;
 
@@ -9,28 +8,19 @@ use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::prelude::{
     LogLevel, Node, NodeBuilder, NodeName, PortName, SignalHandlingMode, set_log_level,
 };
-use lager_topics::{Request, Role, Topic};
+use lager_topics::Role;
 
-use crate::any::AnyPublisher;
 use crate::clock::{self, Clock};
 use crate::config::BusConfig;
 use crate::doorbell::{self, Board};
-use crate::error::{IntrospectError, OpenError, PortError};
-use crate::found::Found;
-use crate::introspect::{self, NodeInfo, TopicInfo};
-use crate::keeper::Keeper;
-use crate::kept::{self, KeptError};
+use crate::error::OpenError;
+use crate::here::Here;
 use crate::mend;
 use crate::name::{self, RobotName};
 use crate::place::Place;
-use crate::publisher::Publisher;
-use crate::request::{Client, Server};
 use crate::shortage::Shortage;
-use crate::subscriber::Subscriber;
 use crate::sweep;
 use crate::transport::Ipc;
-use crate::untyped::Here;
-use crate::waiter::{Policy, Waiter};
 
 /// A process's membership on the bus; clones share it.
 ///
@@ -78,13 +68,13 @@ impl Bus {
         Ok(Self {
             shared: Arc::new(Shared {
                 node: Here::new(node),
+                board: Board::of(&place, &config.robot),
                 place,
                 config: transport,
                 robot: config.robot.clone(),
                 role,
                 clock,
                 port_name,
-                board: Board::default(),
             }),
         })
     }
@@ -114,7 +104,7 @@ impl Bus {
     /// dead process.
     ///
     /// Samples a killed writer has sent stay with subscribers that have received from it before,
-    /// until they are drained; a keeper should still drain first ([`Keeper::remember`]).
+    /// until they are drained; a keeper should still drain first ([`crate::Keeper::remember`]).
     pub fn sweep(&self) -> usize {
         mend::unfinished(&self.shared.place);
         doorbell::sweep(&self.shared.place, &self.shared.robot);
@@ -125,106 +115,6 @@ impl Bus {
     /// cleared, or after its files were removed.
     pub fn is_listed(&self) -> bool {
         self.shared.place.is_current() && sweep::is_listed(&self.shared.config, &self.shared.node)
-    }
-
-    /// A writer of `T`, to be used in this thread. It rings the actors of `T`, now and later.
-    ///
-    /// # Errors
-    /// Too many writers, a process of another build on the topic, or no resources.
-    pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, PortError> {
-        Publisher::new(self)
-    }
-
-    /// A reader of `T`, to be used in this thread.
-    ///
-    /// # Errors
-    /// Too many readers, a process of another build on the topic, or no resources.
-    pub fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, PortError> {
-        Subscriber::new(self)
-    }
-
-    /// A reader of the topic called `name`, which this process need not know; `None` if no process
-    /// has the topic open. To be used in this thread.
-    ///
-    /// # Errors
-    /// As for a subscriber, or the topic does not describe its samples.
-    pub fn found(&self, name: &str) -> Result<Option<Found>, PortError> {
-        Found::new(self, name)
-    }
-
-    /// A writer of the topic called `name`: of the table, or of one that this process was not built
-    /// with; `None` if no process has that one open. To be used in this thread.
-    ///
-    /// # Errors
-    /// As for a publisher, or the topic does not describe its samples.
-    pub fn any_publisher(&self, name: &str) -> Result<Option<AnyPublisher>, PortError> {
-        AnyPublisher::new(self, name)
-    }
-
-    /// A waiter, which wakes this process when a topic that it acts on has samples; to be used in
-    /// this thread.
-    ///
-    /// # Errors
-    /// The role acts on nothing, or there are no resources.
-    pub fn waiter(&self, policy: Policy) -> Result<Waiter, PortError> {
-        Waiter::new(self, policy)
-    }
-
-    /// The asking side of `R`, to be used in this thread.
-    ///
-    /// # Errors
-    /// Too many clients, a process of another build, or no resources.
-    pub fn client<R: Request>(&self) -> Result<Client<R>, PortError> {
-        Client::new(self)
-    }
-
-    /// The answering side of `R`, to be used in this thread.
-    ///
-    /// # Errors
-    /// Too many servers, a process of another build, or no resources.
-    pub fn server<R: Request>(&self) -> Result<Server<R>, PortError> {
-        Server::new(self)
-    }
-
-    /// Keeps the last value of `T` for its writer's successor.
-    ///
-    /// # Errors
-    /// As for a subscriber.
-    pub fn keeper<T: Topic>(&self) -> Result<Keeper<T>, PortError> {
-        Keeper::new(self)
-    }
-
-    /// The last value, from before this process's restart, of a topic that it writes itself. Waits
-    /// at most `timeout` of real time. `None`: the topic can be read, and no value was kept.
-    ///
-    /// Call it before making the topic's publisher.
-    ///
-    /// # Errors
-    /// The topic cannot be read, so it is not known whether a value was kept; faults that pass were
-    /// waited for. A process that must resume from that value must not take this for a first start.
-    pub fn kept<T: Topic>(&self, timeout: Duration) -> Result<Option<T::Payload>, KeptError> {
-        kept::kept::<T>(self, timeout)
-    }
-
-    /// Every topic in use on this bus, of every robot.
-    ///
-    /// # Errors
-    /// The bus's files cannot be listed.
-    pub fn topics(&self) -> Result<Vec<TopicInfo>, IntrospectError> {
-        introspect::topics(self)
-    }
-
-    /// Every topic of the table as one robot uses it; those not in use have no ports.
-    pub fn topics_of(&self, robot: &RobotName) -> Vec<TopicInfo> {
-        introspect::topics_of(self, robot)
-    }
-
-    /// Every process on this bus, living or dead.
-    ///
-    /// # Errors
-    /// The bus's files cannot be listed.
-    pub fn nodes(&self) -> Result<Vec<NodeInfo>, IntrospectError> {
-        introspect::list(&self.shared.config)
     }
 
     pub(crate) fn node(&self) -> &Node<Ipc> {

@@ -1,12 +1,12 @@
 //! What can go wrong, one enum per operation; every message says what to do.
 
-use std::path::PathBuf;
+use std::io::{Error, ErrorKind};
+use std::path::{Path, PathBuf};
 
 use lager_topics::Role;
 
 use crate::fault::{Difference, TransportFault};
 use crate::shortage::Shortage;
-use crate::stop::StopError;
 
 /// Why a process could not join the bus.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -302,4 +302,50 @@ pub enum IntrospectError {
     /// The transport failed.
     #[error("the bus's files could not be listed ({0}); check the permissions of the bus's folder")]
     Transport(#[from] TransportFault),
+}
+
+/// Why the stop word cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StopError {
+    /// There is no room for the file.
+    #[error(
+        "the stop word {path} has no room: make some (`df {path}` tells where), or switch the robot off at its battery"
+    )]
+    Full {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The user may not.
+    #[error(
+        "this user may not use the stop word {path}: stop the robot as the user who runs it (sudo -u USER)"
+    )]
+    Permission {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Anything else the system says.
+    #[error("the stop word {path} cannot be used ({detail}); is its folder there and a folder?")]
+    System {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        detail: String,
+    },
+}
+
+impl StopError {
+    /// What `error` means for the file at `path`.
+    pub(crate) fn new(path: &Path, error: &Error) -> Self {
+        let path = path.to_owned();
+        match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
+            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+                Self::Permission { path }
+            }
+            _ => Self::System {
+                path,
+                detail: error.to_string(),
+            },
+        }
+    }
 }

@@ -6,7 +6,8 @@ use lager_topics::{Described, Description, Stamp};
 
 use crate::bus::Bus;
 use crate::error::{PortError, ReceiveError};
-use crate::service::{self, Side};
+use crate::kind::Side;
+use crate::service;
 use crate::untyped::{Reader, Taken};
 
 /// The reading end of a topic that is only known by its name; stays in the thread that made it.

@@ -13,12 +13,12 @@ use crate::config::BusConfig;
 use crate::doorbell;
 use crate::error::IntrospectError;
 use crate::fault::TransportFault;
+use crate::kind::{Kind, Side};
 use crate::mend;
 use crate::name::{self, RobotName};
-use crate::service::{self, Side, TopicService};
+use crate::service::{self, TopicService};
 use crate::sweep;
 use crate::transport::Ipc;
-use crate::untyped::Kind;
 
 /// How a topic in use compares with this build's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,6 +162,32 @@ pub struct NodeInfo {
     pub state: NodeState,
 }
 
+impl Bus {
+    /// Every topic in use on this bus, of every robot.
+    ///
+    /// # Errors
+    /// The bus's files cannot be listed.
+    pub fn topics(&self) -> Result<Vec<TopicInfo>, IntrospectError> {
+        topics(self)
+    }
+
+    /// Every topic of the table as one robot uses it; those not in use have no ports.
+    pub fn topics_of(&self, robot: &RobotName) -> Vec<TopicInfo> {
+        TOPICS
+            .iter()
+            .map(|entry| look(self, robot, entry.name))
+            .collect()
+    }
+
+    /// Every process on this bus, living or dead.
+    ///
+    /// # Errors
+    /// The bus's files cannot be listed.
+    pub fn nodes(&self) -> Result<Vec<NodeInfo>, IntrospectError> {
+        list(self.transport())
+    }
+}
+
 /// Every process on a bus, living or dead, without joining it (joining sweeps).
 ///
 /// # Errors
@@ -185,7 +211,7 @@ pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> 
     Ok(removed)
 }
 
-pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
+fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
     let mut found = Vec::new();
     Node::<Ipc>::list(config, |state| {
         let (details, state) = match &state {
@@ -214,7 +240,7 @@ pub(crate) fn list(config: &Config) -> Result<Vec<NodeInfo>, IntrospectError> {
     Ok(found)
 }
 
-pub(crate) fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
+fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
     let mut in_use = Vec::new();
     Ipc::list(bus.transport(), |details| {
         let details = details.static_details;
@@ -235,13 +261,6 @@ pub(crate) fn topics(bus: &Bus) -> Result<Vec<TopicInfo>, IntrospectError> {
         .iter()
         .map(|(robot, _, topic)| look(bus, robot, topic))
         .collect())
-}
-
-pub(crate) fn topics_of(bus: &Bus, robot: &RobotName) -> Vec<TopicInfo> {
-    TOPICS
-        .iter()
-        .map(|entry| look(bus, robot, entry.name))
-        .collect()
 }
 
 /// Topics are listed in the table's order, others behind them.

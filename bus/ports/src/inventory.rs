@@ -18,7 +18,8 @@ use std::collections::BTreeSet;
 use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 
-use crate::place::{Place, SHARED_MEMORY};
+use crate::place::Place;
+use crate::shortage::SHARED_MEMORY;
 
 /// How the kernel marks a mapping whose file was removed.
 const REMOVED: &str = " (deleted)";

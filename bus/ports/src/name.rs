@@ -7,9 +7,15 @@ use std::str::FromStr;
 
 use lager_topics::Role;
 
-use crate::place;
-
 const FAMILY: &str = "lager";
+
+/// The transport's folder, which stands in the bus's beside those of the robots.
+pub(crate) const TRANSPORT: &str = "iceoryx2";
+
+/// Whether a robot cannot have this name because the transport has it.
+pub(crate) fn is_transport(name: &str) -> bool {
+    name.starts_with(TRANSPORT)
+}
 
 /// The name of a robot: 1 to 24 characters of `a`-`z`, `0`-`9` and `-`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -78,7 +84,7 @@ impl FromStr for RobotName {
         if text.len() > Self::MAX_LENGTH {
             return Err(RobotNameError::TooLong(text.to_owned()));
         }
-        if place::is_transport(text) {
+        if is_transport(text) {
             return Err(RobotNameError::Reserved(text.to_owned()));
         }
         Ok(Self(text.to_owned()))

@@ -31,19 +31,13 @@ use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, SemanticString};
 use lager_topics::Role;
 
-use crate::doorbell;
 use crate::error::OpenError;
 use crate::lock::{self, Lock, LockError, SUCCESSION};
-use crate::name::RobotName;
+use crate::name::{RobotName, TRANSPORT, is_transport};
+use crate::shortage::SHARED_MEMORY;
 
 /// The folder of a system service.
 const SYSTEM: &str = "/run/lager";
-
-/// Where the transport's shared memory lies.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
-
-/// The transport's folder in the bus's.
-const TRANSPORT: &str = "iceoryx2";
 
 /// The longest path of a socket, in bytes.
 const LONGEST_SOCKET: usize = 107;
@@ -120,6 +114,11 @@ impl Place {
     /// A robot's folder, which may not be there.
     pub fn folder_of(&self, robot: &RobotName) -> PathBuf {
         self.folder.join(robot.as_str())
+    }
+
+    /// The file of a robot's board of bells, which may not be there.
+    pub(crate) fn bells(&self, robot: &RobotName) -> PathBuf {
+        self.folder_of(robot).join("bells")
     }
 
     /// The robots that have a folder here, up or not.
@@ -200,7 +199,7 @@ impl Place {
         for folder in old {
             let _ = fs::remove_dir_all(folder);
         }
-        doorbell::remove(self, robot);
+        let _ = fs::remove_file(self.bells(robot));
         true
     }
 
@@ -301,11 +300,6 @@ pub fn other_places() -> Vec<OtherPlace> {
         .collect();
     places.sort_by(|a, b| a.folder.cmp(&b.folder));
     places
-}
-
-/// Whether a robot cannot have this name because the transport has it.
-pub(crate) fn is_transport(name: &str) -> bool {
-    name.starts_with(TRANSPORT)
 }
 
 fn next(generation: usize) -> usize {

@@ -23,7 +23,8 @@ use crate::bus::Bus;
 use crate::cause::Cause;
 use crate::clock::Clock;
 use crate::error::{PortError, SendError};
-use crate::untyped::{Kind, Lent, To, Writer};
+use crate::kind::Kind;
+use crate::untyped::{Lent, To, Writer};
 
 /// The writing end of a topic; stays in the thread that made it.
 ///

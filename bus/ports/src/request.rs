@@ -14,7 +14,8 @@ use lager_topics::{Payload, Request};
 use crate::bus::Bus;
 use crate::clock::Clock;
 use crate::error::{CallError, PortError, ReceiveError};
-use crate::untyped::{Answerer, Asker, Question};
+use crate::kind::Question;
+use crate::untyped::{Answerer, Asker};
 
 type Ask<R> = <R as Request>::Request;
 type Answer<R> = <R as Request>::Reply;

@@ -1,9 +1,9 @@
 //! Opening services: names, limits, the layout check, and what each refusal means.
 //!
 //! The public service of a topic admits 64 observers, twice its actors and 8 further subscribers
-//! ([`Qos::max_subscribers`]). So keepers and restarted services get a place even when observers
+//! (`Qos::max_subscribers`). So keepers and restarted services get a place even when observers
 //! have taken all of theirs; the 65th observer is counted and refused. The actors' own service,
-//! where a topic has one, admits actors only ([`Qos::max_acting`]). Both have the same layout,
+//! where a topic has one, admits actors only (`Qos::max_acting`). Both have the same layout,
 //! queue and history, and a process that has the actors' service open has the public one open too.
 //! So a tool that knows the topic's name finds the topic as long as anybody uses it.
 
@@ -14,17 +14,17 @@ use iceoryx2::service::builder::request_response::RequestResponseOpenOrCreateErr
 use iceoryx2::service::messaging_pattern::MessagingPattern;
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
-use lager_topics::{Description, Qos};
+use lager_topics::Description;
 
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::fault::{Difference, Refusal, TransportFault};
+use crate::kind::{Bytes, Header, Kind, Question, Side};
 use crate::name::{self, RobotName};
-pub(crate) use crate::patience::{Fault, patiently};
+use crate::patience::{Fault, patiently};
 use crate::schema::{self, required};
 use crate::shortage::Shortage;
 use crate::transport::Ipc;
-use crate::untyped::{Bytes, Header, Kind, Question};
 
 /// Samples a subscriber may hold at the same time.
 pub(crate) const MAX_HELD: usize = 4;
@@ -47,32 +47,6 @@ pub(crate) type TopicService = publish_subscribe::PortFactory<Ipc, Bytes, Header
 pub(crate) type RequestService = request_response::PortFactory<Ipc, Bytes, Header, Bytes, Header>;
 
 pub(crate) type EventService = event::PortFactory<Ipc>;
-
-/// One of a topic's services.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
-    /// The one under the topic's name.
-    Public,
-    /// The one that the actors read, of a topic that serves them first.
-    Actors,
-}
-
-impl Side {
-    fn name(self, topic: &str) -> String {
-        match self {
-            Self::Public => topic.to_owned(),
-            Self::Actors => name::of_actors(topic),
-        }
-    }
-
-    /// Places for subscribers.
-    pub(crate) const fn places(self, qos: &Qos) -> usize {
-        match self {
-            Self::Public => qos.max_subscribers(),
-            Self::Actors => qos.max_acting(),
-        }
-    }
-}
 
 /// Opens a service of a topic, or creates it with the limits of the table.
 pub(crate) fn topic(bus: &Bus, kind: &Kind, side: Side) -> Result<TopicService, PortError> {

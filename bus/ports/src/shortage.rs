@@ -6,7 +6,8 @@ use std::fs;
 
 use rustix::process::{Resource, getrlimit};
 
-use crate::place::SHARED_MEMORY;
+/// Where the transport's shared memory lies.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
 /// A process that can open at most this many more files cannot open a port: a port may take as
 /// many.

@@ -52,6 +52,7 @@ use std::path::{Path, PathBuf};
 use lager_topics::{Coded, Role, StopCause};
 
 use crate::clock::Clock;
+use crate::error::StopError;
 
 pub use page::{Release, StopPage};
 
@@ -147,51 +148,6 @@ impl fmt::Display for Stop {
         match self.origin() {
             Some(role) => write!(formatter, "by the {role}: {}", self.cause()),
             None => write!(formatter, "by nobody known: {}", self.cause()),
-        }
-    }
-}
-
-/// Why the stop word cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum StopError {
-    /// There is no room for the file.
-    #[error(
-        "the stop word {path} has no room: make some (`df {path}` tells where), or switch the robot off at its battery"
-    )]
-    Full {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The user may not.
-    #[error(
-        "this user may not use the stop word {path}: stop the robot as the user who runs it (sudo -u USER)"
-    )]
-    Permission {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Anything else the system says.
-    #[error("the stop word {path} cannot be used ({detail}); is its folder there and a folder?")]
-    System {
-        /// The file.
-        path: PathBuf,
-        /// The system's words.
-        detail: String,
-    },
-}
-
-impl StopError {
-    fn new(path: &Path, error: &Error) -> Self {
-        let path = path.to_owned();
-        match error.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
-            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-                Self::Permission { path }
-            }
-            _ => Self::System {
-                path,
-                detail: error.to_string(),
-            },
         }
     }
 }

@@ -35,7 +35,7 @@ use iceoryx2_cal::named_concept::{
 };
 
 use crate::lease;
-use crate::place::SHARED_MEMORY;
+use crate::shortage::SHARED_MEMORY;
 
 /// Creating a segment takes microseconds; a creator that lives and has not set a size by then is
 /// stopped.

@@ -10,7 +10,8 @@ use crate::bus::Bus;
 use crate::cause::Cause;
 use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError};
-use crate::untyped::{Kind, Reader, Taken};
+use crate::kind::Kind;
+use crate::untyped::{Reader, Taken};
 
 /// The reading end of a topic; stays in the thread that made it.
 pub struct Subscriber<T: Topic> {

@@ -150,7 +150,7 @@ impl Waiter {
         };
         Ok(Self {
             stays: PhantomData,
-            bell: Bell::hang(bus)?,
+            bell: Bell::hang(bus.board(), role)?,
             policy,
             role,
             adaptive: RefCell::new(Adaptive {

@@ -9,12 +9,11 @@
 //!
 //! | file | what it is |
 //! |---|---|
-//! | `word` | the ring and sleep protocol; `model` runs it under all interleavings with at most three preemptions |
+//! | `word` | the ring and sleep protocol; `model` runs it under all interleavings of three threads with at most three preemptions |
 //! | `futex` | the word as a futex |
 //! | `board` | the shared memory: who is rung for what, who may spin |
 //! | `segment`, `locks` | its file: joining, leaving, seats, what killed processes leave |
 //! | `pace` | when looking without pause is worth it |
-//! | `standard` | listeners of plain iceoryx2, which know nothing of boards |
 //!
 //! **Invariant:** a ring is a hint, and so are its reasons (the topics it was for). A waiter has a
 //! time-out and looks at everything now and then. Ringing and waiting do not allocate.
@@ -26,7 +25,6 @@ mod locks;
 mod model;
 mod pace;
 mod segment;
-mod standard;
 mod word;
 
 use core::time::Duration;
@@ -36,10 +34,8 @@ use lager_topics::Role;
 
 pub(crate) use pace::{Pace, Plan};
 use segment::{Fault, Segment};
-pub(crate) use standard::StandardListeners;
 use word::Sleeper;
 
-use crate::bus::Bus;
 use crate::error::PortError;
 use crate::fault::{Difference, TransportFault};
 use crate::name::RobotName;
@@ -54,18 +50,31 @@ pub(crate) const fn reason(id: u32) -> usize {
     1 + id as usize % (board::REASONS - 1)
 }
 
-/// A bus's board, opened when the first of its ports needs it and left with the last.
-#[derive(Default)]
-pub(crate) struct Board(Mutex<Weak<Segment>>);
+/// A robot's board, opened when the first port of this process needs it and left with the last.
+pub(crate) struct Board {
+    place: Place,
+    robot: RobotName,
+    segment: Mutex<Weak<Segment>>,
+}
 
 impl Board {
-    fn open(&self, bus: &Bus, role: Role) -> Result<Arc<Segment>, PortError> {
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+    /// The board of `robot`, which is not opened yet.
+    pub(crate) fn of(place: &Place, robot: &RobotName) -> Self {
+        Self {
+            place: place.clone(),
+            robot: robot.clone(),
+            segment: Mutex::default(),
+        }
+    }
+
+    fn open(&self, role: Role) -> Result<Arc<Segment>, PortError> {
+        let mut known = self.segment.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(segment) = known.upgrade() {
             return Ok(segment);
         }
-        bus.place().robot(bus.robot());
-        let path = segment::path(bus.place(), bus.robot());
+        // Its folder is made if it is missing.
+        self.place.robot(&self.robot);
+        let path = self.place.bells(&self.robot);
         let segment = Segment::join(&path).map_err(|fault| error(role, fault))?;
         let segment = Arc::new(segment);
         *known = Arc::downgrade(&segment);
@@ -75,13 +84,13 @@ impl Board {
 
 /// Clears the seats of killed processes on one robot's board, or removes it if it is unused.
 pub(crate) fn sweep(place: &Place, robot: &RobotName) {
-    sweep_at(&segment::path(place, robot));
+    sweep_at(&place.bells(robot));
 }
 
 /// The same for every robot of the bus.
 pub(crate) fn sweep_all(place: &Place) {
-    for path in segment::all(place) {
-        sweep_at(&path);
+    for robot in place.robots() {
+        sweep(place, &robot);
     }
 }
 
@@ -93,14 +102,9 @@ fn sweep_at(path: &std::path::Path) {
     }
 }
 
-/// Removes the board of a robot without waiters, whatever the board contains.
-pub(crate) fn remove(place: &Place, robot: &RobotName) {
-    let _ = std::fs::remove_file(segment::path(place, robot));
-}
-
 /// The living processes whose waiters are rung for `role`; a process may wait more than once.
 pub(crate) fn woken(place: &Place, robot: &RobotName, role: Role) -> Vec<u32> {
-    match Segment::existing(&segment::path(place, robot)) {
+    match Segment::existing(&place.bells(robot)) {
         Ok(Some(segment)) => segment.woken(role),
         _ => Vec::new(),
     }
@@ -114,10 +118,9 @@ pub(crate) struct Bell {
 }
 
 impl Bell {
-    /// Hangs a bell of this process's role.
-    pub(crate) fn hang(bus: &Bus) -> Result<Self, PortError> {
-        let role = bus.role();
-        let segment = bus.board().open(bus, role)?;
+    /// Hangs a bell of that role.
+    pub(crate) fn hang(board: &Board, role: Role) -> Result<Self, PortError> {
+        let segment = board.open(role)?;
         let seat = segment
             .take_seat(role)
             .map_err(|fault| error(role, fault))?;
@@ -183,9 +186,9 @@ pub(crate) struct Rope {
 impl Rope {
     /// A rope to the bells of `role`, present and future, for samples of the topic or request with
     /// the number `id`.
-    pub(crate) fn to(bus: &Bus, role: Role, id: u32) -> Result<Self, PortError> {
+    pub(crate) fn to(board: &Board, role: Role, id: u32) -> Result<Self, PortError> {
         Ok(Self {
-            segment: bus.board().open(bus, role)?,
+            segment: board.open(role)?,
             role,
             reason: reason(id),
         })

@@ -34,10 +34,6 @@ use rustix::thread::{MembarrierCommand, membarrier};
 
 use super::board::{Board, Layout, SEATS, SEATS_PER_ROLE};
 use super::locks::{Kind, is_held, try_lock, unlock};
-use crate::name::RobotName;
-use crate::place::Place;
-
-const NAME: &str = "bells";
 
 const DOOR: u64 = 0;
 const PRESENCE: u64 = 1;
@@ -63,17 +59,6 @@ impl From<Error> for Fault {
     fn from(error: Error) -> Self {
         Self::File(error)
     }
-}
-
-/// Where the board of a robot lies.
-pub(crate) fn path(place: &Place, robot: &RobotName) -> PathBuf {
-    place.folder_of(robot).join(NAME)
-}
-
-/// Where the boards of all robots on a bus lie, if they have one.
-pub(crate) fn all(place: &Place) -> Vec<PathBuf> {
-    let robots = place.robots();
-    robots.iter().map(|robot| path(place, robot)).collect()
 }
 
 /// An open board. The last one dropped removes the file.

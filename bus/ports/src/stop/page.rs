@@ -10,7 +10,8 @@ use lager_topics::StopCause;
 
 use super::mapping::Page;
 use super::watch::Watch;
-use super::{Stop, StopError, at, boards};
+use super::{Stop, at, boards};
+use crate::error::StopError;
 use crate::waiter::Ringer;
 
 /// What became of a stop that was to be released.

@@ -16,8 +16,8 @@ use lager_topics::StopCause;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 use rustix::fs::inotify::{self, CreateFlags, WatchFlags};
 
-use super::StopError;
 use super::mapping::{Identity, Page};
+use crate::error::StopError;
 
 /// How often the thread looks without a watch, and after a failure.
 const LOOK: Timespec = Timespec {

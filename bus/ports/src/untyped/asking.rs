@@ -14,12 +14,15 @@ use iceoryx2::service::port_factory::client::ClientCreateError;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 use iceoryx2::service::static_config::message_type_details::TypeDetail;
 
-use super::{Bytes, Header, Here, Question, behind, ends_here};
+use super::behind;
 use crate::bus::Bus;
 use crate::doorbell::Rope;
 use crate::error::{CallError, PortError, ReceiveError};
 use crate::fault::TransportFault;
-use crate::service::{self, Fault, MAX_CLIENTS, MAX_SERVERS, RequestService, patiently};
+use crate::here::{Here, ends_here};
+use crate::kind::{Bytes, Header, Question};
+use crate::patience::{Fault, patiently};
+use crate::service::{self, MAX_CLIENTS, MAX_SERVERS, RequestService};
 use crate::transport::Ipc;
 
 /// How often an asker looks for its answer. Askers are not actors, so no ring wakes them.
@@ -46,7 +49,7 @@ ends_here!(AskingPort, AnsweringPort, Active);
 impl Asker {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, question: Question) -> Result<Self, PortError> {
-        let rope = Rope::to(bus, question.actor, question.id)?;
+        let rope = Rope::to(bus.board(), question.actor, question.id)?;
         let service = service::request(bus, &question)?;
         let client = patiently(bus, question.name, || {
             service

@@ -23,11 +23,10 @@ use core::ptr::NonNull;
 
 use lager_topics::Stamp;
 
-use super::Kind;
 use super::outlet::Outlet;
 use crate::bus::Bus;
 use crate::error::{PortError, SendError};
-use crate::service::Side;
+use crate::kind::{Kind, Side};
 
 /// Where everybody but the actors reads.
 pub(crate) struct Copies {

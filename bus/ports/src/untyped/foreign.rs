@@ -10,7 +10,8 @@ use super::writer::new_epoch;
 use crate::bus::Bus;
 use crate::doorbell::Rope;
 use crate::error::{PortError, SendError};
-use crate::service::{self, Side};
+use crate::kind::Side;
+use crate::service;
 
 /// A writer of somebody else's topic. The processes that act on such a topic are guests, so it
 /// rings guests.
@@ -40,7 +41,7 @@ impl Foreign {
             outlet: Outlet::on(bus, name, service)?,
             actors: OnceCell::new(),
             size: description.size(),
-            rope: Rope::to(bus, Role::Guest, id(name))?,
+            rope: Rope::to(bus.board(), Role::Guest, id(name))?,
             next_sequence: Cell::new(0),
             // Taken after the port exists, as a typed writer does.
             epoch: new_epoch(),

@@ -11,10 +11,13 @@ use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
 use iceoryx2::sample_mut::SampleMut;
 use lager_topics::Stamp;
 
-use super::{Bytes, Header, Here, Kind, behind, ends_here};
+use super::behind;
 use crate::bus::Bus;
 use crate::error::{PortError, SendError};
-use crate::service::{self, Fault, MAX_LOANS, Side, TopicService, patiently};
+use crate::here::{Here, ends_here};
+use crate::kind::{Bytes, Header, Kind, Side};
+use crate::patience::{Fault, patiently};
+use crate::service::{self, MAX_LOANS, TopicService};
 use crate::transport::Ipc;
 
 /// The port, with the service that it is on.

@@ -10,12 +10,15 @@ use iceoryx2::prelude::{CallbackProgression, PortFactory};
 use iceoryx2::sample::Sample;
 use lager_topics::{OBSERVERS, Stamp};
 
-use super::{Bytes, Header, Here, Kind, behind, ends_here};
+use super::behind;
 use crate::bus::Bus;
 use crate::clock::Clock;
 use crate::error::{PortError, ReceiveError};
+use crate::here::{Here, ends_here};
+use crate::kind::{Bytes, Header, Kind, Side};
 use crate::name;
-use crate::service::{self, Fault, MAX_HELD, Side, TopicService, patiently};
+use crate::patience::{Fault, patiently};
+use crate::service::{self, MAX_HELD, TopicService};
 use crate::streams::{Newest, Streams};
 use crate::transport::Ipc;
 

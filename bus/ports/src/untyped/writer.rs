@@ -7,13 +7,14 @@ use lager_topics::Stamp;
 
 use super::copies::Copies;
 use super::outlet::{Lent, Outlet};
-use super::{Here, Kind, ends_here};
+use super::standard::StandardListeners;
 use crate::bus::Bus;
 use crate::cause::Cause;
 use crate::clock::Clock;
-use crate::doorbell::{Rope, StandardListeners};
+use crate::doorbell::Rope;
 use crate::error::{PortError, SendError};
-use crate::service::Side;
+use crate::here::{Here, ends_here};
+use crate::kind::{Kind, Side};
 
 /// [`crate::Publisher`] without the payload's type.
 pub(crate) struct Writer {
@@ -51,7 +52,7 @@ impl Writer {
             .qos
             .actors
             .iter()
-            .map(|actor| Rope::to(bus, *actor, kind.id))
+            .map(|actor| Rope::to(bus.board(), *actor, kind.id))
             .collect::<Result<_, _>>()?;
         let standard = StandardListeners::of(bus, kind)?;
         let (copies, side) = if kind.qos.serves_actors_first() {

@@ -9,9 +9,10 @@ use iceoryx2::prelude::PortFactory;
 
 use crate::bus::Bus;
 use crate::error::PortError;
-use crate::service::{self, EventService, Fault, patiently};
+use crate::kind::Kind;
+use crate::patience::{Fault, patiently};
+use crate::service::{self, EventService};
 use crate::transport::Ipc;
-use crate::untyped::Kind;
 
 /// The standard listeners of one topic, from a writer's side.
 pub(crate) struct StandardListeners {
