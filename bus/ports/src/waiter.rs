@@ -22,7 +22,7 @@ use rustix::thread::set_current_timer_slack;
 
 use crate::bus::Bus;
 use crate::clock::Clock;
-use crate::doorbell::{self, Bell, InsideRope, Pace, Plan};
+use crate::doorbell::{self, Bell, Pace, Plan, SeatRinger};
 use crate::error::PortError;
 use crate::untyped::republish_states;
 
@@ -217,7 +217,7 @@ impl Waiter {
     /// None at present.
     pub fn ringer(&self) -> Result<Ringer, PortError> {
         Ok(Ringer {
-            rope: self.bell.inside_rope(),
+            seat: self.bell.seat_ringer(),
         })
     }
 
@@ -362,13 +362,13 @@ impl fmt::Debug for Waiter {
 /// Wakes a [`Waiter`] of this process from any thread; clones ring the same one.
 #[derive(Clone)]
 pub struct Ringer {
-    rope: InsideRope,
+    seat: SeatRinger,
 }
 
 impl Ringer {
     /// Rings.
     pub fn ring(&self) {
-        self.rope.ring();
+        self.seat.ring();
     }
 }
 

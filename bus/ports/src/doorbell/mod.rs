@@ -161,9 +161,9 @@ impl Bell {
         self.segment.stop_spinning(self.seat);
     }
 
-    /// A rope for the threads of this process.
-    pub(crate) fn inside_rope(&self) -> InsideRope {
-        InsideRope {
+    /// A ringer for the threads of this process.
+    pub(crate) fn seat_ringer(&self) -> SeatRinger {
+        SeatRinger {
             segment: Arc::clone(&self.segment),
             seat: self.seat,
         }
@@ -176,15 +176,15 @@ impl Drop for Bell {
     }
 }
 
-/// A ringer's end.
-pub(crate) struct Rope {
+/// The end of whoever rings the waiters of a role.
+pub(crate) struct RoleRinger {
     segment: Arc<Segment>,
     role: Role,
     reason: usize,
 }
 
-impl Rope {
-    /// A rope to the bells of `role`, present and future, for samples of the topic or request with
+impl RoleRinger {
+    /// A ringer of the bells of `role`, present and future, for samples of the topic or request with
     /// the number `id`.
     pub(crate) fn to(board: &Board, role: Role, id: u32) -> Result<Self, PortError> {
         Ok(Self {
@@ -201,15 +201,15 @@ impl Rope {
     }
 }
 
-/// A rope to one bell, for the threads of its own process; clones ring the same bell. After the
+/// A ringer of one bell, for the threads of its own process; clones ring the same bell. After the
 /// bell is gone, a ring may wake the next owner of its seat in vain.
 #[derive(Clone)]
-pub(crate) struct InsideRope {
+pub(crate) struct SeatRinger {
     segment: Arc<Segment>,
     seat: usize,
 }
 
-impl InsideRope {
+impl SeatRinger {
     /// Rings.
     pub(crate) fn ring(&self) {
         word::ring(self.segment.seat(self.seat), INSIDE);

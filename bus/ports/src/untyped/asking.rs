@@ -16,7 +16,7 @@ use iceoryx2::service::static_config::message_type_details::TypeDetail;
 
 use super::behind;
 use crate::bus::Bus;
-use crate::doorbell::Rope;
+use crate::doorbell::RoleRinger;
 use crate::error::{CallError, PortError, ReceiveError};
 use crate::fault::TransportFault;
 use crate::here::{Here, ends_here};
@@ -32,7 +32,7 @@ const LOOK_EVERY: Duration = Duration::from_micros(200);
 pub(crate) struct Asker {
     port: Here<AskingPort>,
     question: Question,
-    rope: Rope,
+    ringer: RoleRinger,
 }
 
 struct AskingPort {
@@ -49,7 +49,7 @@ ends_here!(AskingPort, AnsweringPort, Active);
 impl Asker {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, question: Question) -> Result<Self, PortError> {
-        let rope = Rope::to(bus.board(), question.actor, question.id)?;
+        let ringer = RoleRinger::to(bus.board(), question.actor, question.id)?;
         let service = service::request(bus, &question)?;
         let client = patiently(bus, question.name, || {
             service
@@ -70,7 +70,7 @@ impl Asker {
         Ok(Self {
             port: Here::new(AskingPort { client, service }),
             question,
-            rope,
+            ringer,
         })
     }
 
@@ -132,7 +132,7 @@ impl Asker {
         // SAFETY: all of its bytes have been written.
         let loan = unsafe { loan.assume_init() };
         let pending = loan.send().map_err(|error| self.failed(error))?;
-        self.rope.ring();
+        self.ringer.ring();
         Ok(pending)
     }
 

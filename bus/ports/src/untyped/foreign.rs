@@ -8,7 +8,7 @@ use lager_topics::{Description, Role, Stamp, id};
 use super::outlet::Outlet;
 use super::writer::new_epoch;
 use crate::bus::Bus;
-use crate::doorbell::Rope;
+use crate::doorbell::RoleRinger;
 use crate::error::{PortError, SendError};
 use crate::kind::Side;
 use crate::service;
@@ -22,7 +22,7 @@ pub(crate) struct Foreign {
     /// The actors' service, since somebody has it open.
     actors: OnceCell<Outlet>,
     size: usize,
-    rope: Rope,
+    ringer: RoleRinger,
     pub(crate) next_sequence: Cell<u64>,
     pub(crate) epoch: u64,
 }
@@ -41,7 +41,7 @@ impl Foreign {
             outlet: Outlet::on(bus, name, service)?,
             actors: OnceCell::new(),
             size: description.size(),
-            rope: Rope::to(bus.board(), Role::Guest, id(name))?,
+            ringer: RoleRinger::to(bus.board(), Role::Guest, id(name))?,
             next_sequence: Cell::new(0),
             // Taken after the port exists, as a typed writer does.
             epoch: new_epoch(),
@@ -74,11 +74,11 @@ impl Foreign {
         let acting = self.actors.get();
         let acted = acting.map_or(Ok(()), |outlet| put(outlet, payload, stamp));
         if acting.is_some() {
-            self.rope.ring();
+            self.ringer.ring();
         }
         let sent = put(&self.outlet, payload, stamp);
         if acting.is_none() {
-            self.rope.ring();
+            self.ringer.ring();
         }
         acted.and(sent)
     }

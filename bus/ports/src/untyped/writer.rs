@@ -11,7 +11,7 @@ use super::standard::StandardListeners;
 use crate::bus::Bus;
 use crate::cause::Cause;
 use crate::clock::Clock;
-use crate::doorbell::Rope;
+use crate::doorbell::RoleRinger;
 use crate::error::{PortError, SendError};
 use crate::here::{Here, ends_here};
 use crate::kind::{Kind, Side};
@@ -25,7 +25,7 @@ pub(crate) struct Writer {
     /// Everybody else has not got the last sample yet.
     behind: Cell<bool>,
     standard: Here<StandardListeners>,
-    ropes: Box<[Rope]>,
+    ringers: Box<[RoleRinger]>,
     next_sequence: Cell<u64>,
     epoch: u64,
     writer: u32,
@@ -48,11 +48,11 @@ pub(crate) enum To {
 impl Writer {
     #[inline(never)]
     pub(crate) fn new(bus: &Bus, kind: &Kind) -> Result<Self, PortError> {
-        let ropes = kind
+        let ringers = kind
             .qos
             .actors
             .iter()
-            .map(|actor| Rope::to(bus.board(), *actor, kind.id))
+            .map(|actor| RoleRinger::to(bus.board(), *actor, kind.id))
             .collect::<Result<_, _>>()?;
         let standard = StandardListeners::of(bus, kind)?;
         let (copies, side) = if kind.qos.serves_actors_first() {
@@ -65,7 +65,7 @@ impl Writer {
             copies,
             behind: Cell::new(false),
             standard: Here::new(standard),
-            ropes,
+            ringers,
             next_sequence: Cell::new(0),
             // Taken after the ports exist: a subscriber that is older than the epoch was there for
             // every sample, and may count its losses from 0 on.
@@ -120,8 +120,8 @@ impl Writer {
         }
         let sent = lent.send(stamp);
         if to != To::AllQuietly {
-            for rope in &self.ropes {
-                rope.ring();
+            for ringer in &self.ringers {
+                ringer.ring();
             }
         }
         self.behind.set(true);
