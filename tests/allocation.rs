@@ -4,45 +4,18 @@
 //! The robot itself runs in a process of its own, so that only the two services and this test's
 //! sleeping thread are counted.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
 use lager_plant::Warehouse;
 use lager_ports::{Bus, Cause, Shutdown};
+use lager_rig::allocations::{self, Counting};
 use lager_tests::{Domain, wait_for};
 use lager_topics::{
     Ask, AskKind, BridgeRequest, LinkHealth, MapProduct, MissionOrder, Mode, NavMap, NavStatus,
     Order, Phase, Role, SensorLine, Side, SteeringState, WarehouseMap,
 };
-
-/// The system's allocator, which counts.
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call goes unchanged to the system's allocator; only a counter is added.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`, which is the system's too.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System` by `alloc` above, with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: `pointer` came from `System` by `alloc` above, with this layout.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -130,7 +103,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
             line.latest().expect("readable").map(|_| ())
         });
         wait_for("a report", || state.latest().expect("readable").map(|_| ()));
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations::of_all_threads();
         // From driving over the next crossing to the station: decisions are made, not only frames
         // passed on.
         let frames = wait_for("2000 frames", || {
@@ -139,7 +112,7 @@ fn bridge_and_logic_allocate_nothing_per_frame() {
             let frames = line.received() + line.lost() + state.received() + state.lost();
             (frames > 2_000).then_some(frames)
         });
-        let after = ALLOCATIONS.load(Ordering::Relaxed);
+        let after = allocations::of_all_threads();
         assert_eq!(after - before, 0, "allocations over {frames} frames");
     });
     // The shutdown rings the services, so it has the bells open.

@@ -68,8 +68,7 @@ pub fn alone() -> MutexGuard<'static, ()> {
 /// its processes left.
 #[derive(Debug)]
 pub struct Domain {
-    bus: PathBuf,
-    folder: PathBuf,
+    own: lager_rig::Domain,
     _alone: MutexGuard<'static, ()>,
 }
 
@@ -80,15 +79,9 @@ impl Domain {
     /// When its folder cannot be made.
     #[must_use]
     pub fn new() -> Self {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
         let alone = alone();
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let name = format!("lager-test-{}-{number}", std::process::id());
-        let folder = std::env::temp_dir().join(&name);
-        fs::create_dir_all(&folder).expect("a temporary folder");
         Self {
-            bus: Path::new("/dev/shm").join(name),
-            folder,
+            own: lager_rig::Domain::new("lager-test").expect("a bus of its own"),
             _alone: alone,
         }
     }
@@ -98,9 +91,9 @@ impl Domain {
         let mut command = Command::new(lager());
         command
             .arg("--bus")
-            .arg(&self.bus)
+            .arg(self.own.folder())
             .args(args)
-            .current_dir(&self.folder)
+            .current_dir(self.folder())
             .stdin(Stdio::null());
         command
     }
@@ -112,8 +105,8 @@ impl Domain {
     pub fn start(&self, args: &[&str]) -> Running {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let log = self.folder.join(format!("{number}.log"));
-        let out = self.folder.join(format!("{number}.out"));
+        let log = self.folder().join(format!("{number}.log"));
+        let out = self.folder().join(format!("{number}.out"));
         let child = self
             .lager(args)
             .stdout(fs::File::create(&out).expect("a log file"))
@@ -176,33 +169,32 @@ impl Domain {
         BusConfig {
             robot: robot.parse().expect("a robot's name"),
             speed,
-            clock: None,
-            folder: Some(self.bus.clone()),
+            ..self.own.config()
         }
     }
 
     /// Where `robot` keeps its clock page if its body is emulated.
     #[must_use]
     pub fn clock_page(&self, robot: &str) -> PathBuf {
-        self.bus.join(robot).join("clock")
+        self.own.folder().join(robot).join("clock")
     }
 
     /// Where the emulated boards of `robot` keep their EEPROMs.
     #[must_use]
     pub fn eeprom(&self, robot: &str) -> PathBuf {
-        self.bus.join(robot).join("eeprom")
+        self.own.folder().join(robot).join("eeprom")
     }
 
     /// The folder in which the bus lives.
     #[must_use]
     pub fn bus_folder(&self) -> &Path {
-        &self.bus
+        self.own.folder()
     }
 
     /// A folder of this test's own.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        &self.folder
+        self.own.files()
     }
 
     /// The shared memory and bookkeeping files that are left.
@@ -211,25 +203,10 @@ impl Domain {
     /// When the bus's folder cannot be used.
     #[must_use]
     pub fn leftovers(&self) -> Vec<String> {
-        let place = self.bus("r1", 1.0).place().expect("the bus's folder");
-        let mut left: Vec<String> = place
-            .segments()
-            .iter()
+        let left = self.own.left().into_iter();
+        left.filter(|path| !is_released_stop(path))
             .map(|path| path.display().to_string())
-            // The transport keeps one small segment for each bus for ever.
-            .filter(|name| !name.ends_with(".global_mgmt"))
-            .collect();
-        let mut folders = vec![self.bus.clone()];
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
-                if entry.path().is_dir() {
-                    folders.push(entry.path());
-                } else if !is_released_stop(&entry.path()) {
-                    left.push(entry.path().display().to_string());
-                }
-            }
-        }
-        left
+            .collect()
     }
 
     /// The last line of a test: nothing of the bus is left.
@@ -252,7 +229,7 @@ impl Domain {
     /// Prints the last lines of every log that is not empty.
     fn show_logs(&self) {
         const LINES: usize = 40;
-        for entry in fs::read_dir(&self.folder).into_iter().flatten().flatten() {
+        for entry in fs::read_dir(self.folder()).into_iter().flatten().flatten() {
             let log = fs::read(entry.path()).unwrap_or_default();
             let log = String::from_utf8_lossy(&log);
             if entry.path().extension().is_some_and(|end| end == "log") && !log.is_empty() {
@@ -267,14 +244,10 @@ impl Domain {
 }
 
 impl Drop for Domain {
-    /// Removes the test's own folder and bus. A test that fails shows first what its processes logged.
+    /// A test that fails shows what its processes logged, before its folder and its bus are removed.
     fn drop(&mut self) {
         if std::thread::panicking() {
             self.show_logs();
-        }
-        let _ = fs::remove_dir_all(&self.folder);
-        if let Ok(place) = self.bus("r1", 1.0).place() {
-            place.remove();
         }
     }
 }

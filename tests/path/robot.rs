@@ -4,11 +4,12 @@
 use std::time::{Duration, Instant};
 
 use lager_ports::{Bus, Cause, Clock, Publisher, Subscriber};
+use lager_rig::one_square;
 use lager_tests::{Domain, WATCHDOG};
 use lager_topics::{
     Ask, AskKind, BridgeRequest, CommandLatency, LatencyCommand, LatencyPath, LinkHealth,
-    MapProduct, MissionOrder, Mode, NavMap, NavStatus, Order, PathLatency, Phase, Role,
-    SensorDistance, SensorLine, Side, Stamp, SteeringCommand, SteeringState, WarehouseMap,
+    MissionOrder, Mode, NavMap, NavStatus, Order, PathLatency, Phase, Role, SensorDistance,
+    SensorLine, Stamp, SteeringCommand, SteeringState,
 };
 use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCommand};
 
@@ -137,7 +138,7 @@ impl Seen {
 
 impl Robot {
     pub(crate) fn start(domain: &Domain, traced: bool) -> Self {
-        let boards = Boards::new(domain.folder());
+        let boards = Boards::new();
         let bus = domain.bus("r1", 1.0);
         let ports = boards
             .ports
@@ -268,21 +269,4 @@ impl Robot {
         bridge.end();
         logic.end();
     }
-}
-
-/// A warehouse of one square: the product stands beside the edge the robot looks along.
-fn one_square() -> WarehouseMap {
-    let mut map = WarehouseMap {
-        width: 1,
-        height: 1,
-        side_length_cm: 50,
-        product_count: 1,
-        ..WarehouseMap::default()
-    };
-    map.products[0] = MapProduct {
-        id: 1,
-        side: Side::Down.into(),
-        ..MapProduct::default()
-    };
-    map
 }

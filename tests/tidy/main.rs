@@ -68,10 +68,16 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "lager-pty",
         ],
     ),
+    // What tests and benches stand on.
+    (
+        "lager-rig",
+        &["lager-ports", "lager-topics", "lager-wire"],
+    ),
     // floor 4
     (
         "lager-benches",
         &[
+            "lager-rig",
             "lager-wire",
             "lager-topics",
             "lager-ports",

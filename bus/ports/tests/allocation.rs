@@ -6,75 +6,25 @@
 //! A binary of its own, since the allocator counts for the whole process. One test only, so that
 //! nothing else runs meanwhile; what other threads do is not counted.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig, Cause, Policy, Wake};
+use lager_rig::Domain;
+use lager_rig::allocations::{Counting, of as allocations};
 use lager_topics::{LinkHealth, Role, SensorLine, SteeringCommand};
 
-struct Counting;
-
-thread_local! {
-    static COUNT: Cell<Option<u64>> = const { Cell::new(None) };
-}
-
-fn count() {
-    // The thread may be ending, and then nobody counts any more.
-    let _ = COUNT.try_with(|count| count.set(count.get().map(|count| count + 1)));
-}
-
-// SAFETY: everything is done by the system's allocator; counting neither allocates nor unwinds.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Allocations while `work` runs in this thread.
-fn allocations(work: impl FnOnce()) -> u64 {
-    COUNT.set(Some(0));
-    work();
-    COUNT.replace(None).unwrap()
-}
+static COUNTING: Counting = Counting;
 
 #[test]
 fn nothing_is_allocated_per_frame() {
     let counted = allocations(|| drop(std::hint::black_box(Box::new(1))));
     assert_eq!(counted, 1, "the counter counts");
 
-    let id = format!("lpa{}", std::process::id());
-    let config = BusConfig {
-        folder: Some(std::path::Path::new("/dev/shm").join(id)),
-        ..BusConfig::default()
-    };
+    let domain = Domain::new("lager-ports").unwrap();
     for policy in [Policy::Block, Policy::Spin, Policy::ADAPTIVE] {
-        exchange(&config, policy);
+        exchange(&domain.config(), policy);
     }
-    config.place().unwrap().remove();
 }
 
 /// Sensor frame to order, again and again, with observers attached.

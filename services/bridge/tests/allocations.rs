@@ -1,49 +1,14 @@
 //! After start-up the bridge allocates nothing: neither in its readers nor in its main loop.
 //!
 //! It is a program of its own because it replaces the allocator.
-#![allow(unsafe_code, reason = "an allocator cannot be had otherwise")]
 
 #[path = "bridge/harness/mod.rs"]
 mod harness;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-
+use lager_rig::allocations::{Counting, exempt_this_thread, of_all_threads};
 use lager_topics::Finish;
 
 use harness::{FOLLOW, LEFT_PERP, Robot, logic};
-
-static COUNTING: AtomicBool = AtomicBool::new(false);
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
-fn count() {
-    if COUNTING.load(Ordering::Relaxed) && !harness::is_exempt() {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
-// SAFETY: every call is handed to the system's allocator unchanged; counting touches only
-// atomics and a thread-local without a destructor.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps `alloc`'s contract, which is the same.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System` with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: `pointer` came from `System` with this layout.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -65,7 +30,7 @@ fn published(robot: &mut Robot) -> [u64; 4] {
 
 #[test]
 fn nothing_is_allocated_per_frame_or_order() {
-    harness::exempt();
+    exempt_this_thread();
     let mut robot = Robot::autonomous();
     // Once through everything, so that whatever is made on first use is made.
     let drive = |robot: &mut Robot, first: u32| {
@@ -91,12 +56,11 @@ fn nothing_is_allocated_per_frame_or_order() {
     drive(&mut robot, 1);
 
     let before = published(&mut robot);
-    COUNTING.store(true, Ordering::Relaxed);
+    let already = of_all_threads();
     for round in 1..=4 {
         drive(&mut robot, round * 10);
     }
-    COUNTING.store(false, Ordering::Relaxed);
-    let allocations = ALLOCATIONS.load(Ordering::Relaxed);
+    let allocations = of_all_threads() - already;
     let after = published(&mut robot);
     let samples: u64 = after
         .iter()
@@ -107,11 +71,9 @@ fn nothing_is_allocated_per_frame_or_order() {
     assert_eq!(allocations, 0, "over {samples} samples");
 
     // The counter counts: a thread of the bridge's kind that allocates is seen.
-    ALLOCATIONS.store(0, Ordering::Relaxed);
-    COUNTING.store(true, Ordering::Relaxed);
+    let already = of_all_threads();
     std::thread::spawn(|| drop(std::hint::black_box(vec![0_u8; 100])))
         .join()
         .unwrap();
-    COUNTING.store(false, Ordering::Relaxed);
-    assert!(ALLOCATIONS.load(Ordering::Relaxed) > 0);
+    assert!(of_all_threads() > already);
 }

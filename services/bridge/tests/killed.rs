@@ -7,11 +7,14 @@
 #[path = "bridge/harness/mod.rs"]
 mod harness;
 
-use std::process::{Child, Command as Process};
+use std::error::Error;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use lager_bridge::BridgeConfig;
 use lager_ports::{Bus, Keeper, Shutdown};
+use lager_rig::process::run_if_asked;
+use lager_rig::{Parent, Process};
 use lager_topics::{Finish, LinkHealth, Mode, Role, SteeringOrder};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -20,63 +23,43 @@ use harness::{
     logic, wait_until,
 };
 
-const AS_BRIDGE: &str = "as-bridge";
-
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    match arguments.get(1).map(String::as_str) {
-        Some(AS_BRIDGE) => be_the_bridge(&arguments[2], arguments.len() > 3),
-        Some("--list") => (),
-        _ => {
-            a_turn_is_carried_out_once_however_often_the_bridge_is_killed();
-            println!("test a_turn_is_carried_out_once_however_often_the_bridge_is_killed ... ok");
-            a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older();
-            println!("test a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older ... ok");
-        }
+    run_if_asked(&[&[(BRIDGE, bridge)]]);
+    if std::env::args().nth(1).as_deref() == Some("--list") {
+        return;
     }
+    a_turn_is_carried_out_once_however_often_the_bridge_is_killed();
+    println!("test a_turn_is_carried_out_once_however_often_the_bridge_is_killed ... ok");
+    a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older();
+    println!("test a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older ... ok");
 }
 
-fn be_the_bridge(name: &str, resume: bool) {
-    let config = harness::bus_config(name);
-    let folder = harness::folder(name);
-    let bus = Bus::open(&config, Role::Bridge).unwrap();
+const BRIDGE: &str = "bridge";
+
+/// The bridge as a process that does not outlive the test.
+fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some((bus, ports, resume)) = parent.hear::<(PathBuf, PathBuf, bool)>()? else {
+        return Ok(());
+    };
+    let bus = Bus::open(&harness::bus_config(&bus), Role::Bridge).unwrap();
     let config = BridgeConfig {
-        ports: [folder.join("sensor"), folder.join("steering")],
+        ports: [ports.join("sensor"), ports.join("steering")],
         resume,
         ..BridgeConfig::default()
     };
     lager_bridge::run(&bus, &config, &Shutdown::new()).unwrap();
+    Ok(())
 }
 
-/// The bridge as a process that does not outlive the test.
-struct Running(Child);
-
-impl Running {
-    fn start(isolation: &Isolation, resume: Option<&str>) -> Self {
-        let program = std::env::current_exe().unwrap();
-        Self(
-            Process::new(program)
-                .args([AS_BRIDGE, isolation.name()])
-                .args(resume)
-                .spawn()
-                .unwrap(),
-        )
-    }
-
-    fn kill(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        self.kill();
-    }
+fn start(isolation: &Isolation, resume: bool) -> Option<Process> {
+    let mut process = Process::start(BRIDGE).unwrap();
+    process.tell(&(isolation.bus_folder(), isolation.folder(), resume));
+    Some(process)
 }
 
 struct Scene {
-    bridge: Running,
+    /// `None` while there is none.
+    bridge: Option<Process>,
     keeper: Keeper<LinkHealth>,
     supervisor: Bus,
     hands: Hands,
@@ -92,7 +75,7 @@ impl Scene {
         let steering = Board::plugged(SteeringBoard::new(), isolation.folder().join("steering"));
         let supervisor = isolation.open(Role::Supervisor);
         Self {
-            bridge: Running::start(&isolation, None),
+            bridge: start(&isolation, false),
             keeper: supervisor.keeper().unwrap(),
             hands: Hands::new(&isolation.open(Role::Operator)),
             supervisor,
@@ -104,11 +87,11 @@ impl Scene {
 
     /// What a supervisor does when its bridge has died.
     fn restart(&mut self) {
-        self.bridge.kill();
+        self.bridge = None;
         self.keeper.remember().unwrap();
         self.supervisor.sweep();
         self.keeper.hand_over().unwrap();
-        self.bridge = Running::start(&self.isolation, Some("resume"));
+        self.bridge = start(&self.isolation, true);
     }
 
     /// Renews `order` until `condition` holds, and does the supervisor's work beside it.
@@ -199,7 +182,8 @@ fn a_frozen_bridge_that_goes_on_writes_standby_and_nothing_older() {
         health.sensor.up == 1 && health.steering.up == 1
     });
     scene.hands.set_mode(Mode::Autonomous);
-    let process = Pid::from_raw(i32::try_from(scene.bridge.0.id()).unwrap()).unwrap();
+    let process = scene.bridge.as_ref().unwrap().pid();
+    let process = Pid::from_raw(i32::try_from(process).unwrap()).unwrap();
     let mut id = 100;
     for round in 0..20 {
         id += 1;

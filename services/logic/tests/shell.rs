@@ -1,41 +1,21 @@
 //! The shell on a real bus: what goes out, in which order, and what a successor takes up.
 
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use lager_logic::{LogicConfig, run};
-use lager_ports::{Bus, BusConfig, Cause, Publisher, Shutdown, Subscriber};
+use lager_ports::{Bus, Cause, Publisher, Shutdown, Subscriber};
+use lager_rig::{Domain, one_square};
 use lager_topics::{
     DistanceFrame, EventKind, Health, Input, InputKind, LineFrame, LinkHealth, LogThought,
-    MapProduct, MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus,
-    OperatorInput, Order, Phase, Role, SensorDistance, SensorLine, Side, Stamp, SteeringCommand,
-    SteeringOrder, SteeringReport, SteeringState, Topic, WarehouseMap,
+    MissionEvent, MissionOrder, Mode, NavMap, NavRoute, NavStatus, NavigatorStatus, OperatorInput,
+    Order, Phase, Role, SensorDistance, SensorLine, Stamp, SteeringCommand, SteeringOrder,
+    SteeringReport, SteeringState, Topic,
 };
 use lager_wire::LineState;
 
 /// A bus of its own for one test.
-struct Domain(BusConfig);
-
-impl Domain {
-    fn new() -> Self {
-        static NEXT: AtomicU32 = AtomicU32::new(0);
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let folder = format!("/dev/shm/ll{}x{number}", std::process::id());
-        Self(BusConfig {
-            folder: Some(folder.into()),
-            ..BusConfig::default()
-        })
-    }
-
-    fn open(&self, role: Role) -> Bus {
-        Bus::open(&self.0, role).unwrap()
-    }
-}
-
-impl Drop for Domain {
-    fn drop(&mut self) {
-        self.0.place().unwrap().remove();
-    }
+fn domain() -> Domain {
+    Domain::new("lager-logic").unwrap()
 }
 
 /// What a steering board says that stands.
@@ -85,19 +65,7 @@ impl World {
 
     /// Tells the retained topics, and lets the boards report standing on the line.
     fn tell(&self, mode: Mode, stopped: bool) {
-        let mut map = WarehouseMap {
-            width: 1,
-            height: 1,
-            side_length_cm: 50,
-            product_count: 1,
-            ..WarehouseMap::default()
-        };
-        map.products[0] = MapProduct {
-            id: 1,
-            side: Side::Down.into(),
-            ..MapProduct::default()
-        };
-        self.map.send(Cause::OWN, map).unwrap();
+        self.map.send(Cause::OWN, one_square()).unwrap();
         let health = Health {
             mode: mode.into(),
             stopped: stopped.into(),
@@ -193,7 +161,7 @@ fn with_logic(domain: &Domain, resume: bool, work: impl FnOnce()) {
 
 #[test]
 fn an_order_leads_to_a_renewed_steering_order_and_is_announced() {
-    let domain = Domain::new();
+    let domain = domain();
     let bus = domain.open(Role::Supervisor);
     let mut world = World::new(&bus);
     with_logic(&domain, false, || {
@@ -232,7 +200,7 @@ fn an_order_leads_to_a_renewed_steering_order_and_is_announced() {
 
 #[test]
 fn a_renewal_carries_the_newest_frame() {
-    let domain = Domain::new();
+    let domain = domain();
     let bus = domain.open(Role::Supervisor);
     let mut world = World::new(&bus);
     with_logic(&domain, false, || {
@@ -265,7 +233,7 @@ fn a_renewal_carries_the_newest_frame() {
 
 #[test]
 fn a_latched_stop_silences_logic_until_the_resume() {
-    let domain = Domain::new();
+    let domain = domain();
     let bus = domain.open(Role::Supervisor);
     let mut world = World::new(&bus);
     with_logic(&domain, false, || {
@@ -287,7 +255,7 @@ fn a_latched_stop_silences_logic_until_the_resume() {
 
 #[test]
 fn a_successor_takes_up_the_kept_state() {
-    let domain = Domain::new();
+    let domain = domain();
     let bus = domain.open(Role::Supervisor);
     let mut world = World::new(&bus);
     let mut keeper = bus.keeper::<NavStatus>().unwrap();
@@ -325,7 +293,7 @@ fn a_successor_takes_up_the_kept_state() {
 
 #[test]
 fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
-    let domain = Domain::new();
+    let domain = domain();
     let bus = domain.open(Role::Supervisor);
     let mut world = World::new(&bus);
     let distance = bus.publisher::<SensorDistance>().unwrap();
@@ -358,7 +326,7 @@ fn what_is_missed_is_counted_on_every_topic_where_each_sample_counts() {
 
 #[test]
 fn a_successor_that_finds_nothing_kept_knows_no_place_until_a_reset() {
-    let domain = Domain::new();
+    let domain = domain();
     let shutdown = Shutdown::new();
     let bus = domain.open(Role::Logic);
     let logic = {

@@ -4,13 +4,14 @@
 use std::time::Duration;
 
 use lager_ports::{Cause, Peer, Policy, PortError, Wake};
+use lager_rig::Process;
 use lager_topics::{
     Health, LARGEST_COPY, LinkHealth, OBSERVERS, Qos, Role, SensorLine, Stamp, Topic, payload,
 };
 
 use crate::domain::{Domain, drain, frame, send, sweep};
 use crate::interop::stock_listener_of_line;
-use crate::process::Player;
+use crate::process;
 
 const NOTHING: [u32; 0] = [];
 
@@ -106,11 +107,11 @@ fn a_killed_writer_takes_no_more_along_than_what_it_had_sent_ahead() {
         .open(Role::Observer)
         .subscriber::<SensorLine>()
         .unwrap();
-    Player::start(&domain, "line-writer-ahead").kill();
+    process::start(&domain, "line-writer-ahead").kill();
     assert_eq!(drain(&mut actor), (0..10).collect::<Vec<_>>());
     assert_eq!(drain(&mut observer), (0..9).collect::<Vec<_>>());
     // Its successor is a new stream, and no loss.
-    Player::start(&domain, "line-writer").kill();
+    process::start(&domain, "line-writer").kill();
     for reader in [&mut actor, &mut observer] {
         assert_eq!(drain(reader), (0..10).collect::<Vec<_>>());
         assert_eq!((reader.lost(), reader.writers_heard()), (0, 2));
@@ -223,7 +224,7 @@ fn a_state_that_is_handed_over_reaches_the_successor_and_both_kinds_of_readers()
     let domain = Domain::new();
     let supervisor = domain.open(Role::Supervisor);
     let mut keeper = supervisor.keeper::<LinkHealth>().unwrap();
-    let bridge = Player::start(&domain, "health-writer");
+    let bridge = process::start(&domain, "health-writer");
     let pid = bridge.pid();
     keeper.remember().unwrap();
     bridge.kill();
@@ -321,12 +322,12 @@ fn neither_side_takes_places_of_the_other() {
 fn places_of_killed_actors_are_taken_again() {
     let domain = Domain::new();
     let players: Vec<_> = (0..SensorLine::QOS.max_acting())
-        .map(|_| Player::start(&domain, "line-actor"))
+        .map(|_| process::start(&domain, "line-actor"))
         .collect();
     // All start before any is swept, since opening sweeps.
     let bridge = domain.open(Role::Bridge);
     let logic = domain.open(Role::Logic);
-    players.into_iter().for_each(Player::kill);
+    players.into_iter().for_each(Process::kill);
     let publisher = bridge.publisher::<SensorLine>().unwrap();
     let mut successor = logic.subscriber::<SensorLine>().unwrap();
     send(&publisher, 6);

@@ -3,10 +3,11 @@
 use std::time::{Duration, Instant};
 
 use lager_ports::{Policy, Wake, remove_stale_nodes};
+use lager_rig::Process;
 use lager_topics::{Role, SensorLine};
 
 use crate::domain::{Domain, send, until};
-use crate::process::Player;
+use crate::process;
 use crate::waiting::spins_under_quick_rings;
 
 const LONG: Duration = Duration::from_secs(60);
@@ -35,7 +36,7 @@ fn a_ringer_killed_anywhere_leaves_a_bell_that_others_can_ring() {
     let bridge = domain.open(Role::Bridge);
     let publisher = bridge.publisher::<SensorLine>().unwrap();
     for round in 0..ROUNDS {
-        let flood = Player::start(&domain, "line-flood");
+        let flood = process::start(&domain, "line-flood");
         let end = Instant::now() + Duration::from_millis(2);
         while Instant::now() < end {
             assert_eq!(waiter.wait(LONG), Wake::Rung);
@@ -69,13 +70,13 @@ fn waiters_killed_anywhere_give_their_seats_to_their_successors() {
     let witness = logic.waiter(Policy::Block).unwrap();
     for round in 0..ROUNDS {
         let parts = ["navigator-hurries", "navigator-waits"];
-        let victims = parts.map(|part| Player::start(&domain, part));
+        let victims = parts.map(|part| process::start(&domain, part));
         let end = Instant::now() + Duration::from_millis(1);
         while Instant::now() < end {
             send(&publisher, 0);
         }
         somewhere(round);
-        victims.into_iter().for_each(Player::kill);
+        victims.into_iter().for_each(Process::kill);
         // Nobody sweeps: every place of the role must be had all the same.
         let successors: Vec<_> = (0..7)
             .map(|_| logic.waiter(Policy::Block).unwrap())
@@ -94,7 +95,7 @@ fn a_killed_spinner_gives_its_right_back() {
     // As many as may spin at a time; none is left to this one unless they give it back.
     let cores = std::thread::available_parallelism().unwrap().get();
     for _ in 1..cores.min(8) {
-        Player::start(&domain, "navigator-spins").kill();
+        process::start(&domain, "navigator-spins").kill();
     }
     bridge.sweep();
     if cores > 1 {
@@ -107,9 +108,9 @@ fn of_killed_processes_alone_nothing_is_left() {
     let domain = Domain::new();
     for round in 0..ROUNDS {
         let parts = ["navigator-hurries", "line-flood", "navigator-waits"];
-        let victims = parts.map(|part| Player::start(&domain, part));
+        let victims = parts.map(|part| process::start(&domain, part));
         somewhere(round);
-        victims.into_iter().for_each(Player::kill);
+        victims.into_iter().for_each(Process::kill);
         assert_eq!(bells(&domain), 1, "they had a board");
         until("all of it is swept", || {
             if round % 2 == 0 {

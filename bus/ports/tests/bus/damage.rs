@@ -8,10 +8,11 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig, Inventory, OpenError, mend};
+use lager_rig::Process;
 use lager_topics::{Role, SensorDistance, SensorLine};
 
 use crate::domain::{Domain, drain, send};
-use crate::process::Player;
+use crate::process;
 
 /// What `work` gives; a minute is longer than anything here takes, and shorter than for ever.
 fn in_time<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
@@ -138,8 +139,8 @@ fn of_the_dead_alone_mending_leaves_nothing_whatever_their_files_hold() {
     let domain = Domain::new();
     for damage in 0..4_u8 {
         let players = ["line-writer", "line-reader", "navigator-waits", "bridge"]
-            .map(|part| Player::start(&domain, part));
-        players.into_iter().for_each(Player::kill);
+            .map(|part| process::start(&domain, part));
+        players.into_iter().for_each(Process::kill);
         for segment in domain.place().segments() {
             match damage {
                 0 => {}

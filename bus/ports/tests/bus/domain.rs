@@ -1,7 +1,6 @@
 //! A bus of its own for each test.
 
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use lager_ports::{
@@ -13,25 +12,22 @@ use lager_topics::{LineFrame, Role, SensorLine};
 /// A bus nobody else is on. Dropping it proves that nothing of it is left.
 pub(crate) struct Domain {
     pub(crate) config: BusConfig,
+    own: lager_rig::Domain,
 }
 
 impl Domain {
     pub(crate) fn new() -> Self {
-        static NEXT: AtomicU32 = AtomicU32::new(0);
-        let id = format!(
-            "lp{}x{}",
-            std::process::id(),
-            NEXT.fetch_add(1, Ordering::Relaxed)
-        );
-        Self::at(Path::new("/dev/shm").join(id))
+        Self::of(lager_rig::Domain::new("lager-ports").unwrap())
     }
 
     pub(crate) fn at(folder: PathBuf) -> Self {
+        Self::of(lager_rig::Domain::at(folder))
+    }
+
+    fn of(own: lager_rig::Domain) -> Self {
         Self {
-            config: BusConfig {
-                folder: Some(folder),
-                ..BusConfig::default()
-            },
+            config: own.config(),
+            own,
         }
     }
 
@@ -53,36 +49,17 @@ impl Domain {
 
     /// What processes have in shared memory on this bus.
     pub(crate) fn in_shared_memory(&self) -> Vec<String> {
-        let mut left = self.left_in_shared_memory();
-        // The transport keeps one small segment for each bus for ever.
-        left.retain(|name| !name.ends_with(".global_mgmt"));
-        left
-    }
-
-    fn left_in_shared_memory(&self) -> Vec<String> {
-        let segments = self.place().segments();
+        let of_memory = |path: &&PathBuf| !path.starts_with(self.own.folder());
+        let left = self.own.left();
         let name = |path: &PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
-        segments.iter().map(name).collect()
+        left.iter().filter(of_memory).map(name).collect()
     }
 
     /// Files (not folders) in the bus's folder.
     pub(crate) fn left_in_folder(&self) -> Vec<PathBuf> {
-        let mut files = Vec::new();
-        let mut folders = vec![self.place().folder().to_owned()];
-        while let Some(folder) = folders.pop() {
-            let Ok(entries) = std::fs::read_dir(folder) else {
-                continue;
-            };
-            for entry in entries {
-                let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                } else {
-                    files.push(path);
-                }
-            }
-        }
-        files
+        let mut left = self.own.left();
+        left.retain(|path| path.starts_with(self.own.folder()));
+        left
     }
 }
 
@@ -91,7 +68,6 @@ impl Drop for Domain {
         let swept = remove_all_stale_nodes(&self.config);
         let left = self.in_shared_memory();
         let files = self.left_in_folder();
-        self.place().remove();
         if !std::thread::panicking() {
             assert!(swept, "a killed process could not be swept");
             assert_eq!(left, Vec::<String>::new());

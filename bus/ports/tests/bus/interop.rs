@@ -20,7 +20,7 @@ use lager_topics::{
 };
 
 use crate::domain::{Domain, frame, send};
-use crate::process::Player;
+use crate::process;
 
 /// As a stock program reads it from what `lager config --iceoryx2` prints.
 fn config(domain: &Domain) -> Config {
@@ -351,7 +351,7 @@ fn stock_asks_and_our_server_answers() {
 #[test]
 fn stock_sees_our_nodes_and_topics_and_sweeps_the_killed() {
     let domain = Domain::new();
-    let player = Player::start(&domain, "line-writer");
+    let player = process::start(&domain, "line-writer");
     let pid = player.pid();
     let node = stock(&domain);
 

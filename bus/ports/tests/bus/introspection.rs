@@ -8,7 +8,7 @@ use lager_ports::{Layout, NodeState, Peer, Policy, nodes, remove_stale_nodes};
 use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
 
 use crate::domain::{Domain, send};
-use crate::process::Player;
+use crate::process;
 
 #[test]
 fn topics_in_use_are_listed_with_their_ends() {
@@ -66,7 +66,7 @@ fn who_is_woken_by_a_topic_is_told() {
         pid: std::process::id(),
     };
     assert_eq!(woken(), [here]);
-    let player = Player::start(&domain, "navigator-waits");
+    let player = process::start(&domain, "navigator-waits");
     let there = Peer {
         pid: player.pid(),
         ..here
@@ -143,7 +143,7 @@ fn processes_are_listed_with_robot_and_role() {
 fn a_killed_process_is_listed_as_stale_until_it_is_removed() {
     let domain = Domain::new();
     assert_eq!(nodes(&domain.config).unwrap(), []);
-    let player = Player::start(&domain, "line-writer");
+    let player = process::start(&domain, "line-writer");
     let pid = player.pid();
     assert_eq!(nodes(&domain.config).unwrap()[0].state, NodeState::Alive);
     player.kill();
@@ -175,7 +175,7 @@ fn node_folder(domain: &Domain) -> PathBuf {
 #[test]
 fn a_process_killed_while_it_writes_a_tag_is_removed() {
     let domain = Domain::new();
-    Player::start(&domain, "line-writer").kill();
+    process::start(&domain, "line-writer").kill();
     let name = format!("{}7.port_tag", domain.place().prefix());
     let tag = node_folder(&domain).join(name);
     std::fs::write(&tag, "").unwrap();
@@ -188,7 +188,7 @@ fn a_process_killed_while_it_writes_a_tag_is_removed() {
 #[test]
 fn a_process_killed_while_it_leaves_is_removed() {
     let domain = Domain::new();
-    Player::start(&domain, "onlooker").kill();
+    process::start(&domain, "onlooker").kill();
     let folder = node_folder(&domain);
     let details = std::fs::read_dir(&folder)
         .unwrap()

@@ -11,15 +11,15 @@ use lager_topics::{
 };
 
 use crate::domain::{Domain, drain, send, sweep, until};
-use crate::process::Player;
+use crate::process;
 
 const LONG: Duration = Duration::from_secs(60);
 
 #[test]
 fn a_killed_process_is_swept_at_the_next_open() {
     let domain = Domain::new();
-    Player::start(&domain, "line-writer").kill();
-    Player::start(&domain, "line-reader").kill();
+    process::start(&domain, "line-writer").kill();
+    process::start(&domain, "line-reader").kill();
     assert_ne!(domain.in_shared_memory(), Vec::<String>::new());
 
     let bus = domain.open(Role::Bridge);
@@ -38,10 +38,10 @@ fn a_sweep_counts_the_dead_and_leaves_the_living_alone() {
     let domain = Domain::new();
     let bus = domain.open(Role::Supervisor);
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
-    let living = Player::start(&domain, "line-writer");
+    let living = process::start(&domain, "line-writer");
     // Opening sweeps too, so both start before either dies.
-    let reader = Player::start(&domain, "line-reader");
-    let bridge = Player::start(&domain, "deaf-bridge");
+    let reader = process::start(&domain, "line-reader");
+    let bridge = process::start(&domain, "deaf-bridge");
     reader.kill();
     bridge.kill();
     sweep(&bus, 2);
@@ -56,7 +56,7 @@ fn a_successor_of_a_killed_writer_is_a_new_stream_and_no_loss() {
     let bus = domain.open(Role::Logic);
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
     for restart in 1..=3 {
-        let writer = Player::start(&domain, "line-writer");
+        let writer = process::start(&domain, "line-writer");
         assert_eq!(drain(&mut subscriber), (0..10).collect::<Vec<_>>());
         writer.kill();
         bus.sweep();
@@ -73,7 +73,7 @@ fn places_of_killed_writers_are_taken_again() {
     let mut subscriber = reader.subscriber::<SensorLine>().unwrap();
     // All start before any is swept; opening sweeps, so they are killed together.
     let writers: Vec<_> = (0..SensorLine::QOS.max_publishers())
-        .map(|_| Player::start(&domain, "line-writer"))
+        .map(|_| process::start(&domain, "line-writer"))
         .collect();
     for writer in writers {
         writer.kill();
@@ -88,7 +88,7 @@ fn what_a_killed_writer_has_sent_can_be_read_before_the_sweep() {
     let domain = Domain::new();
     let bus = domain.open(Role::Logic);
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
-    let writer = Player::start(&domain, "line-writer");
+    let writer = process::start(&domain, "line-writer");
     writer.kill();
     assert_eq!(drain(&mut subscriber), (0..10).collect::<Vec<_>>());
     assert_eq!(subscriber.lost(), 0);
@@ -99,7 +99,7 @@ fn what_a_killed_writer_has_sent_survives_the_sweep_if_its_reader_had_met_it() {
     let domain = Domain::new();
     let bus = domain.open(Role::Logic);
     let mut subscriber = bus.subscriber::<SensorLine>().unwrap();
-    let writer = Player::start(&domain, "line-writer");
+    let writer = process::start(&domain, "line-writer");
     // One sample is enough to meet; nine stay unread.
     assert_eq!(subscriber.receive().unwrap().unwrap().link_epoch, 0);
     writer.kill();
@@ -117,7 +117,7 @@ fn a_killed_reader_does_not_hold_the_writer_up() {
         .open(Role::Observer)
         .subscriber::<SensorLine>()
         .unwrap();
-    let reader = Player::start(&domain, "line-reader");
+    let reader = process::start(&domain, "line-reader");
     send(&publisher, 0);
     reader.kill();
     for number in 1..1000 {
@@ -135,7 +135,7 @@ fn the_successor_of_a_killed_actor_is_rung() {
     let logic = domain.open(Role::Logic);
     let publisher = logic.publisher::<SteeringCommand>().unwrap();
     for swept in [false, true] {
-        let actor = Player::start(&domain, "deaf-bridge");
+        let actor = process::start(&domain, "deaf-bridge");
         publisher.send(Cause::OWN, Default::default()).unwrap();
         actor.kill();
         for _ in 0..10 {
@@ -162,7 +162,7 @@ fn the_last_value_of_a_killed_service_is_handed_to_its_successor() {
         "there is nothing to hand over yet"
     );
 
-    let service = Player::start(&domain, "navigator");
+    let service = process::start(&domain, "navigator");
     let pid = service.pid();
     keeper.remember().unwrap();
     assert_eq!(keeper.value().unwrap().0.order_id, 7);
@@ -212,7 +212,7 @@ fn a_keeper_withdraws_when_the_successor_speaks() {
     let domain = Domain::new();
     let supervisor = domain.open(Role::Supervisor);
     let mut keeper = supervisor.keeper::<NavStatus>().unwrap();
-    let service = Player::start(&domain, "navigator");
+    let service = process::start(&domain, "navigator");
     keeper.remember().unwrap();
     service.kill();
     supervisor.sweep();
@@ -266,7 +266,7 @@ fn a_hand_over_that_failed_is_tried_again() {
     let domain = Domain::new();
     let supervisor = domain.open(Role::Supervisor);
     let mut keeper = supervisor.keeper::<NavStatus>().unwrap();
-    let service = Player::start(&domain, "navigator");
+    let service = process::start(&domain, "navigator");
     keeper.remember().unwrap();
     service.kill();
     keeper.remember().unwrap();
@@ -307,7 +307,7 @@ fn an_asker_survives_the_killing_of_its_server() {
         ..Ask::default()
     };
     for _ in 0..3 {
-        let bridge = Player::start(&domain, "bridge");
+        let bridge = process::start(&domain, "bridge");
         assert_eq!(client.call(ask, LONG).unwrap().gain_p, 3);
         bridge.kill();
         // Nobody has swept yet: the dead server seems to be there but does not answer.
@@ -325,7 +325,7 @@ fn an_asker_survives_the_killing_of_its_server() {
 fn a_question_is_put_again_to_the_successor_of_a_killed_server() {
     let domain = Domain::new();
     let station = domain.open(Role::Station);
-    let deaf = Player::start(&domain, "deaf-bridge");
+    let deaf = process::start(&domain, "deaf-bridge");
     std::thread::scope(|scope| {
         let asking = scope.spawn(|| {
             let client = station.client::<BridgeRequest>().unwrap();
@@ -333,7 +333,7 @@ fn a_question_is_put_again_to_the_successor_of_a_killed_server() {
         });
         std::thread::sleep(Duration::from_millis(30));
         deaf.kill();
-        let successor = Player::start(&domain, "bridge");
+        let successor = process::start(&domain, "bridge");
         assert_eq!(asking.join().unwrap().unwrap().outcome, Outcome::Done);
         drop(successor);
     });
@@ -346,7 +346,7 @@ fn a_server_survives_the_killing_of_its_askers() {
     let server = bridge.server::<BridgeRequest>().unwrap();
     let answer = |_: &Ask| lager_topics::Answer::default();
     for swept in [false, true] {
-        Player::start(&domain, "asker").kill();
+        process::start(&domain, "asker").kill();
         if swept {
             bridge.sweep();
         }

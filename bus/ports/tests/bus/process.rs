@@ -1,13 +1,14 @@
-//! Other processes: this test binary started again, playing one part until it is killed.
+//! Other processes: this test binary started again, as one of a robot's until it is killed.
 
-use std::io::{BufRead, BufReader, Write};
 use std::mem::ManuallyDrop;
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use lager_ports::{Bus, BusConfig, Cause, Policy};
+use lager_ports::{Bus, Cause, Policy};
+use lager_rig::process::{end_with_parent, ready};
+use lager_rig::{Parent, Process, bus_at};
 use lager_topics::{
     Answer, BridgeRequest, Health, LinkHealth, NavStatus, NavigatorStatus, Outcome, Role,
     SensorLine, SteeringCommand,
@@ -16,90 +17,34 @@ use lager_topics::{
 use crate::domain::{Domain, frame};
 use crate::swept::stranger;
 
-const PART: &str = "LAGER_PORTS_TEST_PART";
-const FOLDER: &str = "LAGER_PORTS_TEST_FOLDER";
-
-/// A process that plays a part and waits to be killed.
-pub(crate) struct Player {
-    child: Child,
-    // The player ends when this closes, so that none outlives a failed test.
-    stdin: ChildStdin,
+/// Starts the process `name` on the bus of `domain`, and waits until it is ready.
+pub(crate) fn start(domain: &Domain, name: &str) -> Process {
+    let mut process = Process::start_in_test(name, "process::child").unwrap();
+    process.tell(domain.config.folder.as_ref().unwrap());
+    let () = process.hear_within(Duration::from_secs(60)).unwrap();
+    process
 }
 
-impl Player {
-    /// Starts a process in `part` and waits until it is ready.
-    pub(crate) fn start(domain: &Domain, part: &str) -> Self {
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["process::player", "--exact", "--ignored", "--nocapture"])
-            .env(PART, part)
-            .env(FOLDER, domain.config.folder.as_ref().unwrap())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let stdin = child.stdin.take().unwrap();
-        let ready = BufReader::new(child.stdout.take().unwrap())
-            .lines()
-            .any(|line| line.unwrap().ends_with("READY"));
-        assert!(ready, "the player `{part}` ended before it was ready");
-        Self { child, stdin }
-    }
+/// The bus's folder, as the parent has told it.
+static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
-    pub(crate) fn pid(&self) -> u32 {
-        self.child.id()
-    }
-
-    pub(crate) fn is_running(&mut self) -> bool {
-        self.child.try_wait().unwrap().is_none()
-    }
-
-    /// Lets it end by itself, for parts that do that in order.
-    pub(crate) fn end(mut self) {
-        self.stdin.write_all(b"\n").unwrap();
-        assert!(self.child.wait().unwrap().success());
-    }
-
-    /// `kill -9`, and waits until it is gone.
-    pub(crate) fn kill(mut self) {
-        self.child.kill().unwrap();
-        self.child.wait().unwrap();
-    }
-}
-
-impl Drop for Player {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-fn ready() {
-    println!("READY");
-    std::io::stdout().flush().unwrap();
-}
-
-/// Returns when the parent is gone or done with this process.
-fn until_parent_ends() {
-    let mut nothing = String::new();
-    let _ = std::io::stdin().read_line(&mut nothing);
-    std::process::exit(0);
+fn folder() -> PathBuf {
+    FOLDER.get().expect("it is told").clone()
 }
 
 fn open(role: Role) -> Bus {
-    let config = BusConfig {
-        folder: std::env::var(FOLDER).ok().map(PathBuf::from),
-        ..BusConfig::default()
-    };
-    Bus::open(&config, role).unwrap()
+    Bus::open(&bus_at(folder()), role).unwrap()
 }
 
 #[test]
-#[ignore = "a part for the other tests to start and kill"]
-fn player() {
-    let Ok(part) = std::env::var(PART) else {
+#[ignore = "a process for the other tests to start and kill"]
+fn child() {
+    let Some(mut parent) = Parent::of_this_process() else {
         return;
     };
-    match part.as_str() {
+    let told = parent.hear().unwrap().expect("a folder");
+    FOLDER.set(told).expect("it is told once");
+    match parent.name() {
         "line-writer" => {
             let bus = open(Role::Bridge);
             let publisher = bus.publisher::<SensorLine>().unwrap();
@@ -107,7 +52,7 @@ fn player() {
                 publisher.send(Cause::OWN, frame(number)).unwrap();
             }
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "line-writer-ahead" => {
             let bus = open(Role::Bridge);
@@ -118,13 +63,13 @@ fn player() {
                 loan.send_ahead().unwrap();
             }
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "line-actor" => {
             let bus = open(Role::Logic);
             let _subscriber = bus.subscriber::<SensorLine>().unwrap();
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "health-writer" => {
             let bus = open(Role::Bridge);
@@ -137,17 +82,17 @@ fn player() {
                 publisher.send(Cause::event(1234), health).unwrap();
             }
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "line-reader" => {
             let bus = open(Role::Observer);
             let _subscriber = bus.subscriber::<SensorLine>().unwrap();
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "stranger" => {
             // The parent tidies up.
-            let domain = ManuallyDrop::new(Domain::at(std::env::var(FOLDER).unwrap().into()));
+            let domain = ManuallyDrop::new(Domain::at(folder()));
             let ends = AtomicBool::new(false);
             std::thread::scope(|scope| {
                 scope.spawn(|| {
@@ -162,7 +107,7 @@ fn player() {
         "onlooker" => {
             let _bus = open(Role::Observer);
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "navigator" => {
             let bus = open(Role::Logic);
@@ -175,13 +120,13 @@ fn player() {
                 publisher.send(Cause::event(1234), status).unwrap();
             }
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "navigator-waits" => {
             // Sleeps whenever it is let.
             let bus = open(Role::Logic);
             let waiter = bus.waiter(Policy::Block).unwrap();
-            std::thread::spawn(until_parent_ends);
+            std::thread::spawn(|| end_with_parent());
             ready();
             loop {
                 waiter.wait(Duration::from_secs(3600));
@@ -191,7 +136,7 @@ fn player() {
             // Wakes and sleeps as fast as it is rung.
             let bus = open(Role::Logic);
             let waiter = bus.waiter(Policy::Block).unwrap();
-            std::thread::spawn(until_parent_ends);
+            std::thread::spawn(|| end_with_parent());
             ready();
             loop {
                 waiter.wait(Duration::from_micros(50));
@@ -201,7 +146,7 @@ fn player() {
             // Holds the right to look without pause.
             let bus = open(Role::Logic);
             let waiter = bus.waiter(Policy::ADAPTIVE).unwrap();
-            std::thread::spawn(until_parent_ends);
+            std::thread::spawn(|| end_with_parent());
             let ringer = waiter.ringer().unwrap();
             std::thread::spawn(move || {
                 loop {
@@ -221,7 +166,7 @@ fn player() {
             // Rings without pause.
             let bus = open(Role::Bridge);
             let publisher = bus.publisher::<SensorLine>().unwrap();
-            std::thread::spawn(until_parent_ends);
+            std::thread::spawn(|| end_with_parent());
             ready();
             loop {
                 publisher.send(Cause::OWN, frame(0)).unwrap();
@@ -234,14 +179,14 @@ fn player() {
             let _subscriber = bus.subscriber::<SteeringCommand>().unwrap();
             let _server = bus.server::<BridgeRequest>().unwrap();
             ready();
-            until_parent_ends();
+            end_with_parent();
         }
         "bridge" => {
             let bus = open(Role::Bridge);
             let waiter = bus.waiter(Policy::Block).unwrap();
             let server = bus.server::<BridgeRequest>().unwrap();
             ready();
-            std::thread::spawn(until_parent_ends);
+            std::thread::spawn(|| end_with_parent());
             loop {
                 waiter.wait(Duration::from_millis(20));
                 server
@@ -260,10 +205,10 @@ fn player() {
             std::thread::spawn(|| {
                 std::thread::sleep(Duration::from_millis(20));
                 ready();
-                until_parent_ends();
+                end_with_parent();
             });
             let _ = client.call(lager_topics::Ask::default(), Duration::from_secs(60));
         }
-        other => panic!("there is no part `{other}`"),
+        other => panic!("there is no process `{other}`"),
     }
 }

@@ -14,7 +14,7 @@ use lager_topics::Role;
 
 use crate::domain::{Domain, sweep, until};
 use crate::interop::stock;
-use crate::process::Player;
+use crate::process;
 
 /// How often the robot beside the stranger is killed.
 const KILLS: usize = 100;
@@ -84,14 +84,14 @@ fn is_listed(node: &Node<ipc::Service>) -> bool {
 #[test]
 fn a_plain_iceoryx2_process_never_notices_a_robot_that_is_killed_and_swept() {
     let domain = Domain::new();
-    let mut stranger = Player::start(&domain, "stranger");
+    let mut stranger = process::start(&domain, "stranger");
     let node = stock(&domain);
     let count = count(&node);
     let bus = domain.open(Role::Supervisor);
     let mut counted = 0;
     for kill in 0..KILLS {
         let part = ["line-writer", "deaf-bridge", "navigator", "line-reader"][kill % 4];
-        Player::start(&domain, part).kill();
+        process::start(&domain, part).kill();
         if kill % 2 == 0 {
             sweep(&bus, 1);
         } else {
@@ -114,7 +114,7 @@ fn a_plain_iceoryx2_process_never_notices_a_robot_that_is_killed_and_swept() {
     }
     drop(count);
     drop(node);
-    stranger.end();
+    assert!(stranger.end().success());
 }
 
 /// Where the transport keeps what the process says of itself.
@@ -132,7 +132,7 @@ fn details_of(domain: &Domain, pid: u32) -> PathBuf {
 fn a_dead_node_whose_details_cannot_be_read_keeps_what_it_has() {
     let domain = Domain::new();
     let bus = domain.open(Role::Supervisor);
-    let writer = Player::start(&domain, "line-writer");
+    let writer = process::start(&domain, "line-writer");
     let details = details_of(&domain, writer.pid());
     writer.kill();
     let intact = fs::read(&details).unwrap();
@@ -159,7 +159,7 @@ fn a_dead_node_whose_details_cannot_be_read_keeps_what_it_has() {
 fn a_dead_node_that_was_writing_its_details_is_swept() {
     let domain = Domain::new();
     let bus = domain.open(Role::Supervisor);
-    let onlooker = Player::start(&domain, "onlooker");
+    let onlooker = process::start(&domain, "onlooker");
     let details = details_of(&domain, onlooker.pid());
     onlooker.kill();
     fs::set_permissions(&details, PermissionsExt::from_mode(0o600)).unwrap();

@@ -132,7 +132,7 @@ impl<P: Peer> Drop for Board<P> {
 }
 
 fn run<P: Peer>(inner: &Mutex<Inner<P>>) {
-    super::exempt();
+    lager_rig::allocations::exempt_this_thread();
     let start = Instant::now();
     let mut buffer = [0; 512];
     loop {

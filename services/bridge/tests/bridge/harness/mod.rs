@@ -14,9 +14,7 @@ mod original;
 mod pty;
 mod steering;
 
-use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -25,6 +23,7 @@ use lager_ports::{
     Bus, BusConfig, Cause, Client, Clock, PortError, Publisher, Shutdown, Stop, StopPage, StopTold,
     StopWord, Subscriber,
 };
+use lager_rig::Domain;
 use lager_topics::{
     Answer, Ask, AskKind, BridgeRequest, DistanceFrame, Finish, Health, LineFrame, LinkHealth,
     Mode, Origin, Role, SensorDistance, SensorLine, SteeringCommand, SteeringOrder, SteeringReport,
@@ -44,20 +43,6 @@ pub(crate) const SPEED: f64 = 0.3;
 /// How long anything may take before a test fails.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-thread_local! {
-    static EXEMPT: Cell<bool> = const { Cell::new(false) };
-}
-
-/// This thread belongs to the test and not to the bridge: what it allocates is not counted.
-pub(crate) fn exempt() {
-    EXEMPT.set(true);
-}
-
-/// Whether this thread belongs to the test.
-pub(crate) fn is_exempt() -> bool {
-    EXEMPT.try_with(Cell::get).unwrap_or(true)
-}
-
 /// Waits until `condition` holds.
 pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
@@ -67,64 +52,41 @@ pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     }
 }
 
-/// The bus of an isolation.
-pub(crate) fn bus_config(name: &str) -> BusConfig {
+/// The bus in `folder`, at the speed of these tests.
+pub(crate) fn bus_config(folder: &Path) -> BusConfig {
     BusConfig {
-        folder: Some(PathBuf::from("/dev/shm").join(name)),
         speed: SPEED,
-        ..BusConfig::default()
+        ..lager_rig::bus_at(folder)
     }
-}
-
-/// Where an isolation's ports are.
-pub(crate) fn folder(name: &str) -> PathBuf {
-    PathBuf::from("/tmp").join(name)
 }
 
 /// An isolated bus.
 pub(crate) struct Isolation {
     pub(crate) config: BusConfig,
-    folder: PathBuf,
+    domain: Domain,
 }
 
 impl Isolation {
     pub(crate) fn new() -> Self {
-        static NEXT: AtomicU32 = AtomicU32::new(0);
-        let name = format!(
-            "lbr{}n{}x",
-            std::process::id(),
-            NEXT.fetch_add(1, Ordering::Relaxed)
-        );
-        let folder = folder(&name);
-        std::fs::create_dir_all(&folder).unwrap();
+        let domain = Domain::new("lager-bridge").unwrap();
         Self {
-            config: bus_config(&name),
-            folder,
+            config: bus_config(domain.folder()),
+            domain,
         }
     }
 
-    /// The name by which another process joins with [`bus_config`].
-    pub(crate) fn name(&self) -> &str {
-        let folder = self.config.folder.as_deref().and_then(Path::file_name);
-        folder.and_then(|name| name.to_str()).expect("it is named")
+    /// The bus's folder, by which another process joins with [`bus_config`].
+    pub(crate) fn bus_folder(&self) -> &Path {
+        self.domain.folder()
     }
 
+    /// Where the ports are.
     pub(crate) fn folder(&self) -> &Path {
-        &self.folder
+        self.domain.files()
     }
 
     pub(crate) fn open(&self, role: Role) -> Bus {
         Bus::open(&self.config, role).unwrap()
-    }
-}
-
-impl Drop for Isolation {
-    /// Removes what the transport leaves for the next process of a domain, which never comes.
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.folder);
-        if let Ok(place) = self.config.place() {
-            place.remove();
-        }
     }
 }
 

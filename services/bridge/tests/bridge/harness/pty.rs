@@ -1,39 +1,28 @@
 //! A pseudo terminal whose slave end is found under a fixed path, as a serial port is.
 
 use std::fs::File;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
+use lager_rig::Cable;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::io::Errno;
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// The master end, and the link to the slave end. Dropped it is unplugged.
 pub(crate) struct Pty {
-    master: OwnedFd,
+    cable: Cable,
     link: PathBuf,
 }
 
 impl Pty {
     /// A new pseudo terminal, whose slave end is linked at `link`.
     pub(crate) fn new(link: &Path) -> Self {
-        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
-        let master = openpt(flags).unwrap();
-        grantpt(&master).unwrap();
-        unlockpt(&master).unwrap();
-        fcntl_setfl(&master, OFlags::NONBLOCK).unwrap();
-        // A serial line has no echo, whether its port is open or not.
-        let mut termios = tcgetattr(&master).unwrap();
-        termios.make_raw();
-        tcsetattr(&master, OptionalActions::Now, &termios).unwrap();
-        let slave = ptsname(&master, Vec::new()).unwrap();
+        let cable = Cable::new().unwrap();
         let _ = std::fs::remove_file(link);
-        symlink(slave.to_str().unwrap(), link).unwrap();
+        symlink(cable.path(), link).unwrap();
         Self {
-            master,
+            cable,
             link: link.to_owned(),
         }
     }
@@ -53,10 +42,10 @@ impl Pty {
             tv_sec: 0,
             tv_nsec: 1_000_000,
         };
-        let mut fds = [PollFd::new(&self.master, PollFlags::IN)];
+        let mut fds = [PollFd::new(&self.cable, PollFlags::IN)];
         let _ = poll(&mut fds, Some(&timeout));
         let hung_up = fds[0].revents().contains(PollFlags::HUP);
-        match rustix::io::read(&self.master, buffer) {
+        match rustix::io::read(&self.cable, buffer) {
             Ok(count) => count,
             Err(_) => {
                 if hung_up {
@@ -70,7 +59,7 @@ impl Pty {
 
     /// Writes as much as fits; how much that was.
     pub(crate) fn write(&self, bytes: &[u8]) -> usize {
-        match rustix::io::write(&self.master, bytes) {
+        match rustix::io::write(&self.cable, bytes) {
             Ok(count) => count,
             Err(Errno::AGAIN | Errno::IO) => 0,
             Err(errno) => panic!("writing to the pseudo terminal: {errno}"),
@@ -79,8 +68,8 @@ impl Pty {
 }
 
 impl AsFd for Pty {
-    fn as_fd(&self) -> std::os::fd::BorrowedFd<'_> {
-        self.master.as_fd()
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.cable.as_fd()
     }
 }
 

@@ -1,0 +1,98 @@
+//! A board as tests and measurements play it: one end of a cable and one end of a link.
+//!
+//! It decides nothing: what is sent and when, its player says.
+
+use lager_ports::Clock;
+use lager_wire::link::{BoardEvent, BoardLink};
+use lager_wire::{Callsign, Payload, ResetCause, SteerData, SteerFlags};
+
+use crate::{Cable, Refused};
+
+/// How long a board waits for the next byte of a packet, in us. The bridge writes packets whole,
+/// but a process that is put to sleep may be cut off in one.
+const GAP_US: u32 = 50_000;
+
+/// One board: its end of the wire and its end of the link.
+#[derive(Debug)]
+pub struct Board {
+    /// Its end of the wire.
+    pub cable: Cable,
+    /// Its end of the link.
+    pub link: BoardLink,
+}
+
+impl Board {
+    /// A board that has just been switched on.
+    ///
+    /// # Errors
+    /// There is no pseudo terminal to be had.
+    pub fn new(sign: Callsign) -> Result<Self, Refused> {
+        Ok(Self {
+            cable: Cable::new()?,
+            link: BoardLink::new(sign, ResetCause::PowerOn, GAP_US),
+        })
+    }
+
+    /// Sends a handshake if one is due.
+    ///
+    /// # Errors
+    /// As [`Cable::write`].
+    pub fn shake_hands(&mut self) -> Result<(), Refused> {
+        match self.link.poll(board_us()) {
+            Some(syn) => self.cable.write(&syn),
+            None => Ok(()),
+        }
+    }
+
+    /// Sends data, if the link is up.
+    ///
+    /// # Errors
+    /// As [`Cable::write`].
+    pub fn send(&mut self, payload: Payload) -> Result<(), Refused> {
+        match self.link.encode(payload) {
+            Some(packet) => self.cable.write(&packet),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes what has come, and hands over each packet's data.
+    ///
+    /// # Errors
+    /// As [`Cable::read`].
+    pub fn take(&mut self, mut packet: impl FnMut(Payload)) -> Result<(), Refused> {
+        let mut buffer = [0; 256];
+        loop {
+            let count = self.cable.read(&mut buffer)?;
+            if count == 0 {
+                return Ok(());
+            }
+            for byte in &buffer[..count] {
+                if let Some(BoardEvent::Packet(taken)) = self.link.push(*byte, board_us()) {
+                    packet(taken.payload);
+                }
+            }
+        }
+    }
+}
+
+/// What a steering board reports that does what it is told, but whose wheels are in the air: a flag
+/// besides the duties of 0 says that they are meant.
+#[must_use]
+pub fn wheels_in_the_air(code: u8) -> Payload {
+    Payload::SteerData(SteerData {
+        code,
+        left_duty: 0,
+        right_duty: 0,
+        flags: SteerFlags::ARM_LOCKED,
+        line_error: 0,
+        finished_seq: 0,
+        servo_errors: 0,
+        battery_decivolts: 111,
+    })
+}
+
+/// A board's clock: microseconds that wrap.
+#[must_use]
+pub fn board_us() -> u32 {
+    (Clock::monotonic_ns() / 1_000) as u32
+}

@@ -1,0 +1,44 @@
+//! What tests and benches stand on: a bus of their own, this program again as another process,
+//! memory that processes share, boards behind pseudo terminals, and an allocator that counts.
+//!
+//! Apart from both, so that each of these exists once. Nothing here measures or asserts.
+
+pub mod allocations;
+mod board;
+mod cable;
+mod domain;
+mod interrupts;
+mod map;
+pub mod process;
+pub mod schedule;
+mod shared;
+
+pub use board::{Board, board_us, wheels_in_the_air};
+pub use cable::{Cable, timespec};
+pub use domain::{Domain, NoPlace, bus_at};
+pub use interrupts::{heed_interrupts, interrupted};
+pub use map::one_square;
+pub use process::{Parent, Process, ProcessError};
+pub use shared::{Barrier, Shareable, Shared, inherit};
+
+/// The kernel refused something that a test or a measurement is made of.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{what} could not be made ({detail}); check the limit of open files (ulimit -n) and free memory"
+)]
+pub struct Refused {
+    /// What was to be made.
+    pub what: &'static str,
+    /// What the kernel says.
+    pub detail: String,
+}
+
+impl Refused {
+    /// That `what` could not be made.
+    pub fn to_make<E: core::fmt::Display>(what: &'static str) -> impl FnOnce(E) -> Self {
+        move |error| Self {
+            what,
+            detail: error.to_string(),
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! Memory and descriptors that processes share without a name, so that nothing is left when they
+//! end, however they end.
+//!
+//! A parent makes them and its children inherit them by number. The bus does not use them.
+
+use core::fmt;
+use core::marker::PhantomData;
+use core::ptr::NonNull;
+use core::sync::atomic::{AtomicU32, Ordering};
+use core::time::Duration;
+use std::ops::Deref;
+use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
+use std::time::Instant;
+
+use rustix::fs::{MemfdFlags, ftruncate, memfd_create};
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+
+use crate::Refused;
+
+/// What may lie in memory shared with other processes.
+///
+/// # Safety
+/// All zeros are a valid value, every field may be changed by another process at any time (atomics
+/// and arrays of them only), and there is no pointer inside.
+#[allow(unsafe_code)]
+pub unsafe trait Shareable: Sync {}
+
+/// A `T` in memory shared between processes, all zeros at first.
+pub struct Shared<T: Shareable> {
+    memory: NonNull<T>,
+    file: OwnedFd,
+    owns: PhantomData<T>,
+}
+
+impl<T: Shareable> Shared<T> {
+    /// Makes it.
+    ///
+    /// # Errors
+    /// There is no memory, or no descriptor.
+    pub fn new() -> Result<Self, Refused> {
+        // Without CLOEXEC: children inherit it.
+        let file = memfd_create("lager-rig", MemfdFlags::empty()).map_err(no_memory)?;
+        ftruncate(&file, size_of::<T>() as u64).map_err(no_memory)?;
+        Self::map(file)
+    }
+
+    /// The one that the parent has made, by its number there.
+    ///
+    /// # Errors
+    /// It cannot be mapped.
+    pub fn inherited(number: RawFd) -> Result<Self, Refused> {
+        Self::map(inherit(number))
+    }
+
+    /// The number by which a child finds it.
+    #[must_use]
+    pub fn number(&self) -> RawFd {
+        self.file.as_raw_fd()
+    }
+
+    #[allow(unsafe_code)]
+    fn map(file: OwnedFd) -> Result<Self, Refused> {
+        // SAFETY: a new mapping at an address of the kernel's choice touches no other memory.
+        let memory = unsafe {
+            mmap(
+                core::ptr::null_mut(),
+                size_of::<T>(),
+                ProtFlags::READ | ProtFlags::WRITE,
+                MapFlags::SHARED | MapFlags::POPULATE,
+                &file,
+                0,
+            )
+        }
+        .map_err(no_memory)?;
+        Ok(Self {
+            memory: NonNull::new(memory.cast()).expect("the kernel maps nothing at 0 unasked"),
+            file,
+            owns: PhantomData,
+        })
+    }
+}
+
+impl<T: Shareable> Deref for Shared<T> {
+    type Target = T;
+
+    #[allow(unsafe_code)]
+    fn deref(&self) -> &T {
+        // SAFETY: the mapping is page-aligned, as large as `T`, initialised with zeros, lives as
+        // long as `self`, and `Shareable` allows others to change it meanwhile.
+        unsafe { self.memory.as_ref() }
+    }
+}
+
+impl<T: Shareable> Drop for Shared<T> {
+    #[allow(unsafe_code)]
+    fn drop(&mut self) {
+        // SAFETY: it was mapped with this size, and references to it ended before `self`.
+        let _ = unsafe { munmap(self.memory.as_ptr().cast(), size_of::<T>()) };
+    }
+}
+
+impl<T: Shareable> fmt::Debug for Shared<T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_tuple("Shared")
+            .field(&self.number())
+            .finish()
+    }
+}
+
+/// The descriptor that the parent has made, by its number there. Each number at most once.
+#[must_use]
+#[allow(unsafe_code)]
+pub fn inherit(number: RawFd) -> OwnedFd {
+    // SAFETY: the parent made it without CLOEXEC for this process, which nobody else told the
+    // number, and each is taken over once.
+    unsafe { OwnedFd::from_raw_fd(number) }
+}
+
+fn no_memory(error: rustix::io::Errno) -> Refused {
+    Refused::to_make("memory shared between the processes")(error)
+}
+
+/// Where processes wait for each other before they start measuring.
+#[derive(Debug)]
+#[repr(C, align(64))]
+pub struct Barrier {
+    arrived: AtomicU32,
+}
+
+impl Barrier {
+    /// Waits until `all` processes have arrived as often as this one, which is at its `round`th
+    /// barrier, from 1. Looks without sleeping, so that all go on at once; false if somebody has
+    /// not come within `limit`.
+    pub fn pass(&self, all: u32, round: u32, limit: Duration) -> bool {
+        let start = Instant::now();
+        self.arrived.fetch_add(1, Ordering::AcqRel);
+        while self.arrived.load(Ordering::Acquire) < all * round {
+            if start.elapsed() > limit {
+                return false;
+            }
+            // The others may be on this core.
+            rustix::thread::sched_yield();
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[repr(C)]
+    struct Words {
+        barrier: Barrier,
+        word: AtomicU32,
+    }
+
+    // SAFETY: atomics only.
+    #[allow(unsafe_code)]
+    unsafe impl Shareable for Words {}
+
+    #[test]
+    fn what_one_mapping_writes_another_reads() {
+        let one = Shared::<Words>::new().unwrap();
+        assert_eq!(one.word.load(Ordering::Relaxed), 0);
+        let number = rustix::io::dup(&one.file).unwrap();
+        let other = Shared::<Words>::map(number).unwrap();
+        one.word.store(7, Ordering::Release);
+        assert_eq!(other.word.load(Ordering::Acquire), 7);
+    }
+
+    #[test]
+    fn nobody_passes_the_barrier_alone() {
+        let memory = Shared::<Words>::new().unwrap();
+        assert!(!memory.barrier.pass(2, 1, Duration::from_millis(5)));
+        assert!(memory.barrier.pass(2, 1, Duration::from_secs(60)));
+    }
+}
