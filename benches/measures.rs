@@ -6,12 +6,12 @@
 use std::path::Path;
 use std::time::Duration;
 
-use lager_benches::hop;
-use lager_benches::{BenchError, Mode, Options, Regime, Report, cast};
+use lager_benches::{BenchError, FAMILY, Mode, Options, Regime, Report, Scenario, run_if_asked};
+use lager_rig::ProcessError;
 use rustix::process::{Pid, Signal, kill_process};
 
 fn main() {
-    cast::play_if_asked();
+    run_if_asked();
     let tests: &[(&str, fn())] = &[
         ("a_hop_yields_every_row_once", a_hop_yields_every_row_once),
         (
@@ -19,8 +19,8 @@ fn main() {
             a_report_is_read_back_as_it_was_written,
         ),
         (
-            "a_killed_player_ends_the_measurement",
-            a_killed_player_ends_the_measurement,
+            "a_killed_process_ends_the_measurement",
+            a_killed_process_ends_the_measurement,
         ),
         (
             "what_cannot_be_measured_is_refused",
@@ -52,7 +52,9 @@ fn options(modes: &[Mode], regime: Regime) -> Options {
 
 /// The cheapest measurement: one core, nobody spins.
 fn same_core() -> Report {
-    hop::measure(&options(&[Mode::Block], Regime::SameCore)).expect("a report")
+    Scenario::Hop
+        .measure(&options(&[Mode::Block], Regime::SameCore))
+        .expect("a report")
 }
 
 fn a_hop_yields_every_row_once() {
@@ -127,37 +129,37 @@ fn a_report_is_read_back_as_it_was_written() {
     }
 }
 
-fn a_killed_player_ends_the_measurement() {
+fn a_killed_process_ends_the_measurement() {
     let killer = std::thread::spawn(|| {
         loop {
-            if let Some(player) = a_player() {
+            if let Some(process) = a_child() {
                 // Some way into its work, wherever that is.
                 std::thread::sleep(Duration::from_millis(30));
-                if kill_process(player, Signal::KILL).is_ok() {
+                if kill_process(process, Signal::KILL).is_ok() {
                     return;
                 }
             }
             std::thread::sleep(Duration::from_millis(1));
         }
     });
-    let ended = hop::measure(&options(&[Mode::Block], Regime::SameCore));
-    killer.join().expect("the killer finds a player");
+    let ended = Scenario::Hop.measure(&options(&[Mode::Block], Regime::SameCore));
+    killer.join().expect("the killer finds a process");
     assert!(
-        matches!(ended, Err(BenchError::PartEnded { .. })),
+        matches!(ended, Err(BenchError::Process(ProcessError::Ended { .. }))),
         "{ended:?}"
     );
 }
 
 fn what_cannot_be_measured_is_refused() {
-    let refused = hop::measure(&options(&[Mode::Spin], Regime::SameCore));
+    let refused = Scenario::Hop.measure(&options(&[Mode::Spin], Regime::SameCore));
     assert!(
         matches!(refused, Err(BenchError::NothingToMeasure(_))),
         "{refused:?}"
     );
 }
 
-/// A process that this one has started to play a part.
-fn a_player() -> Option<Pid> {
+/// A process that this one has started.
+fn a_child() -> Option<Pid> {
     let own = std::process::id().to_string();
     std::fs::read_dir("/proc").ok()?.find_map(|entry| {
         let path = entry.ok()?.path();
@@ -171,7 +173,7 @@ fn a_player() -> Option<Pid> {
 
 /// What measurements of this process have left in shared memory and among temporary files.
 fn left_behind() -> Vec<String> {
-    let own = format!("lager-bench-{}-", std::process::id());
+    let own = format!("{FAMILY}-{}-", std::process::id());
     [Path::new("/dev/shm"), &std::env::temp_dir()]
         .iter()
         .filter_map(|folder| std::fs::read_dir(folder).ok())

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::BenchError;
 use crate::machine;
 use crate::report::{Mode, Regime, Report, Row};
+use crate::stats::Quantiles;
 
 /// The baud rates of the lines to the Pi that there are images for: the default and the original's.
 pub const BAUDS: [u32; 2] = [500_000, 9_600];
@@ -172,22 +173,19 @@ impl Trace {
     }
 
     fn rows(&self) -> [Row; 2] {
-        let row = |what: &str, span: &Span| Row {
-            name: "chip".to_owned(),
-            variant: String::new(),
-            what: format!("{what}@{}", baud_name(self.baud)),
+        let row = |what: &str, span: &Span| {
+            let times = Quantiles {
+                n: self.phases,
+                p50_ns: self.nanoseconds(span.median),
+                p99_ns: self.nanoseconds(span.p99),
+                p999_ns: self.nanoseconds(span.worst),
+            };
+            let what = format!("{what}@{}", baud_name(self.baud));
             // The boards sleep until an interrupt wakes them; nobody's core matters.
-            mode: Mode::Block,
-            regime: Regime::Plain,
-            n: self.phases,
-            p50_ns: self.nanoseconds(span.median),
-            p99_ns: self.nanoseconds(span.p99),
-            p999_ns: self.nanoseconds(span.worst),
-            ratio_to: String::new(),
-            ratio_p50: 1.0,
-            ratio_p99: 1.0,
-            ratios: Vec::new(),
-            cpu_percent: None,
+            Row {
+                name: "chip".to_owned(),
+                ..Row::of(&what, Mode::Block, Regime::Plain, Some(times))
+            }
         };
         [
             row("tape-to-duty", &self.tape_to_duty),

@@ -3,6 +3,8 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use lager_rig::{NoPlace, ProcessError, Refused};
+
 /// Why a measurement ended without a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
@@ -50,15 +52,8 @@ pub enum BenchError {
     )]
     NothingToMeasure(String),
     /// The kernel refused something a measurement is made of.
-    #[error(
-        "{what} could not be made ({detail}); check the limit of open files (ulimit -n) and free memory"
-    )]
-    Kernel {
-        /// What was to be made.
-        what: &'static str,
-        /// What the kernel says.
-        detail: String,
-    },
+    #[error(transparent)]
+    Kernel(#[from] Refused),
     /// The bus or bare iceoryx2 failed.
     #[error("{what}: {detail}; check that /dev/shm exists, is writable and is not full")]
     Bus {
@@ -68,53 +63,11 @@ pub enum BenchError {
         detail: String,
     },
     /// The measurement has no place for its bus.
-    #[error(
-        "{place} cannot be used for the measurement's own bus ({detail}); check that it exists, is writable and is not full"
-    )]
-    NoPlace {
-        /// The folder.
-        place: PathBuf,
-        /// What the kernel says.
-        detail: String,
-    },
-    /// The second process could not be started.
-    #[error(
-        "the process for `{part}` could not be started ({detail}); the executable may have been replaced meanwhile, start again"
-    )]
-    Start {
-        /// What it was to play.
-        part: String,
-        /// What the kernel says.
-        detail: String,
-    },
-    /// A process of the measurement ended too early.
-    #[error(
-        "the process for `{part}` ended before it was done ({detail}); look at its messages above and start again"
-    )]
-    PartEnded {
-        /// What it played.
-        part: String,
-        /// How it ended.
-        detail: String,
-    },
-    /// A process of the measurement says what went wrong.
-    #[error("{detail}")]
-    PartFailed {
-        /// What it played.
-        part: String,
-        /// Its sentence.
-        detail: String,
-    },
-    /// A process of the measurement said nothing for too long.
-    #[error(
-        "the process for `{part}` did not answer within {limit:?}; a wake-up was lost or the machine is overloaded: start again, and report it if it happens twice"
-    )]
-    PartSilent {
-        /// What it played.
-        part: String,
-        /// How long it was waited for.
-        limit: Duration,
-    },
+    #[error(transparent)]
+    NoPlace(#[from] NoPlace),
+    /// A process of the measurement is of no use.
+    #[error(transparent)]
+    Process(ProcessError),
     /// A sample came that was not sent, or twice, or in the wrong order.
     #[error(
         "`{contender}` delivered sample {got} where {expected} was due; this is a defect, please report it with the command line"
@@ -178,5 +131,14 @@ pub(crate) fn no_bus(error: impl core::fmt::Display) -> BenchError {
     BenchError::Bus {
         what: "the bus of the measurement could not be opened",
         detail: error.to_string(),
+    }
+}
+
+impl From<ProcessError> for BenchError {
+    fn from(error: ProcessError) -> Self {
+        match error {
+            ProcessError::Interrupted => Self::Interrupted,
+            other => Self::Process(other),
+        }
     }
 }

@@ -24,21 +24,19 @@ use iceoryx2::port::publisher::Publisher as BarePublisher;
 use iceoryx2::prelude::ipc;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use lager_ports::{Bus, Clock, Publisher};
+use lager_rig::{Domain, Process, Shared, interrupted};
 use lager_topics::{Role, Stamp, Topic};
 
 use crate::baseline::iceoryx::{Header, Member, Stream};
-use crate::domain::Domain;
 use crate::error::BenchError;
-use crate::machine::{self, Awake, Bound, cores_for};
-use crate::parts::{Part, interrupted};
-use crate::report::{Mode, Options, Regime, Report, Row};
-use crate::run::{self, Entry};
-use crate::shared::Shared;
+use crate::group::{self, Entry, Group};
+use crate::machine::{Bound, cores_for};
+use crate::report::{Mode, Options, Regime};
 use crate::slow;
 use block::{Block, Fan};
-use readers::{Counter, LIMIT, READERS, Script};
+use readers::{Counter, LIMIT, READERS, Setup};
 
-pub(crate) use readers::PARTS;
+pub(crate) use readers::PROCESSES;
 
 /// Sizes of a block, in words of eight bytes.
 const SMALL: usize = 8;
@@ -46,105 +44,67 @@ const KIB_64: usize = 1 << 13;
 const MIB_1: usize = 1 << 17;
 
 /// How many subscribers there are.
-pub const READERS_OF: [usize; 3] = [1, 8, 64];
-
-/// A block of 1 MiB passes over the stack once, unless the compiler saves it the way.
-const STACK: usize = 32 << 20;
-
-const ENTRIES: &[Entry] = &[
-    Entry {
-        name: "lager",
-        variant: "",
-        mode: Mode::Spin,
-        against: &["iceoryx2/header"],
-    },
-    Entry {
-        name: "iceoryx2",
-        variant: "header",
-        mode: Mode::Spin,
-        against: &[],
-    },
-];
+const READERS_OF: [usize; 3] = [1, 8, 64];
 
 /// Who publishes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Contender {
+enum Contender {
     /// Our typed ports.
     Lager,
     /// Bare iceoryx2 with the same user header.
     Iceoryx2,
 }
 
-/// Measures publishing in every regime that `options` names. The readers look without pause, so
-/// the only mode there is is `spin`.
-///
-/// # Errors
-/// See [`BenchError`].
-pub fn measure(options: &Options) -> Result<Report, BenchError> {
-    let mut rows = Vec::new();
-    if options.modes.contains(&Mode::Spin) {
-        for regime in &options.regimes {
-            let _awake = Awake::during(*regime)?;
-            for readers in READERS_OF {
-                let what = format!("publish-{readers}");
-                rows.extend(group::<SMALL>(&what, *regime, readers, 2_000, options)?);
-                let what = format!("publish-{readers}@64KiB");
-                rows.extend(group::<KIB_64>(&what, *regime, readers, 300, options)?);
-                let what = format!("publish-{readers}@1MiB");
-                rows.extend(group::<MIB_1>(&what, *regime, readers, 50, options)?);
-            }
+impl Contender {
+    const ALL: [Self; 2] = [Self::Lager, Self::Iceoryx2];
+
+    const fn entry(self) -> Entry {
+        let (name, variant, against): (_, _, &[&str]) = match self {
+            Self::Lager => ("lager", "", &["iceoryx2/header"]),
+            Self::Iceoryx2 => ("iceoryx2", "header", &[]),
+        };
+        Entry {
+            name,
+            variant,
+            mode: Mode::Spin,
+            against,
         }
     }
-    if rows.is_empty() {
-        return Err(BenchError::NothingToMeasure(
-            "the readers of what is published look without pause, so it is measured in mode spin"
-                .to_owned(),
-        ));
-    }
-    Ok(Report {
-        machine: machine::describe(),
-        rows,
-    })
+}
+
+/// The groups of one regime. The readers look without pause, so the only mode there is is `spin`.
+pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
+    let sizes = |readers| {
+        [
+            group::<SMALL>("", readers, [500, 2_000], regime, options),
+            group::<KIB_64>("@64KiB", readers, [75, 300], regime, options),
+            group::<MIB_1>("@1MiB", readers, [12, 50], regime, options),
+        ]
+    };
+    READERS_OF.into_iter().flat_map(sizes).collect()
 }
 
 /// Both contenders with one size and one number of readers.
 fn group<const WORDS: usize>(
-    what: &str,
-    regime: Regime,
+    size: &str,
     readers: usize,
-    publishes: usize,
+    publishes: [usize; 2],
+    regime: Regime,
     options: &Options,
-) -> Result<Vec<Row>, BenchError> {
-    let (rounds, publishes) = if options.quick {
-        (2, publishes / 4)
-    } else {
-        (4, publishes)
-    };
-    std::thread::scope(|scope| {
-        std::thread::Builder::new()
-            .stack_size(STACK)
-            .spawn_scoped(scope, || {
-                let mut session = Session::<WORDS>::open(regime, readers)?;
-                run::measure(what, regime, ENTRIES, options, rounds, |index| {
-                    let contender = [Contender::Lager, Contender::Iceoryx2][index];
-                    session.round(contender, publishes)
-                })
-            })
-            .map_err(|error| BenchError::Kernel {
-                what: "a thread",
-                detail: error.to_string(),
-            })?
-            .join()
-            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+) -> Group {
+    let all = Contender::ALL.map(|contender| (contender.entry(), contender));
+    let (entries, contenders) = group::wanted(all, options);
+    let what = format!("publish-{readers}{size}");
+    Group::new(what, regime, entries, [2, 4], publishes, move |regime| {
+        let session = Session::<WORDS>::open(regime, readers, contenders.clone())?;
+        Ok(Box::new(session))
     })
 }
 
-/// Blocks of 64 bytes, for the criterion bench.
-pub type Small = Session<SMALL>;
-
-/// A writer of each contender and the process of their readers. Stays in the thread that opened it,
-/// which is bound to a core meanwhile.
-pub struct Session<const WORDS: usize> {
+/// A writer of each contender and the process of their readers. The thread is bound to a core
+/// meanwhile.
+struct Session<const WORDS: usize> {
+    contenders: Vec<Contender>,
     ours: Publisher<Fan<WORDS>>,
     bare: BarePublisher<ipc::Service, Block<WORDS>, Stamp>,
     stream: Stream,
@@ -153,7 +113,7 @@ pub struct Session<const WORDS: usize> {
     number: u64,
     observers: usize,
     // Dropped in this order: nobody is on the bus when it is swept.
-    readers: Part,
+    readers: Process,
     _member: Member,
     _bus: Bus,
     _bound: Bound,
@@ -162,12 +122,13 @@ pub struct Session<const WORDS: usize> {
 
 impl<const WORDS: usize> Session<WORDS> {
     /// Starts the readers and attaches them to both contenders.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
-    pub fn open(regime: Regime, readers: usize) -> Result<Self, BenchError> {
+    fn open(
+        regime: Regime,
+        readers: usize,
+        contenders: Vec<Contender>,
+    ) -> Result<Self, BenchError> {
         let (first, second) = cores_for(regime)?;
-        let domain = Domain::new()?;
+        let domain = Domain::new(crate::FAMILY)?;
         let counter = Shared::<Counter>::new()?;
         let bus = Bus::open(&domain.config(), Role::Operator).map_err(failed)?;
         let member = Member::join(&domain.config())?;
@@ -176,8 +137,8 @@ impl<const WORDS: usize> Session<WORDS> {
             .publisher_builder()
             .create()
             .map_err(failed)?;
-        let mut part = Part::start(READERS)?;
-        let () = part.ask(&Script {
+        let mut process = Process::start(READERS)?;
+        let () = process.ask(&Setup {
             core: second,
             folder: domain.folder().to_owned(),
             words: WORDS,
@@ -185,6 +146,7 @@ impl<const WORDS: usize> Session<WORDS> {
             counter: counter.number(),
         })?;
         let mut session = Self {
+            contenders,
             ours,
             bare,
             stream: Stream::new(),
@@ -192,24 +154,21 @@ impl<const WORDS: usize> Session<WORDS> {
             counter,
             number: 0,
             observers: readers,
-            readers: part,
+            readers: process,
             _member: member,
             _bus: bus,
             _bound: Bound::to(first)?,
             _domain: domain,
         };
         // The first sample connects the ports, which takes long.
-        for contender in [Contender::Lager, Contender::Iceoryx2] {
-            session.round(contender, 20)?;
+        for contender in Contender::ALL {
+            session.publish(contender, 20)?;
         }
         Ok(session)
     }
 
     /// Publishes `count` blocks; how long each took, in ns.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
-    pub fn round(&mut self, contender: Contender, count: usize) -> Result<Vec<u64>, BenchError> {
+    fn publish(&mut self, contender: Contender, count: usize) -> Result<Vec<u64>, BenchError> {
         let mut times = Vec::with_capacity(count);
         for _ in 0..count {
             self.number += 1;
@@ -268,13 +227,9 @@ impl<const WORDS: usize> Session<WORDS> {
     }
 }
 
-impl<const WORDS: usize> fmt::Debug for Session<WORDS> {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter
-            .debug_struct("Session")
-            .field("bytes", &(8 * WORDS))
-            .field("published", &self.number)
-            .finish_non_exhaustive()
+impl<const WORDS: usize> group::Session for Session<WORDS> {
+    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
+        self.publish(self.contenders[index], samples)
     }
 }
 

@@ -1,103 +1,231 @@
-//! The order of measuring: contenders take turns in short rounds within each run, so that whatever
-//! the machine does meanwhile hits all of them alike; ratios are taken within a run.
+//! Rows that take turns: in short rounds within each run, so that whatever the machine does
+//! meanwhile hits all of them alike; ratios are taken within a run.
 //!
-//! What a round is, the scenario says; nothing here starts a process or reads a clock.
+//! This is the one definition of a measurement: `lager bench` and the guard run whole groups
+//! ([`Group::measure`]), criterion times single rows ([`Group::open`]). What a round is, the
+//! scenario says; nothing here reads a clock.
 
+use core::fmt;
 use std::io::{IsTerminal, Write};
 
+use lager_rig::{Refused, heed_interrupts, interrupted};
+
 use crate::error::BenchError;
-use crate::parts::interrupted;
+use crate::machine::Awake;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
 use crate::slow;
 use crate::stats::{Quantiles, median};
 
+/// A payload of 1 MiB passes over the stack once, unless the compiler saves it the way.
+const STACK: usize = 32 << 20;
+
 /// One line of a report before it is measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Entry {
+pub struct Entry {
     /// See [`Row::name`].
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// See [`Row::variant`].
-    pub(crate) variant: &'static str,
+    pub variant: &'static str,
     /// See [`Row::mode`].
-    pub(crate) mode: Mode,
+    pub mode: Mode,
     /// The labels it is compared with, the most important first; each belongs to an entry of the
     /// same group whose label is unique there.
-    pub(crate) against: &'static [&'static str],
+    pub against: &'static [&'static str],
 }
 
 impl Entry {
     /// See [`Row::label`].
-    pub(crate) fn label(&self) -> String {
+    #[must_use]
+    pub fn label(&self) -> String {
         if self.variant.is_empty() {
             self.name.to_owned()
         } else {
             format!("{}/{}", self.name, self.variant)
         }
     }
-}
 
-/// The indices of the entries whose mode is wanted, and of those they are compared with.
-pub(crate) fn wanted(entries: &[Entry], options: &Options) -> Vec<usize> {
-    let asked = |entry: &Entry| options.modes.contains(&entry.mode);
-    let needed = |entry: &Entry| {
-        let label = entry.label();
-        entries
-            .iter()
-            .any(|other| asked(other) && other.against.contains(&label.as_str()))
-    };
-    (0..entries.len())
-        .filter(|index| asked(&entries[*index]) || needed(&entries[*index]))
-        .collect()
-}
-
-/// Measures `entries` against each other: `options.runs` runs of `rounds` rounds each, every entry
-/// once in each round, each round beginning with another one. `round` measures one entry once and
-/// returns its samples in ns.
-///
-/// # Errors
-/// What `round` returns, or somebody wants to stop.
-pub(crate) fn measure(
-    what: &str,
-    regime: Regime,
-    entries: &[Entry],
-    options: &Options,
-    rounds: usize,
-    mut round: impl FnMut(usize) -> Result<Vec<u64>, BenchError>,
-) -> Result<Vec<Row>, BenchError> {
-    let mut runs: Vec<Vec<Quantiles>> = vec![Vec::new(); entries.len()];
-    for run in 0..options.runs.max(1) {
-        let mut samples: Vec<Vec<u64>> = vec![Vec::new(); entries.len()];
-        for turn in 0..rounds {
-            for place in 0..entries.len() {
-                if interrupted() {
-                    return Err(BenchError::Interrupted);
-                }
-                let index = (place + turn) % entries.len();
-                progress(what, regime, run, options, &entries[index]);
-                let entry = &entries[index];
-                slow::row(&format!(
-                    "{what} {} {regime}: {}",
-                    entry.mode,
-                    entry.label()
-                ));
-                samples[index].extend(round(index)?);
-            }
-        }
-        for (index, samples) in samples.iter_mut().enumerate() {
-            runs[index].extend(Quantiles::of(samples));
+    /// A row of it without ratios.
+    pub(crate) fn row(&self, what: &str, regime: Regime, times: Option<Quantiles>) -> Row {
+        Row {
+            name: self.name.to_owned(),
+            variant: self.variant.to_owned(),
+            ..Row::of(what, self.mode, regime, times)
         }
     }
-    clear_progress();
-    Ok(rows(what, regime, entries, &runs))
+}
+
+/// Those of `all` whose mode is wanted, and those that these are compared with.
+pub(crate) fn wanted<T>(
+    all: impl IntoIterator<Item = (Entry, T)>,
+    options: &Options,
+) -> (Vec<Entry>, Vec<T>) {
+    let all: Vec<(Entry, T)> = all.into_iter().collect();
+    let asked = |entry: &Entry| options.modes.contains(&entry.mode);
+    let needed: Vec<&'static str> = all
+        .iter()
+        .filter(|(entry, _)| asked(entry))
+        .flat_map(|(entry, _)| entry.against)
+        .copied()
+        .collect();
+    all.into_iter()
+        .filter(|(entry, _)| asked(entry) || needed.contains(&entry.label().as_str()))
+        .unzip()
+}
+
+/// What is open while a group is measured. Stays in the thread that opened it: its processes end
+/// with that thread, which may be bound to a core meanwhile.
+pub trait Session {
+    /// Measures the entry with that index so many times; how long each took, in ns.
+    ///
+    /// # Errors
+    /// A process or the carrier failed; the session is of no more use.
+    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError>;
+
+    /// When all is measured: adds to the rows what else there is to say.
+    ///
+    /// # Errors
+    /// As [`Session::round`].
+    fn finish(&mut self, _rows: &mut Vec<Row>) -> Result<(), BenchError> {
+        Ok(())
+    }
+}
+
+/// What opening a session yields.
+pub type Opened = Result<Box<dyn Session>, BenchError>;
+
+/// Rows that are measured against each other.
+pub struct Group {
+    /// See [`Row::what`].
+    pub what: String,
+    /// See [`Row::regime`].
+    pub regime: Regime,
+    /// The rows.
+    pub entries: Vec<Entry>,
+    /// Rounds of each entry in a run: quick, and in full.
+    pub(crate) rounds: [usize; 2],
+    /// Samples of a round of each entry: quick, and in full.
+    pub(crate) samples: Vec<[usize; 2]>,
+    /// Without the right to real time it is left out, with a sentence.
+    pub(crate) is_real_time: bool,
+    pub(crate) open: Box<dyn Fn(Regime) -> Opened + Send>,
+}
+
+impl Group {
+    /// A group whose entries all have as many rounds in a run and samples in a round: quick, and in
+    /// full.
+    pub(crate) fn new(
+        what: impl Into<String>,
+        regime: Regime,
+        entries: Vec<Entry>,
+        rounds: [usize; 2],
+        samples: [usize; 2],
+        open: impl Fn(Regime) -> Opened + Send + 'static,
+    ) -> Self {
+        Self {
+            what: what.into(),
+            regime,
+            samples: vec![samples; entries.len()],
+            entries,
+            rounds,
+            is_real_time: false,
+            open: Box::new(open),
+        }
+    }
+
+    /// Starts what is needed to measure it in this thread.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub fn open(&self) -> Opened {
+        heed_interrupts();
+        (self.open)(self.regime)
+    }
+
+    /// Measures every entry against the others, in a thread of its own: `options.runs` runs of some
+    /// rounds each, every entry once in each round, each round beginning with another one.
+    ///
+    /// # Errors
+    /// A session failed, or somebody wants to stop.
+    pub(crate) fn measure(self, options: &Options) -> Result<Vec<Row>, BenchError> {
+        std::thread::scope(|scope| {
+            std::thread::Builder::new()
+                .stack_size(STACK)
+                .spawn_scoped(scope, move || self.measure_here(options))
+                .map_err(Refused::to_make("a thread"))?
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    fn measure_here(self, options: &Options) -> Result<Vec<Row>, BenchError> {
+        match self.open_and_measure(options) {
+            Err(error @ BenchError::RealTime { .. }) if self.is_real_time => {
+                // The rest is worth having without that right.
+                eprintln!("{error}");
+                Ok(Vec::new())
+            }
+            measured => measured,
+        }
+    }
+
+    fn open_and_measure(&self, options: &Options) -> Result<Vec<Row>, BenchError> {
+        let _awake = Awake::during(self.regime)?;
+        let mut session = self.open()?;
+        let mut rows = self.take_turns(options, &mut *session)?;
+        session.finish(&mut rows)?;
+        Ok(rows)
+    }
+
+    fn take_turns(
+        &self,
+        options: &Options,
+        session: &mut dyn Session,
+    ) -> Result<Vec<Row>, BenchError> {
+        let Self {
+            what,
+            regime,
+            entries,
+            ..
+        } = self;
+        let thorough = usize::from(!options.quick);
+        let mut runs: Vec<Vec<Quantiles>> = vec![Vec::new(); entries.len()];
+        for run in 0..options.runs.max(1) {
+            let mut samples: Vec<Vec<u64>> = vec![Vec::new(); entries.len()];
+            for turn in 0..self.rounds[thorough] {
+                for place in 0..entries.len() {
+                    if interrupted() {
+                        return Err(BenchError::Interrupted);
+                    }
+                    let index = (place + turn) % entries.len();
+                    let entry = &entries[index];
+                    progress(what, *regime, run, options, entry);
+                    let row = format!("{what} {} {regime}: {}", entry.mode, entry.label());
+                    slow::row(&row);
+                    samples[index].extend(session.round(index, self.samples[index][thorough])?);
+                }
+            }
+            for (index, samples) in samples.iter_mut().enumerate() {
+                runs[index].extend(Quantiles::of(samples));
+            }
+        }
+        clear_progress();
+        Ok(rows(what, *regime, entries, &runs))
+    }
+}
+
+impl fmt::Debug for Group {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Group")
+            .field("what", &self.what)
+            .field("regime", &self.regime)
+            .field("entries", &self.entries)
+            .finish_non_exhaustive()
+    }
 }
 
 /// The rows of what was measured: `runs` holds each entry's runs, the same number of each.
-pub(crate) fn rows(
-    what: &str,
-    regime: Regime,
-    entries: &[Entry],
-    runs: &[Vec<Quantiles>],
-) -> Vec<Row> {
+fn rows(what: &str, regime: Regime, entries: &[Entry], runs: &[Vec<Quantiles>]) -> Vec<Row> {
     entries
         .iter()
         .zip(runs)
@@ -113,20 +241,11 @@ pub(crate) fn rows(
                 .collect();
             let first = ratios.first();
             Some(Row {
-                name: entry.name.to_owned(),
-                variant: entry.variant.to_owned(),
-                what: what.to_owned(),
-                mode: entry.mode,
-                regime,
-                n: over.n,
-                p50_ns: over.p50_ns,
-                p99_ns: over.p99_ns,
-                p999_ns: over.p999_ns,
                 ratio_to: first.map_or_else(String::new, |first| first.to.clone()),
                 ratio_p50: first.map_or(1.0, |first| first.p50),
                 ratio_p99: first.map_or(1.0, |first| first.p99),
                 ratios,
-                cpu_percent: None,
+                ..entry.row(what, regime, Some(over))
             })
         })
         .collect()
@@ -207,30 +326,50 @@ mod tests {
         },
     ];
 
-    fn options(modes: &[Mode]) -> Options {
-        Options {
-            runs: 3,
-            quick: true,
-            modes: modes.to_vec(),
-            regimes: vec![Regime::Plain],
+    /// What each round of an entry of [`ENTRIES`] yields.
+    struct Planned<R>(R);
+
+    impl<R: FnMut(usize) -> Result<Vec<u64>, BenchError>> Session for Planned<R> {
+        fn round(&mut self, index: usize, _: usize) -> Result<Vec<u64>, BenchError> {
+            (self.0)(index)
         }
+    }
+
+    fn measure(
+        entries: &[Entry],
+        runs: usize,
+        rounds: usize,
+        round: impl FnMut(usize) -> Result<Vec<u64>, BenchError>,
+    ) -> Result<Vec<Row>, BenchError> {
+        let entries = entries.to_vec();
+        let open = |_| unreachable!("it is open");
+        let group = Group::new("hop", Regime::Plain, entries, [rounds; 2], [1; 2], open);
+        let options = Options {
+            runs,
+            ..Options::default()
+        };
+        group.take_turns(&options, &mut Planned(round))
     }
 
     #[test]
     fn a_wanted_mode_brings_what_it_is_compared_with() {
-        assert_eq!(wanted(ENTRIES, &options(&[Mode::Adaptive])), [1, 2]);
-        assert_eq!(wanted(ENTRIES, &options(&[Mode::Block])), [3]);
-        assert_eq!(wanted(ENTRIES, &options(&Mode::ALL)), [0, 1, 2, 3]);
+        let wanted = |modes: &[Mode]| {
+            let options = Options {
+                modes: modes.to_vec(),
+                ..Options::default()
+            };
+            let numbered = ENTRIES.iter().cloned().zip(0..);
+            wanted(numbered, &options).1
+        };
+        assert_eq!(wanted(&[Mode::Adaptive]), [1, 2]);
+        assert_eq!(wanted(&[Mode::Block]), [3]);
+        assert_eq!(wanted(&Mode::ALL), [0, 1, 2, 3]);
     }
 
     #[test]
-    fn contenders_take_turns_and_each_round_begins_with_another() {
+    fn rows_take_turns_and_each_round_begins_with_another() {
         let mut order = Vec::new();
-        let options = Options {
-            runs: 1,
-            ..options(&Mode::ALL)
-        };
-        measure("hop", Regime::Plain, &ENTRIES[..3], &options, 3, |index| {
+        measure(&ENTRIES[..3], 1, 3, |index| {
             order.push(index);
             Ok(vec![1])
         })
@@ -242,19 +381,12 @@ mod tests {
     fn a_machine_that_drifts_from_run_to_run_does_not_move_a_ratio() {
         // Each run is ten times slower than the one before, for both alike.
         let mut rounds = [0_u32; 2];
-        let rows = measure(
-            "hop",
-            Regime::Plain,
-            &ENTRIES[..2],
-            &options(&Mode::ALL),
-            1,
-            |index| {
-                let drift = 10_u64.pow(rounds[index]);
-                rounds[index] += 1;
-                let own = [120, 100][index];
-                Ok(vec![own * drift; 100])
-            },
-        )
+        let rows = measure(&ENTRIES[..2], 3, 1, |index| {
+            let drift = 10_u64.pow(rounds[index]);
+            rounds[index] += 1;
+            let own = [120, 100][index];
+            Ok(vec![own * drift; 100])
+        })
         .unwrap();
         assert_eq!(rows[0].ratio_to, "iceoryx2/header");
         assert!((rows[0].ratio_p50 - 1.2).abs() < 1e-9, "{rows:?}");
@@ -264,7 +396,7 @@ mod tests {
 
     #[test]
     fn what_fails_in_a_round_ends_the_measurement() {
-        let failed = measure("hop", Regime::Plain, ENTRIES, &options(&[]), 1, |_| {
+        let failed = measure(ENTRIES, 1, 1, |_| {
             Err(BenchError::NothingToMeasure("on purpose".to_owned()))
         });
         assert!(matches!(failed, Err(BenchError::NothingToMeasure(_))));

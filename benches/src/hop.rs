@@ -1,88 +1,194 @@
 //! `hop`: one way between two processes.
 //!
 //! ```text
-//!            first process, core 0             second process, core 1
-//!   thrown ─ send ────────── 64 bytes ──────────> receive
-//!                                                   │
-//!   caught ─ receive <────── the same back ──────── send         one way = (caught - thrown) / 2
+//!              sender, core 0                    receiver, core 1
+//!       sent ─ send ────────── 64 bytes ──────────> receive
+//!                                                      │
+//!   received ─ receive <────── the same back ──────── send      one way = (received - sent) / 2
 //! ```
 //!
 //! Both ends are the same contender and wait the same way, except for `adaptive`: of two cores only
-//! one is ever given to adaptive spinning, so there the second process adapts and the first one
-//! spins. Then only the way to the second process is timed, for the contender and for its baseline
-//! (both ends read the same clock, CLOCK_MONOTONIC); half a round trip would hide half of a delay
-//! at one end.
+//! one is ever given to adaptive spinning, so there the receiver adapts and the sender spins. Then
+//! only the way to the receiver is timed, for the contender and for its baseline (both ends read
+//! the same clock, CLOCK_MONOTONIC); half a round trip would hide half of a delay at one end.
 //!
-//! Every contender plays short rounds in turn with all the others, with ports of its own for each
-//! round.
+//! Rows called `hop` are half of the round trip, as fast as samples come back; `hop@full-rate` is
+//! one way at the same rate, `hop@10kHz` with a sample every 100 µs.
 
 mod contender;
 mod ours;
-mod players;
+mod processes;
 
-use core::fmt;
 use core::time::Duration;
 use std::os::fd::{AsRawFd, OwnedFd};
 
+use lager_rig::Refused;
+use lager_rig::process::Main;
 use rustix::event::{EventfdFlags, eventfd};
 
-pub use contender::Contender;
-pub use players::{Round, Timing};
-
 use crate::baseline::stream;
-use crate::domain::Domain;
 use crate::error::BenchError;
-use crate::machine::{self, Awake};
-use crate::parts::{Part, Play};
-use crate::report::{Mode, Options, Ratio, Regime, Report, Row};
-use crate::ring;
-use crate::run::{self, wanted};
-use crate::shared::Shared;
+use crate::group::{Group, Session, wanted};
+use crate::pair::Pair;
+use crate::report::{Mode, Options, Ratio, Regime, Row};
 use crate::slow;
-use players::{Court, Lines, Setup};
+use contender::Contender;
+use processes::{Lanes, Lines, Round, Timing};
 
-const FIRST: &str = "first player of the hop";
-const SECOND: &str = "second player of the hop";
+const SENDER: &str = "sender of the hop";
+const RECEIVER: &str = "receiver of the hop";
 
-pub(crate) const PARTS: &[(&str, Play)] = &[(FIRST, players::first), (SECOND, players::second)];
+pub(crate) const PROCESSES: &[(&str, Main)] =
+    &[(SENDER, processes::sender), (RECEIVER, processes::receiver)];
 
-/// From one throw to the next when they come at 10 kHz.
+/// From one sample to the next when they come at 10 kHz.
 const PACE_NS: u64 = 100_000;
 
-/// Measures the hop: every contender in every mode and regime that `options` names, and the
-/// baselines they are compared with. Rows called `hop` are half of the way there and back, as fast
-/// as balls come back; `hop@full-rate` is one way at the same rate, `hop@10kHz` with a ball every
-/// 100 µs; those called `ring-64` time the writer that wakes one actor beside 64 observers.
-///
-/// # Errors
-/// See [`BenchError`].
-pub fn measure(options: &Options) -> Result<Report, BenchError> {
-    let mut rows = Vec::new();
-    for regime in Regime::ALL {
-        if options.regimes.contains(&regime) {
-            rows.extend(in_regime(regime, options)?);
-            rows.extend(ring::measure(regime, options)?);
+/// What takes part where the receiver adapts.
+const BESIDE_ADAPTIVE: [Contender; 3] = [
+    Contender::Lager(Mode::Spin),
+    Contender::IceoryxHeader,
+    Contender::Lager(Mode::Adaptive),
+];
+
+/// The groups of one regime.
+pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
+    let alike = Contender::ALL
+        .into_iter()
+        .filter(|contender| contender.mode() != Mode::Adaptive)
+        .collect();
+    let adaptive = match options.modes.contains(&Mode::Adaptive) {
+        true => BESIDE_ADAPTIVE.to_vec(),
+        false => Vec::new(),
+    };
+    [
+        ("hop", alike, Timing::RoundTrip),
+        (
+            "hop@full-rate",
+            adaptive.clone(),
+            Timing::OneWay { gap_ns: 0 },
+        ),
+        ("hop@10kHz", adaptive, Timing::OneWay { gap_ns: PACE_NS }),
+    ]
+    .map(|(what, contenders, timing)| group(what, contenders, timing, regime, options))
+    .into()
+}
+
+fn group(
+    what: &str,
+    contenders: Vec<Contender>,
+    timing: Timing,
+    regime: Regime,
+    options: &Options,
+) -> Group {
+    let working = contenders
+        .into_iter()
+        .filter(|contender| contender.works_in(regime))
+        .map(|contender| (contender.entry(), contender));
+    let (entries, contenders) = wanted(working, options);
+    let samples = contenders
+        .iter()
+        .map(|contender| samples(*contender, timing))
+        .collect();
+    let group = Group::new(what, regime, entries, [2, 4], [0; 2], move |regime| {
+        Ok(Box::new(Hop::open(regime, contenders.clone(), timing)?))
+    });
+    Group { samples, ..group }
+}
+
+/// Samples of a round: as many as take a fraction of a second.
+fn samples(contender: Contender, timing: Timing) -> [usize; 2] {
+    match (contender.mode(), timing.gap_ns() > 0) {
+        (Mode::Block, _) => [500, 2_500],
+        (_, true) => [500, 2_000],
+        (_, false) => [5_000, 20_000],
+    }
+}
+
+/// Sender and receiver, which measure any contender.
+struct Hop {
+    pair: Pair<Lanes>,
+    // The processes have inherited them.
+    _lines: Lines<OwnedFd>,
+    contenders: Vec<Contender>,
+    timing: Timing,
+}
+
+impl Hop {
+    fn open(
+        regime: Regime,
+        contenders: Vec<Contender>,
+        timing: Timing,
+    ) -> Result<Self, BenchError> {
+        let lines = lines()?;
+        let numbers: Lines<i32> = lines.each_ref().map(|pair| {
+            pair.each_ref()
+                .map(|descriptor: &OwnedFd| descriptor.as_raw_fd())
+        });
+        Ok(Self {
+            pair: Pair::start(regime, [SENDER, RECEIVER], &numbers)?,
+            _lines: lines,
+            contenders,
+            timing,
+        })
+    }
+}
+
+impl Session for Hop {
+    /// Some samples more are sent before, to warm up.
+    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
+        let (contender, timing) = (self.contenders[index], self.timing);
+        let samples = u32::try_from(samples).unwrap_or(u32::MAX);
+        // Both give up by themselves when nothing comes; this is for those that cannot, because
+        // a bare `read` has no time-out: ten times what the slowest machine should need.
+        let limit = Duration::from_secs(60)
+            + (Duration::from_nanos(timing.gap_ns()) + Duration::from_micros(500))
+                * (samples + samples / 10);
+        let round = |number| Round {
+            contender,
+            warm_up: samples / 10 + 10,
+            samples,
+            timing,
+            number,
+            spin_ns: slow::spin_ns(),
+        };
+        let (sender, receiver): (Vec<u64>, Vec<u64>) = self.pair.round(round, limit)?;
+        if timing == Timing::RoundTrip {
+            return Ok(sender);
         }
+        Ok(sender
+            .iter()
+            .zip(&receiver)
+            .map(|(sent, received)| received.saturating_sub(*sent))
+            .collect())
     }
-    beside_the_parts(&mut rows);
-    if rows.is_empty() {
-        return Err(BenchError::NothingToMeasure(
-            "no contender works in these modes and regimes".to_owned(),
-        ));
-    }
-    Ok(Report {
-        machine: machine::describe(),
-        rows,
-    })
+}
+
+fn lines() -> Result<Lines<OwnedFd>, BenchError> {
+    let pipe = || {
+        let (read, write) = stream::a_pipe().map_err(Refused::to_make("a pipe"))?;
+        Ok::<_, Refused>([read, write])
+    };
+    // Without CLOEXEC: the processes inherit it.
+    let bell = || eventfd(0, EventfdFlags::empty()).map_err(Refused::to_make("an eventfd"));
+    let uds = stream::datagrams().map_err(Refused::to_make("a Unix socket"))?;
+    let tcp = stream::loopback().map_err(Refused::to_make("a TCP connection over loopback"))?;
+    Ok([
+        pipe()?,
+        pipe()?,
+        [bell()?, bell()?],
+        [uds.0, uds.1],
+        [tcp.0, tcp.1],
+    ])
 }
 
 /// What the floor of a blocking hop is called.
-const PARTS_OF_A_HOP: &str = "futex + polled iceoryx2";
+const ITS_PARTS: &str = "futex + polled iceoryx2";
 
 /// Compares the blocking hop on one core with the sum of what it is made of: a hop of a futex on
 /// that core, and one of bare iceoryx2 that is polled from another core. The sum has one cache line
 /// too many, which both pass.
-fn beside_the_parts(rows: &mut [Row]) {
+pub(crate) fn beside_its_parts(rows: &mut [Row]) {
     let find = |label: &str, mode, regime| {
         let is_it = |row: &&Row| {
             row.what == "hop" && row.label() == label && row.mode == mode && row.regime == regime
@@ -100,213 +206,9 @@ fn beside_the_parts(rows: &mut [Row]) {
     };
     let [p50, p99] = [ratio(|row| row.p50_ns), ratio(|row| row.p99_ns)];
     rows[hop].ratios.push(Ratio {
-        to: PARTS_OF_A_HOP.to_owned(),
+        to: ITS_PARTS.to_owned(),
         p50,
         p99,
         runs: vec![[p50, p99]],
     });
-}
-
-fn in_regime(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchError> {
-    let alike: Vec<Contender> = Contender::ALL
-        .into_iter()
-        .filter(|contender| contender.mode() != Mode::Adaptive)
-        .collect();
-    const BESIDE_ADAPTIVE: [Contender; 3] = [
-        Contender::Lager(Mode::Spin),
-        Contender::IceoryxHeader,
-        Contender::Lager(Mode::Adaptive),
-    ];
-    let alike = chosen(&alike, regime, options);
-    let adaptive: Vec<Contender> = if options.modes.contains(&Mode::Adaptive) {
-        chosen(&BESIDE_ADAPTIVE, regime, options)
-    } else {
-        Vec::new()
-    };
-    if alike.is_empty() && adaptive.is_empty() {
-        return Ok(Vec::new());
-    }
-    let mut session = Session::open(regime)?;
-    let mut rows = Vec::new();
-    for (what, contenders, timing) in [
-        ("hop", &alike, Timing::ThereAndBack),
-        ("hop@full-rate", &adaptive, Timing::OneWay { gap_ns: 0 }),
-        ("hop@10kHz", &adaptive, Timing::OneWay { gap_ns: PACE_NS }),
-    ] {
-        rows.extend(group(what, contenders, timing, &mut session, options)?);
-    }
-    Ok(rows)
-}
-
-fn chosen(all: &[Contender], regime: Regime, options: &Options) -> Vec<Contender> {
-    let working: Vec<Contender> = all
-        .iter()
-        .copied()
-        .filter(|contender| contender.works_in(regime))
-        .collect();
-    let entries: Vec<_> = working.iter().map(|contender| contender.entry()).collect();
-    wanted(&entries, options)
-        .into_iter()
-        .map(|index| working[index])
-        .collect()
-}
-
-fn group(
-    what: &str,
-    contenders: &[Contender],
-    timing: Timing,
-    session: &mut Session,
-    options: &Options,
-) -> Result<Vec<Row>, BenchError> {
-    let entries: Vec<_> = contenders
-        .iter()
-        .map(|contender| contender.entry())
-        .collect();
-    let rounds = if options.quick { 2 } else { 4 };
-    let regime = session.regime;
-    run::measure(what, regime, &entries, options, rounds, |index| {
-        let contender = contenders[index];
-        session.round(contender, balls(contender, timing, options.quick), timing)
-    })
-}
-
-/// Balls of a round: as many as take a fraction of a second.
-fn balls(contender: Contender, timing: Timing, quick: bool) -> u32 {
-    match (contender.mode(), timing.gap_ns() > 0, quick) {
-        (Mode::Block, _, false) => 2_500,
-        (Mode::Block, _, true) | (_, true, true) => 500,
-        (_, true, false) => 2_000,
-        (_, false, false) => 20_000,
-        (_, false, true) => 5_000,
-    }
-}
-
-/// Two processes, each on its core, that play rounds with any contender.
-pub struct Session {
-    // Dropped in this order: nobody is on the bus when it is swept.
-    first: Part,
-    second: Part,
-    _awake: Awake,
-    _lines: Lines<OwnedFd>,
-    _court: Shared<Court>,
-    _domain: Domain,
-    regime: Regime,
-    rounds: u32,
-}
-
-impl Session {
-    /// Starts both processes.
-    ///
-    /// # Errors
-    /// There are too few cores, or something cannot be made.
-    pub fn open(regime: Regime) -> Result<Self, BenchError> {
-        let cores = machine::cores_for(regime)?;
-        let domain = Domain::new()?;
-        let court = Shared::<Court>::new()?;
-        let lines = lines()?;
-        let awake = Awake::during(regime)?;
-        let start = |name, core| {
-            let mut part = Part::start(name)?;
-            let () = part.ask(&Setup {
-                core,
-                folder: domain.folder().to_owned(),
-                court: court.number(),
-                lines: numbers(&lines),
-            })?;
-            Ok::<Part, BenchError>(part)
-        };
-        Ok(Self {
-            first: start(FIRST, cores.0)?,
-            second: start(SECOND, cores.1)?,
-            _awake: awake,
-            _lines: lines,
-            _court: court,
-            _domain: domain,
-            regime,
-            rounds: 0,
-        })
-    }
-
-    /// Throws some balls to warm up and then `balls` that are timed. Returns the time of one way of
-    /// each, in ns.
-    ///
-    /// # Errors
-    /// A player failed; the session is of no more use.
-    pub fn round(
-        &mut self,
-        contender: Contender,
-        balls: u32,
-        timing: Timing,
-    ) -> Result<Vec<u64>, BenchError> {
-        self.rounds += 1;
-        let round = Round {
-            contender,
-            warm_up: balls / 10 + 10,
-            balls,
-            timing,
-            number: self.rounds,
-            spin_ns: slow::spin_ns(),
-        };
-        // Players give up by themselves when nothing comes; this is for those that cannot, because
-        // a bare `read` has no time-out: ten times what the slowest machine should need.
-        let limit = Duration::from_secs(60)
-            + (Duration::from_nanos(timing.gap_ns()) + Duration::from_micros(500))
-                * (balls + balls / 10);
-        self.first.tell(&round)?;
-        self.second.tell(&round)?;
-        let (first, second): (Vec<u64>, Vec<u64>) =
-            Part::both(&mut self.first, &mut self.second, limit)?;
-        if timing == Timing::ThereAndBack {
-            return Ok(first);
-        }
-        Ok(first
-            .iter()
-            .zip(&second)
-            .map(|(thrown, caught)| caught.saturating_sub(*thrown))
-            .collect())
-    }
-}
-
-impl fmt::Debug for Session {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter
-            .debug_struct("Session")
-            .field("regime", &self.regime)
-            .field("rounds", &self.rounds)
-            .finish_non_exhaustive()
-    }
-}
-
-fn lines() -> Result<Lines<OwnedFd>, BenchError> {
-    let kernel = |what| {
-        move |error: std::io::Error| BenchError::Kernel {
-            what,
-            detail: error.to_string(),
-        }
-    };
-    let pipe = || stream::a_pipe().map_err(|error| kernel("a pipe")(error.into()));
-    // Without CLOEXEC: the players inherit it.
-    let bell =
-        || eventfd(0, EventfdFlags::empty()).map_err(|error| kernel("an eventfd")(error.into()));
-    let uds = stream::datagrams().map_err(|error| kernel("a Unix socket")(error.into()))?;
-    let tcp = stream::loopback().map_err(kernel("a TCP connection over loopback"))?;
-    Ok(Lines {
-        pipes: [pipe()?, pipe()?],
-        eventfds: [bell()?, bell()?],
-        uds: [uds.0, uds.1],
-        tcp: [tcp.0, tcp.1],
-    })
-}
-
-fn numbers(lines: &Lines<OwnedFd>) -> Lines<i32> {
-    let number = AsRawFd::as_raw_fd;
-    Lines {
-        pipes: [0, 1].map(|index| {
-            let (read, write) = &lines.pipes[index];
-            (number(read), number(write))
-        }),
-        eventfds: [0, 1].map(|index| number(&lines.eventfds[index])),
-        uds: [0, 1].map(|index| number(&lines.uds[index])),
-        tcp: [0, 1].map(|index| number(&lines.tcp[index])),
-    }
 }

@@ -4,15 +4,19 @@
 //! It never changes anything for other processes.
 
 use core::marker::PhantomData;
+use std::error::Error;
 
+use lager_rig::process::Main;
+use lager_rig::schedule::schedule;
+use lager_rig::{Parent, Process, Refused};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
 use crate::error::BenchError;
-use crate::parts::{Part, Play, Stage};
 use crate::report::Regime;
-use crate::schedule::schedule;
 
-pub(crate) const PARTS: &[(&str, Play)] = &[("idle spinner", keep_from_halting)];
+const SPINNER: &str = "idle spinner";
+
+pub(crate) const PROCESSES: &[(&str, Main)] = &[(SPINNER, keep_from_halting)];
 
 /// The machine in one line: processor, cores, governor, kernel.
 #[must_use]
@@ -121,7 +125,7 @@ impl Drop for Bound {
 /// Processes that keep cores from halting, for as long as this lives.
 #[derive(Debug)]
 pub struct Awake {
-    _spinners: Vec<Part>,
+    _spinners: Vec<Process>,
 }
 
 impl Awake {
@@ -138,9 +142,9 @@ impl Awake {
         let spinners = cores
             .into_iter()
             .map(|core| {
-                let mut part = Part::start("idle spinner")?;
-                let () = part.ask(&core)?;
-                Ok(part)
+                let mut spinner = Process::start(SPINNER)?;
+                let () = spinner.ask(&core)?;
+                Ok(spinner)
             })
             .collect::<Result<_, BenchError>>()?;
         Ok(Self {
@@ -150,16 +154,13 @@ impl Awake {
 }
 
 /// Runs whenever nothing else wants the core, until it is killed.
-fn keep_from_halting(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(core) = stage.hear::<usize>()? else {
+fn keep_from_halting(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(core) = parent.hear::<usize>()? else {
         return Ok(());
     };
     pin(core)?;
-    schedule(libc::SCHED_IDLE, 0).map_err(|error| BenchError::Kernel {
-        what: "a process of the lowest priority",
-        detail: error.to_string(),
-    })?;
-    stage.tell(&())?;
+    schedule(libc::SCHED_IDLE, 0).map_err(Refused::to_make("a process of the lowest priority"))?;
+    parent.say(&())?;
     loop {
         core::hint::spin_loop();
     }

@@ -24,31 +24,28 @@
 //! **Cores**: the boards, the bridge and the floor's ends are bound to the first core, logic and
 //! the floor's middle to the second; in the regime of one core all are on that one.
 
-mod board;
-mod cable;
 mod floor;
 mod pace;
-mod players;
 mod processes;
 mod robot;
+mod services;
 mod stages;
 
 use crate::error::BenchError;
-use crate::machine::{self, Awake, Bound, cores_for};
-use crate::report::{Mode, Options, Regime, Report, Row};
-use crate::run::{self, Entry};
+use crate::group::{Entry, Group, Session, wanted};
+use crate::machine::{Bound, cores_for};
+use crate::report::{Mode, Options, Regime, Row};
 use crate::stats::Quantiles;
 use floor::Floor;
 use pace::{Chain, TURN, turn};
-use players::{Place, RealTime};
 use robot::Robot;
+use services::{Place, RealTime};
 
-pub(crate) use floor::PARTS as FLOOR_PARTS;
-pub(crate) use players::PARTS;
+pub(crate) use floor::PROCESSES as FLOOR_PROCESSES;
+pub(crate) use services::PROCESSES;
 
-/// Turns of each chain in one run.
-const TURNS: usize = 8;
-const QUICK_TURNS: usize = 2;
+/// Turns of each chain in one run: quick, and in full.
+const TURNS: [usize; 2] = [2, 8];
 
 /// Frames of somewhat more than a second.
 const A_SECOND: usize = 1_100;
@@ -57,202 +54,177 @@ const A_SECOND: usize = 1_100;
 const SERVICES: i32 = 40;
 const BOARDS: i32 = 50;
 
-const ENTRIES: &[Entry] = &[
+/// A row of ours or of the floor.
+const fn entry(
+    name: &'static str,
+    variant: &'static str,
+    mode: Mode,
+    against: &'static [&'static str],
+) -> Entry {
     Entry {
-        name: "lager",
-        variant: "block",
-        mode: Mode::Block,
-        against: &["floor"],
-    },
-    Entry {
-        name: "floor",
-        variant: "",
-        mode: Mode::Block,
-        against: &[],
-    },
-    Entry {
-        name: "lager",
-        variant: "adaptive",
-        mode: Mode::Adaptive,
-        against: &["lager/block", "floor"],
-    },
-];
-
-const OBSERVED: &[Entry] = &[
-    Entry {
-        name: "lager",
-        variant: "alone",
-        mode: Mode::Block,
-        against: &[],
-    },
-    Entry {
-        name: "lager",
-        variant: "8 observers",
-        mode: Mode::Block,
-        against: &["lager/alone"],
-    },
-    Entry {
-        name: "lager",
-        variant: "64 observers",
-        mode: Mode::Block,
-        against: &["lager/alone"],
-    },
-];
-
-/// Measures the path in every wanted mode and regime. A spinning path is not measured: bridge and
-/// logic would keep two cores, and the boards need one.
-///
-/// # Errors
-/// A frame was not answered, a process ended, or the machine lacks something; the sentence says
-/// what to do.
-pub fn measure(options: &Options) -> Result<Report, BenchError> {
-    let mut rows = Vec::new();
-    for regime in &options.regimes {
-        rows.extend(measure_in(*regime, options)?);
+        name,
+        variant,
+        mode,
+        against,
     }
-    if rows.is_empty() {
-        return Err(BenchError::NothingToMeasure(
-            "the path is measured blocking and adaptive, the latter on two cores".to_owned(),
-        ));
-    }
-    Ok(Report {
-        machine: machine::describe(),
-        rows,
-    })
 }
 
-fn measure_in(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchError> {
+const ALONE: [Entry; 3] = [
+    entry("lager", "block", Mode::Block, &["floor"]),
+    entry("floor", "", Mode::Block, &[]),
+    entry(
+        "lager",
+        "adaptive",
+        Mode::Adaptive,
+        &["lager/block", "floor"],
+    ),
+];
+
+/// With so many observers.
+const OBSERVED: [(Entry, usize); 3] = [
+    (entry("lager", "alone", Mode::Block, &[]), 0),
+    (
+        entry("lager", "8 observers", Mode::Block, &["lager/alone"]),
+        8,
+    ),
+    (
+        entry("lager", "64 observers", Mode::Block, &["lager/alone"]),
+        64,
+    ),
+];
+
+/// The groups of one regime. A spinning path is not measured: bridge and logic would keep two cores,
+/// and the boards need one.
+pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     let mut options = options.clone();
     if regime == Regime::SameCore {
         // Nobody spins on the only core that the others have.
         options.modes.retain(|mode| *mode != Mode::Adaptive);
     }
-    let wanted = run::wanted(ENTRIES, &options);
-    if wanted.is_empty() {
-        return Ok(Vec::new());
-    }
-    let entries: Vec<Entry> = wanted.iter().map(|index| ENTRIES[*index].clone()).collect();
-    // In a thread of its own: bound to a core and in real time only as long as this lasts.
-    let observed = regime != Regime::SameCore && options.modes.contains(&Mode::Block);
-    let measured = in_a_thread({
-        let options = options.clone();
-        move || path(regime, &entries, &options)
-    })?;
-    if !observed {
-        return Ok(measured);
-    }
-    match in_a_thread(move || path_observed(regime, &options)) {
-        Ok(more) => Ok([measured, more].concat()),
-        Err(BenchError::RealTime { detail }) => {
-            // The rest is worth having without the right to real time.
-            eprintln!("{}", BenchError::RealTime { detail });
-            Ok(measured)
-        }
-        Err(error) => Err(error),
-    }
-}
-
-fn in_a_thread(
-    work: impl FnOnce() -> Result<Vec<Row>, BenchError> + Send + 'static,
-) -> Result<Vec<Row>, BenchError> {
-    std::thread::spawn(work)
-        .join()
-        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-}
-
-/// Blocking, the floor, and adaptive; then the stages of the blocking path.
-fn path(regime: Regime, entries: &[Entry], options: &Options) -> Result<Vec<Row>, BenchError> {
-    let (ends, mind) = cores_for(regime)?;
-    let [at_ends, at_mind] = [ends, mind].map(|core| Place {
-        core: Some(core),
-        priority: None,
+    let (entries, _) = wanted(ALONE.map(|entry| (entry, ())), &options);
+    let chains = entries.clone();
+    let alone = Group::new("path", regime, entries, TURNS, [TURN; 2], move |regime| {
+        Ok(Box::new(Chains::alone(regime, &chains)?))
     });
-    let _awake = Awake::during(regime)?;
-    let mut chains: Vec<Box<dyn Chain>> = Vec::new();
-    for entry in entries {
-        let mut chain: Box<dyn Chain> = if entry.name == "floor" {
-            Box::new(Floor::start(at_ends, at_mind)?)
-        } else {
-            Box::new(Robot::start(&entry.label(), entry.mode, at_ends, at_mind)?)
+    if regime == Regime::SameCore {
+        return vec![alone];
+    }
+    let (entries, observers) = wanted(OBSERVED, &options);
+    let robots: Vec<_> = entries.iter().cloned().zip(observers).collect();
+    let what = "path@observed";
+    let observed = Group::new(what, regime, entries, TURNS, [TURN; 2], move |regime| {
+        Ok(Box::new(Chains::observed(regime, &robots)?))
+    });
+    vec![
+        alone,
+        Group {
+            is_real_time: true,
+            ..observed
+        },
+    ]
+}
+
+/// The chains that take turns; the thread that plays their boards is bound to a core meanwhile.
+struct Chains {
+    chains: Vec<Box<dyn Chain>>,
+    regime: Regime,
+    /// The robots publish where the time goes; it is asked of those that nobody watches.
+    tells_stages: bool,
+    _bound: Bound,
+}
+
+impl Chains {
+    /// Blocking, the floor, and adaptive.
+    fn alone(regime: Regime, entries: &[Entry]) -> Result<Self, BenchError> {
+        let [at_ends, at_logic] = places(regime, None)?;
+        let start = |entry: &Entry| -> Result<Box<dyn Chain>, BenchError> {
+            Ok(if entry.name == "floor" {
+                Box::new(Floor::start(at_ends, at_logic)?)
+            } else {
+                Box::new(Robot::start(&entry.label(), entry.mode, at_ends, at_logic)?)
+            })
         };
-        chain.end()?;
-        chains.push(chain);
+        Self::of(regime, entries.iter().map(start), true)
     }
-    machine::pin(ends)?;
-    let mut rows = run::measure("path", regime, entries, options, turns(options), |index| {
-        turn(&mut *chains[index], TURN)
-    })?;
-    for (row, chain) in rows.iter_mut().zip(&chains) {
-        row.cpu_percent = chain.cpu_percent();
+
+    /// With nobody watching, and with observers; services and boards in real time.
+    fn observed(regime: Regime, robots: &[(Entry, usize)]) -> Result<Self, BenchError> {
+        let [at_ends, at_logic] = places(regime, Some(SERVICES))?;
+        let start = |(entry, observers): &(Entry, usize)| -> Result<Box<dyn Chain>, BenchError> {
+            let mut robot = Robot::start(&entry.label(), entry.mode, at_ends, at_logic)?;
+            robot.observed_by(*observers)?;
+            robot.with_boards_at(BOARDS)?;
+            Ok(Box::new(robot))
+        };
+        Self::of(regime, robots.iter().map(start), false)
     }
-    for (entry, chain) in entries.iter().zip(&mut chains) {
-        if entry.name == "floor" {
-            continue;
+
+    fn of(
+        regime: Regime,
+        started: impl Iterator<Item = Result<Box<dyn Chain>, BenchError>>,
+        tells_stages: bool,
+    ) -> Result<Self, BenchError> {
+        let mut chains = Vec::new();
+        for chain in started {
+            let mut chain = chain?;
+            chain.end()?;
+            chains.push(chain);
         }
-        rows.push(overtaken(chain.overtaken(), entry, regime));
-        // Counts are published once a second.
-        turn(&mut **chain, A_SECOND)?;
-        let before = chain.counted()?;
-        turn(&mut **chain, A_SECOND)?;
-        if let Some((before, after)) = before.zip(chain.counted()?) {
-            rows.extend(stages::rows(&before, &after, regime, entry.mode));
-        }
+        Ok(Self {
+            chains,
+            regime,
+            tells_stages,
+            // Last of all: what a thread starts inherits its core.
+            _bound: Bound::to(cores_for(regime)?.0)?,
+        })
     }
-    Ok(rows)
 }
 
-/// With nobody watching, and with observers; services and boards in real time.
-fn path_observed(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchError> {
-    let (ends, mind) = cores_for(regime)?;
-    let [at_ends, at_mind] = [ends, mind].map(|core| Place {
+impl Session for Chains {
+    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
+        turn(&mut *self.chains[index], samples)
+    }
+
+    /// Processor time, frames that were overtaken, and the stages of the path.
+    fn finish(&mut self, rows: &mut Vec<Row>) -> Result<(), BenchError> {
+        let mut more = Vec::new();
+        for (row, chain) in rows.iter_mut().zip(&mut self.chains) {
+            if self.tells_stages {
+                row.cpu_percent = chain.cpu_percent();
+            }
+            if row.name == "floor" {
+                continue;
+            }
+            // How many of a robot's frames were overtaken; all 0 if none was.
+            let times = Quantiles::of(&mut chain.overtaken().to_vec());
+            more.push(Row {
+                name: row.name.clone(),
+                variant: row.variant.clone(),
+                ..Row::of("path-overtaken", row.mode, self.regime, times)
+            });
+            if !self.tells_stages {
+                continue;
+            }
+            // Counts are published once a second.
+            turn(&mut **chain, A_SECOND)?;
+            let before = chain.counted()?;
+            turn(&mut **chain, A_SECOND)?;
+            if let Some((before, after)) = before.zip(chain.counted()?) {
+                more.extend(stages::rows(&before, &after, self.regime, row.mode));
+            }
+        }
+        rows.extend(more);
+        Ok(())
+    }
+}
+
+/// Where bridge and boards are, and where logic is.
+fn places(regime: Regime, priority: Option<i32>) -> Result<[Place; 2], BenchError> {
+    let (ends, logic) = cores_for(regime)?;
+    Ok([ends, logic].map(|core| Place {
         core: Some(core),
-        priority: Some(SERVICES),
-    });
-    let _awake = Awake::during(regime)?;
-    let mut robots = Vec::new();
-    for (entry, observers) in OBSERVED.iter().zip([0, 8, 64]) {
-        let mut robot = Robot::start(&entry.label(), entry.mode, at_ends, at_mind)?;
-        robot.observed_by(observers)?;
-        robot.with_boards_at(BOARDS)?;
-        robot.end()?;
-        robots.push(robot);
-    }
-    // Last of all: what a thread starts inherits its core.
-    machine::pin(ends)?;
-    let mut rows = run::measure(
-        "path@observed",
-        regime,
-        OBSERVED,
-        options,
-        turns(options),
-        |index| turn(&mut robots[index], TURN),
-    )?;
-    for (entry, robot) in OBSERVED.iter().zip(&robots) {
-        rows.push(overtaken(robot.overtaken(), entry, regime));
-    }
-    Ok(rows)
-}
-
-/// How many of a robot's frames were overtaken; all 0 if none was.
-fn overtaken(times: &[u64], entry: &Entry, regime: Regime) -> Row {
-    let times = Quantiles::of(&mut times.to_vec());
-    let told = |figure: fn(&Quantiles) -> u64| times.as_ref().map_or(0, figure);
-    Row {
-        name: entry.name.to_owned(),
-        variant: entry.variant.to_owned(),
-        what: "path-overtaken".to_owned(),
-        mode: entry.mode,
-        regime,
-        n: told(|times| times.n),
-        p50_ns: told(|times| times.p50_ns),
-        p99_ns: told(|times| times.p99_ns),
-        p999_ns: told(|times| times.p999_ns),
-        ratio_to: String::new(),
-        ratio_p50: 1.0,
-        ratio_p99: 1.0,
-        ratios: Vec::new(),
-        cpu_percent: None,
-    }
+        priority,
+    }))
 }
 
 /// Whether this process may have real time, without which nothing is `path@observed`.
@@ -260,69 +232,8 @@ fn overtaken(times: &[u64], entry: &Entry, regime: Regime) -> Row {
 /// # Errors
 /// It may not; the sentence says what to do.
 pub fn may_have_real_time() -> Result<(), BenchError> {
-    in_a_thread(|| RealTime::begin(BOARDS).map(|_| Vec::new())).map(|_| ())
-}
-
-/// One chain for the criterion bench. Stays in the thread that opened it, which is bound to a core
-/// meanwhile.
-pub struct Session {
-    chain: Box<dyn Chain>,
-    _bound: Bound,
-}
-
-impl Session {
-    /// The real services, waiting as `mode` says.
-    ///
-    /// # Errors
-    /// See [`measure`].
-    pub fn lager(mode: Mode) -> Result<Self, BenchError> {
-        let (ends, mind, core) = placed()?;
-        Self::of(Robot::start("lager", mode, ends, mind)?, core)
-    }
-
-    /// The same chain of the barest primitives.
-    ///
-    /// # Errors
-    /// See [`measure`].
-    pub fn floor() -> Result<Self, BenchError> {
-        let (ends, mind, core) = placed()?;
-        Self::of(Floor::start(ends, mind)?, core)
-    }
-
-    fn of(mut chain: impl Chain + 'static, core: usize) -> Result<Self, BenchError> {
-        chain.end()?;
-        Ok(Self {
-            chain: Box::new(chain),
-            _bound: Bound::to(core)?,
-        })
-    }
-
-    /// Sends `frames` frames, a millisecond apart, and some before that to warm up; how long each
-    /// took, in ns.
-    ///
-    /// # Errors
-    /// See [`measure`].
-    pub fn round(&mut self, frames: usize) -> Result<Vec<u64>, BenchError> {
-        turn(&mut *self.chain, frames)
-    }
-}
-
-impl core::fmt::Debug for Session {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter.debug_struct("Session").finish_non_exhaustive()
-    }
-}
-
-/// The places of ends and mind on two cores, and the boards' core.
-fn placed() -> Result<(Place, Place, usize), BenchError> {
-    let (ends, mind) = cores_for(Regime::Plain)?;
-    let [at_ends, at_mind] = [ends, mind].map(|core| Place {
-        core: Some(core),
-        priority: None,
-    });
-    Ok((at_ends, at_mind, ends))
-}
-
-fn turns(options: &Options) -> usize {
-    if options.quick { QUICK_TURNS } else { TURNS }
+    // In a thread of its own, which ends with what it got.
+    std::thread::spawn(|| RealTime::begin(BOARDS).map(drop))
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }

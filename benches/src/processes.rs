@@ -1,22 +1,22 @@
-//! Which parts there are: the scenarios' tables, for whoever starts as one of their processes.
+//! The scenarios' tables of processes, for whoever starts as one of them.
 //!
-//! Apart from the parts, so that a scenario can start one without knowing the others.
+//! Apart from the scenarios, so that each can start its own without knowing the others.
 
-use crate::parts::{self, Play};
+use lager_rig::process::{self, Main};
+
 use crate::{fanout, hop, machine, path, ring};
 
-/// Every part of every scenario.
-const TABLES: &[&[(&str, Play)]] = &[
-    machine::PARTS,
-    hop::PARTS,
-    ring::PARTS,
-    path::PARTS,
-    path::FLOOR_PARTS,
-    fanout::PARTS,
+const TABLES: &[&[(&str, Main)]] = &[
+    machine::PROCESSES,
+    hop::PROCESSES,
+    ring::PROCESSES,
+    path::PROCESSES,
+    path::FLOOR_PROCESSES,
+    fanout::PROCESSES,
 ];
 
-/// If this process was started to play a part, plays it and ends the process; otherwise returns
-/// at once. To be called first thing in `main` of every executable that measures.
-pub fn play_if_asked() {
-    parts::play_one_of(TABLES);
+/// If this process was started as one of a scenario's, is that and ends; otherwise returns at once.
+/// To be called first thing in `main` of every executable that measures.
+pub fn run_if_asked() {
+    process::run_if_asked(TABLES);
 }

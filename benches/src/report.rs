@@ -5,7 +5,10 @@
 use core::fmt;
 use core::str::FromStr;
 
+use lager_ports::Policy;
 use serde::{Deserialize, Serialize};
+
+use crate::stats::Quantiles;
 
 /// How the receiver waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -30,6 +33,15 @@ impl Mode {
             Self::Spin => "spin",
             Self::Adaptive => "adaptive",
             Self::Block => "block",
+        }
+    }
+
+    /// What a waiter of the typed ports is told.
+    pub(crate) const fn policy(self) -> Policy {
+        match self {
+            Self::Spin => Policy::Spin,
+            Self::Adaptive => Policy::ADAPTIVE,
+            Self::Block => Policy::Block,
         }
     }
 }
@@ -175,6 +187,27 @@ pub struct Row {
 }
 
 impl Row {
+    /// A row without a name and without ratios; of no samples all its figures are 0.
+    pub(crate) fn of(what: &str, mode: Mode, regime: Regime, times: Option<Quantiles>) -> Self {
+        let told = |figure: fn(&Quantiles) -> u64| times.as_ref().map_or(0, figure);
+        Self {
+            name: String::new(),
+            variant: String::new(),
+            what: what.to_owned(),
+            mode,
+            regime,
+            n: told(|times| times.n),
+            p50_ns: told(|times| times.p50_ns),
+            p99_ns: told(|times| times.p99_ns),
+            p999_ns: told(|times| times.p999_ns),
+            ratio_to: String::new(),
+            ratio_p50: 1.0,
+            ratio_p99: 1.0,
+            ratios: Vec::new(),
+            cpu_percent: None,
+        }
+    }
+
     /// The name by which other rows of the same `what` and regime compare themselves with
     /// this one: `name`, or `name/variant`.
     #[must_use]

@@ -1,7 +1,7 @@
 //! `ring-64`: what it costs a writer to wake the one actor of a topic that 64 observers read.
 //!
 //! ```text
-//!   ringer, core 0                      audience, core 1: an actor and 64 observers
+//!   writer, core 0                     readers, core 1: an actor and 64 observers
 //!                    <── ready ─────── all drained, the actor waits (mode: asleep or looking)
 //!   t0  publish, ring ───────────────>
 //!   t1                                 the actor wakes, everybody drains
@@ -15,44 +15,37 @@
 //! publishing on one with as many readers but no actor, measured in pairs (`lager/ring`). It
 //! compares with iceoryx2 notifying without publishing anything (`notify`, `notify-1`).
 
-mod audience;
-mod ringer;
+mod readers;
+mod writer;
 
 use core::sync::atomic::AtomicU64;
 use core::time::Duration;
-use std::os::fd::RawFd;
-use std::path::PathBuf;
 
-use lager_ports::{Bus, BusConfig};
-use lager_topics::{OBSERVERS, Qos, Role, Topic};
+use lager_rig::Shareable;
+use lager_rig::process::Main;
+use lager_topics::{OBSERVERS, Qos, Topic};
 use serde::{Deserialize, Serialize};
 
-use crate::ball::{Ball, Ping};
-use crate::baseline::iceoryx::Member;
-use crate::baseline::{Fault, LIMIT};
-use crate::domain::Domain;
+use crate::baseline::Fault;
 use crate::error::BenchError;
-use crate::error::no_bus;
-use crate::machine::{self, Awake};
-use crate::parts::{Part, Play, Stage};
-use crate::report::{Mode, Options, Regime, Row};
-use crate::run::{self, Entry};
-use crate::shared::{Barrier, Board, Shared};
+use crate::group::{Entry, Group, Session, wanted};
+use crate::pair::{Pair, Side};
+use crate::report::{Mode, Options, Regime};
+use crate::sample::{Ping, Sample};
 use crate::slow;
-use audience::audience;
-use ringer::ringer;
 
-const RINGER: &str = "ringer";
-const AUDIENCE: &str = "audience of the ringer";
+const WRITER: &str = "writer of ring-64";
+const READERS: &str = "readers of ring-64";
 
-pub(crate) const PARTS: &[(&str, Play)] = &[(RINGER, ringer), (AUDIENCE, audience)];
+pub(crate) const PROCESSES: &[(&str, Main)] =
+    &[(WRITER, writer::writer), (READERS, readers::readers)];
 
 /// The same as [`Ping`], but nobody acts on it.
-struct Unheard;
+struct Observed;
 
-impl Topic for Unheard {
-    const NAME: &'static str = "bench/unheard";
-    type Payload = Ball;
+impl Topic for Observed {
+    const NAME: &'static str = "bench/observed";
+    type Payload = Sample;
     const QOS: Qos = Qos {
         actors: &[],
         ..Ping::QOS
@@ -127,186 +120,88 @@ impl Contender {
     }
 }
 
-/// The rows of this scenario in one regime: `block` with an actor that sleeps when it is rung,
-/// `spin` with one that looks.
-pub(crate) fn measure(regime: Regime, options: &Options) -> Result<Vec<Row>, BenchError> {
-    let mut rows = Vec::new();
-    for mode in [Mode::Spin, Mode::Block] {
-        let shares_its_core = regime == Regime::SameCore && mode == Mode::Spin;
-        if !options.modes.contains(&mode) || shares_its_core {
-            continue;
-        }
-        let entries: Vec<Entry> = Contender::ALL.iter().map(|one| one.entry(mode)).collect();
-        let mut session = Session::open(regime)?;
-        let (rounds, balls) = if options.quick { (2, 100) } else { (4, 500) };
-        rows.extend(run::measure(
-            "ring-64",
-            regime,
-            &entries,
-            options,
-            rounds,
-            |index| session.round(Contender::ALL[index], mode, balls),
-        )?);
-    }
-    Ok(rows)
+/// The groups of one regime: `block` with an actor that sleeps when it is rung, `spin` with one
+/// that looks.
+pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
+    let group = |mode: Mode| {
+        let all = Contender::ALL.map(|contender| (contender.entry(mode), contender));
+        let (entries, contenders) = wanted(all, options);
+        let open = move |regime| {
+            let ring = Ring {
+                pair: Pair::start(regime, [WRITER, READERS], &())?,
+                contenders: contenders.clone(),
+                mode,
+            };
+            Ok(Box::new(ring) as Box<dyn Session>)
+        };
+        Group::new("ring-64", regime, entries, [2, 4], [100, 500], open)
+    };
+    [Mode::Spin, Mode::Block]
+        .into_iter()
+        // Nobody looks without pause on the writer's core.
+        .filter(|mode| regime != Regime::SameCore || *mode == Mode::Block)
+        .map(group)
+        .collect()
 }
 
+/// What writer and readers share.
 #[derive(Debug)]
 #[repr(C)]
-struct Hall {
-    barrier: Barrier,
-    /// The ball that the audience is ready for.
-    ready: AtomicU64,
+struct Ready {
+    /// The sample that the readers are ready for.
+    number: AtomicU64,
 }
 
 // SAFETY: atomics only.
 #[allow(unsafe_code)]
-unsafe impl Board for Hall {}
-
-#[derive(Debug, Serialize, Deserialize)]
-struct Setup {
-    core: usize,
-    folder: PathBuf,
-    hall: RawFd,
-}
+unsafe impl Shareable for Ready {}
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Round {
     contender: Contender,
     mode: Mode,
-    balls: u32,
+    samples: usize,
     number: u32,
-    /// A deliberate slow-down of each ball, in ns.
+    /// A deliberate slow-down of each sample, in ns.
     spin_ns: u64,
 }
 
 impl Round {
-    /// The numbers of the balls; those of [`Contender::Ring`] come in pairs.
+    /// The numbers of the samples; those of [`Contender::Ring`] come in pairs.
     fn all(&self) -> impl Iterator<Item = u64> {
         let base = u64::from(self.number) << 32;
-        let throws = if self.contender == Contender::Ring {
-            2
-        } else {
-            1
+        let each = match self.contender {
+            Contender::Ring => 2,
+            _ => 1,
         };
-        (1..=throws * u64::from(self.balls)).map(move |ball| base + ball)
+        (1..=each * self.samples as u64).map(move |sample| base + sample)
     }
 
-    fn failed(&self, ball: u64, fault: Fault) -> BenchError {
-        let contender = self.contender.entry(self.mode).label();
-        match fault {
-            Fault::Silent => BenchError::NoSample {
-                contender,
-                expected: ball & u64::from(u32::MAX),
-                limit: LIMIT,
-            },
-            Fault::Broken(detail) => BenchError::Carrier { contender, detail },
-        }
+    fn failed(&self, sample: u64, fault: Fault) -> BenchError {
+        fault.of(&self.contender.entry(self.mode).label(), sample)
     }
 }
 
-/// Both processes. Dropped in this order: nobody is on the bus when it is swept.
-struct Session {
-    ringer: Part,
-    audience: Part,
-    _awake: Awake,
-    _hall: Shared<Hall>,
-    _domain: Domain,
-    rounds: u32,
+struct Ring {
+    pair: Pair<Ready>,
+    contenders: Vec<Contender>,
+    mode: Mode,
 }
 
-impl Session {
-    fn open(regime: Regime) -> Result<Self, BenchError> {
-        let cores = machine::cores_for(regime)?;
-        let domain = Domain::new()?;
-        let hall = Shared::<Hall>::new()?;
-        let awake = Awake::during(regime)?;
-        let start = |name, core| {
-            let mut part = Part::start(name)?;
-            let () = part.ask(&Setup {
-                core,
-                folder: domain.folder().to_owned(),
-                hall: hall.number(),
-            })?;
-            Ok::<Part, BenchError>(part)
-        };
-        Ok(Self {
-            ringer: start(RINGER, cores.0)?,
-            audience: start(AUDIENCE, cores.1)?,
-            _awake: awake,
-            _hall: hall,
-            _domain: domain,
-            rounds: 0,
-        })
-    }
-
-    fn round(
-        &mut self,
-        contender: Contender,
-        mode: Mode,
-        balls: u32,
-    ) -> Result<Vec<u64>, BenchError> {
+impl Session for Ring {
+    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
         const PATIENCE: Duration = Duration::from_secs(60);
-        self.rounds += 1;
-        let round = Round {
+        let (contender, mode) = (self.contenders[index], self.mode);
+        let round = |number| Round {
             contender,
             mode,
-            balls,
-            number: self.rounds,
+            samples,
+            number,
             spin_ns: slow::spin_ns(),
         };
-        self.ringer.tell(&round)?;
-        self.audience.tell(&round)?;
-        Part::both(&mut self.ringer, &mut self.audience, PATIENCE).map(|(samples, ())| samples)
+        self.pair.round(round, PATIENCE).map(|(times, ())| times)
     }
 }
 
-/// What a process has at hand all the time.
-struct Place {
-    hall: Shared<Hall>,
-    config: BusConfig,
-}
-
-impl Place {
-    fn enter(stage: &mut Stage) -> Result<Option<Self>, BenchError> {
-        let Some(setup) = stage.hear::<Setup>()? else {
-            return Ok(None);
-        };
-        machine::pin(setup.core)?;
-        let place = Self {
-            hall: Shared::inherited(setup.hall)?,
-            config: BusConfig {
-                folder: Some(setup.folder),
-                ..BusConfig::default()
-            },
-        };
-        stage.tell(&())?;
-        Ok(Some(place))
-    }
-
-    fn bus(&self, role: Role) -> Result<Bus, BenchError> {
-        Bus::open(&self.config, role).map_err(no_bus)
-    }
-
-    fn member(&self) -> Result<Member, BenchError> {
-        Member::join(&self.config)
-    }
-
-    /// Twice in each round: when everybody is there, and when everybody is done.
-    fn meet(&self, round: &Round, times: u32) -> Result<(), BenchError> {
-        const LIMIT: Duration = Duration::from_secs(15);
-        if self
-            .hall
-            .barrier
-            .pass(2, 2 * (round.number - 1) + times, LIMIT)
-        {
-            Ok(())
-        } else {
-            Err(BenchError::Alone { limit: LIMIT })
-        }
-    }
-}
-
-fn broken(error: impl core::fmt::Display) -> Fault {
-    Fault::Broken(error.to_string())
-}
+/// What each of the two has at hand.
+type Own = Side<Ready, ()>;

@@ -1,6 +1,6 @@
 //! Bare iceoryx2, as its own examples use it: its stock `ipc` service, its ports, nothing between.
 //!
-//! Three kinds of line differ in what they carry besides the ball: the same header as the typed
+//! Three kinds of line differ in what they carry besides the sample: the same header as the typed
 //! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and
 //! iceoryx2's own defaults. The same limits include the transport's configuration, which is the
 //! robot's own ([`Member::join`]). A receiver looks without pause, or sleeps on an iceoryx2 event that the
@@ -8,6 +8,7 @@
 
 use core::fmt::Debug;
 use core::time::Duration;
+use std::error::Error;
 use std::time::Instant;
 
 use iceoryx2::config::Config;
@@ -22,8 +23,8 @@ use lager_ports::{BusConfig, Clock};
 use lager_topics::{Qos, Stamp};
 
 use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
-use crate::ball::Ball;
 use crate::error::BenchError;
+use crate::sample::Sample;
 
 /// Samples a subscriber may hold, as the typed ports allow.
 const MAX_HELD: usize = 4;
@@ -98,35 +99,27 @@ impl Member {
         Ok(Self { node })
     }
 
-    /// A publisher of balls; `None` leaves iceoryx2's limits as they are.
+    /// A publisher of samples; `None` leaves iceoryx2's limits as they are.
     pub(crate) fn publisher<H: Header>(
         &self,
         name: &str,
         limits: Option<&Qos>,
-    ) -> Result<Publisher<ipc::Service, Ball, H>, BenchError> {
-        const WHAT: &str = "a publisher of bare iceoryx2 could not be made";
-        patiently(|| {
-            let service = self.topic::<Ball, H>(name, limits)?;
-            service
-                .publisher_builder()
-                .create()
-                .map_err(|error| failed(WHAT, error))
+    ) -> Result<Publisher<ipc::Service, Sample, H>, BenchError> {
+        patiently("a publisher of bare iceoryx2 could not be made", || {
+            let service = self.topic::<Sample, H>(name, limits)?;
+            Ok(service.publisher_builder().create()?)
         })
     }
 
-    /// A subscriber to balls; limits as for the publisher.
+    /// A subscriber to samples; limits as for the publisher.
     pub(crate) fn subscriber<H: Header>(
         &self,
         name: &str,
         limits: Option<&Qos>,
-    ) -> Result<Subscriber<ipc::Service, Ball, H>, BenchError> {
-        const WHAT: &str = "a subscriber of bare iceoryx2 could not be made";
-        patiently(|| {
-            let service = self.topic::<Ball, H>(name, limits)?;
-            service
-                .subscriber_builder()
-                .create()
-                .map_err(|error| failed(WHAT, error))
+    ) -> Result<Subscriber<ipc::Service, Sample, H>, BenchError> {
+        patiently("a subscriber of bare iceoryx2 could not be made", || {
+            let service = self.topic::<Sample, H>(name, limits)?;
+            Ok(service.subscriber_builder().create()?)
         })
     }
 
@@ -166,13 +159,8 @@ impl Member {
         name: &str,
         listeners: usize,
     ) -> Result<Notifier<ipc::Service>, BenchError> {
-        const WHAT: &str = "a notifier of bare iceoryx2 could not be made";
-        patiently(|| {
-            let service = self.event(name, listeners)?;
-            service
-                .notifier_builder()
-                .create()
-                .map_err(|error| failed(WHAT, error))
+        patiently("a notifier of bare iceoryx2 could not be made", || {
+            Ok(self.event(name, listeners)?.notifier_builder().create()?)
         })
     }
 
@@ -182,13 +170,8 @@ impl Member {
         name: &str,
         listeners: usize,
     ) -> Result<Listener<ipc::Service>, BenchError> {
-        const WHAT: &str = "a listener of bare iceoryx2 could not be made";
-        patiently(|| {
-            let service = self.event(name, listeners)?;
-            service
-                .listener_builder()
-                .create()
-                .map_err(|error| failed(WHAT, error))
+        patiently("a listener of bare iceoryx2 could not be made", || {
+            Ok(self.event(name, listeners)?.listener_builder().create()?)
         })
     }
 
@@ -227,26 +210,30 @@ fn failed(what: &'static str, detail: impl Debug) -> BenchError {
 }
 
 /// Tries again while the other process is in the middle of creating or removing the same thing.
-fn patiently<T>(mut attempt: impl FnMut() -> Result<T, BenchError>) -> Result<T, BenchError> {
+fn patiently<T>(
+    what: &'static str,
+    mut attempt: impl FnMut() -> Result<T, Box<dyn Error>>,
+) -> Result<T, BenchError> {
     const PATIENCE: Duration = Duration::from_secs(3);
     let start = Instant::now();
     loop {
         match attempt() {
-            Err(_) if start.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(1)),
-            done => return done,
+            Ok(made) => return Ok(made),
+            Err(error) if start.elapsed() >= PATIENCE => return Err(failed(what, error)),
+            Err(_) => std::thread::sleep(Duration::from_millis(1)),
         }
     }
 }
 
 /// Publishes with a header of one's own.
 pub(crate) struct Sender<H: Header> {
-    publisher: Publisher<ipc::Service, Ball, H>,
+    publisher: Publisher<ipc::Service, Sample, H>,
     stream: Stream,
     next: u64,
 }
 
 impl<H: Header> Sender<H> {
-    pub(crate) fn new(publisher: Publisher<ipc::Service, Ball, H>) -> Self {
+    pub(crate) fn new(publisher: Publisher<ipc::Service, Sample, H>) -> Self {
         Self {
             publisher,
             stream: Stream::new(),
@@ -254,11 +241,11 @@ impl<H: Header> Sender<H> {
         }
     }
 
-    pub(crate) fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        let mut sample = self.publisher.loan_uninit().map_err(broken)?;
-        sample.user_header_mut().fill(self.next, &self.stream);
+    pub(crate) fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        let mut loan = self.publisher.loan_uninit().map_err(broken)?;
+        loan.user_header_mut().fill(self.next, &self.stream);
         self.next += 1;
-        sample.write_payload(*ball).send().map_err(broken)?;
+        loan.write_payload(*sample).send().map_err(broken)?;
         Ok(())
     }
 }
@@ -266,7 +253,7 @@ impl<H: Header> Sender<H> {
 /// Both directions with a receiver that looks without pause.
 pub(crate) struct Polling<H: Header> {
     sender: Sender<H>,
-    subscriber: Subscriber<ipc::Service, Ball, H>,
+    subscriber: Subscriber<ipc::Service, Sample, H>,
     // The ports need it to live.
     _member: Member,
 }
@@ -287,11 +274,11 @@ impl<H: Header> Polling<H> {
 }
 
 impl<H: Header> End for Polling<H> {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        self.sender.send(ball)
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.sender.send(sample)
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
+    fn receive(&mut self) -> Result<Sample, Fault> {
         spin(|| receive(&self.subscriber))
     }
 }
@@ -299,7 +286,7 @@ impl<H: Header> End for Polling<H> {
 /// Both directions with a receiver that sleeps on an event.
 pub(crate) struct Listening {
     sender: Sender<Stamp>,
-    subscriber: Subscriber<ipc::Service, Ball, Stamp>,
+    subscriber: Subscriber<ipc::Service, Sample, Stamp>,
     notifier: Notifier<ipc::Service>,
     listener: Listener<ipc::Service>,
     // The ports need it to live.
@@ -326,13 +313,13 @@ impl Listening {
 }
 
 impl End for Listening {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        self.sender.send(ball)?;
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.sender.send(sample)?;
         self.notifier.notify().map_err(broken)?;
         Ok(())
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
+    fn receive(&mut self) -> Result<Sample, Fault> {
         sleep_until(|| receive(&self.subscriber), || sleep(&self.listener))
     }
 }
@@ -347,12 +334,12 @@ pub(crate) fn sleep(listener: &Listener<ipc::Service>) -> Result<Slept, Fault> {
     })
 }
 
-/// The next ball, if there is one.
+/// The next sample, if there is one.
 pub(crate) fn receive<H: Header>(
-    subscriber: &Subscriber<ipc::Service, Ball, H>,
-) -> Result<Option<Ball>, Fault> {
-    let sample = subscriber.receive().map_err(broken)?;
-    Ok(sample.map(|sample| *sample.payload()))
+    subscriber: &Subscriber<ipc::Service, Sample, H>,
+) -> Result<Option<Sample>, Fault> {
+    let received = subscriber.receive().map_err(broken)?;
+    Ok(received.map(|received| *received.payload()))
 }
 
 /// A fault of a port.
@@ -363,11 +350,11 @@ pub(crate) fn broken(error: impl Debug) -> Fault {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::Domain;
+    use lager_rig::Domain;
 
     #[test]
     fn the_same_limits_are_those_of_the_typed_ports_and_not_the_defaults() {
-        let domain = Domain::new().unwrap();
+        let domain = Domain::new("lager-bench").unwrap();
         let ours = config(&domain.config()).unwrap();
         let places = |config: &Config| {
             let streams = &config.defaults.publish_subscribe;

@@ -8,9 +8,9 @@ use rustix::thread::futex;
 use rustix::time::Timespec;
 
 use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
-use crate::ball::Ball;
+use crate::sample::Sample;
 
-/// One cache line that holds a ball; the number is written last.
+/// One cache line that holds a sample; the number is written last.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Slot {
@@ -18,21 +18,21 @@ pub(crate) struct Slot {
 }
 
 impl Slot {
-    pub(crate) fn write(&self, ball: &Ball) {
-        let words = ball.words();
+    pub(crate) fn write(&self, sample: &Sample) {
+        let words = sample.words();
         for (to, word) in self.words.iter().zip(words).skip(1) {
             to.store(word, Ordering::Relaxed);
         }
         self.words[0].store(words[0], Ordering::Release);
     }
 
-    pub(crate) fn read(&self) -> Ball {
+    pub(crate) fn read(&self) -> Sample {
         let number = self.words[0].load(Ordering::Acquire);
         let mut words = [number; 8];
         for (word, from) in words.iter_mut().zip(&self.words).skip(1) {
             *word = from.load(Ordering::Relaxed);
         }
-        Ball::from_words(words)
+        Sample::from_words(words)
     }
 
     fn number(&self) -> u64 {
@@ -80,14 +80,14 @@ pub(crate) struct Lane {
 }
 
 /// A cache line each way, watched without pause.
-pub(crate) struct CacheLine<'board> {
-    out: &'board Slot,
-    back: &'board Slot,
+pub(crate) struct CacheLine<'memory> {
+    out: &'memory Slot,
+    back: &'memory Slot,
     seen: u64,
 }
 
-impl<'board> CacheLine<'board> {
-    pub(crate) fn new(out: &'board Lane, back: &'board Lane) -> Self {
+impl<'memory> CacheLine<'memory> {
+    pub(crate) fn new(out: &'memory Lane, back: &'memory Lane) -> Self {
         Self {
             out: &out.slot,
             back: &back.slot,
@@ -97,29 +97,29 @@ impl<'board> CacheLine<'board> {
 }
 
 impl End for CacheLine<'_> {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        self.out.write(ball);
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.out.write(sample);
         Ok(())
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
+    fn receive(&mut self) -> Result<Sample, Fault> {
         let (back, seen) = (self.back, self.seen);
         spin(|| Ok((back.number() != seen).then_some(())))?;
-        let ball = back.read();
-        self.seen = ball.number;
-        Ok(ball)
+        let sample = back.read();
+        self.seen = sample.number;
+        Ok(sample)
     }
 }
 
 /// A cache line each way, and a futex to sleep on.
-pub(crate) struct Futex<'board> {
-    out: &'board Lane,
-    back: &'board Lane,
+pub(crate) struct Futex<'memory> {
+    out: &'memory Lane,
+    back: &'memory Lane,
     seen: u32,
 }
 
-impl<'board> Futex<'board> {
-    pub(crate) fn new(out: &'board Lane, back: &'board Lane) -> Self {
+impl<'memory> Futex<'memory> {
+    pub(crate) fn new(out: &'memory Lane, back: &'memory Lane) -> Self {
         Self {
             out,
             back,
@@ -129,12 +129,12 @@ impl<'board> Futex<'board> {
 }
 
 impl End for Futex<'_> {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        self.out.slot.write(ball);
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.out.slot.write(sample);
         Ok(self.out.word.wake()?)
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
+    fn receive(&mut self) -> Result<Sample, Fault> {
         let (word, seen) = (&self.back.word, self.seen);
         self.seen = sleep_until(
             || {
@@ -148,17 +148,17 @@ impl End for Futex<'_> {
 }
 
 /// A cache line each way, and an eventfd to sleep on, without a time-out.
-pub(crate) struct EventFd<'board> {
-    out: &'board Slot,
-    back: &'board Slot,
-    ring: &'board OwnedFd,
-    bell: &'board OwnedFd,
+pub(crate) struct EventFd<'memory> {
+    out: &'memory Slot,
+    back: &'memory Slot,
+    ring: &'memory OwnedFd,
+    bell: &'memory OwnedFd,
 }
 
-impl<'board> EventFd<'board> {
+impl<'memory> EventFd<'memory> {
     pub(crate) fn new(
-        (out, ring): (&'board Lane, &'board OwnedFd),
-        (back, bell): (&'board Lane, &'board OwnedFd),
+        (out, ring): (&'memory Lane, &'memory OwnedFd),
+        (back, bell): (&'memory Lane, &'memory OwnedFd),
     ) -> Self {
         Self {
             out: &out.slot,
@@ -170,13 +170,13 @@ impl<'board> EventFd<'board> {
 }
 
 impl End for EventFd<'_> {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        self.out.write(ball);
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.out.write(sample);
         rustix::io::write(self.ring, &1_u64.to_ne_bytes())?;
         Ok(())
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
+    fn receive(&mut self) -> Result<Sample, Fault> {
         let mut count = [0; 8];
         rustix::io::read(self.bell, &mut count)?;
         Ok(self.back.read())
@@ -186,51 +186,51 @@ impl End for EventFd<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::{Board, Shared};
+    use lager_rig::{Shareable, Shared};
 
     #[repr(C)]
     struct Lanes([Lane; 2]);
 
     // SAFETY: atomics only.
     #[allow(unsafe_code)]
-    unsafe impl Board for Lanes {}
+    unsafe impl Shareable for Lanes {}
 
     fn there_and_back(mut first: impl End + Send, mut second: impl End + Send) {
         std::thread::scope(|scope| {
             scope.spawn(move || {
                 for _ in 0..100 {
-                    let ball = second.receive().unwrap();
-                    second.send(&ball).unwrap();
+                    let sample = second.receive().unwrap();
+                    second.send(&sample).unwrap();
                 }
             });
             for number in 1..=100 {
-                first.send(&Ball::new(number)).unwrap();
-                assert_eq!(first.receive().unwrap(), Ball::new(number));
+                first.send(&Sample::new(number)).unwrap();
+                assert_eq!(first.receive().unwrap(), Sample::new(number));
             }
         });
     }
 
     #[test]
-    fn balls_come_back_over_a_cache_line() {
-        let board = Shared::<Lanes>::new().unwrap();
-        let [there, back] = &board.0;
+    fn samples_come_back_over_a_cache_line() {
+        let memory = Shared::<Lanes>::new().unwrap();
+        let [there, back] = &memory.0;
         there_and_back(CacheLine::new(there, back), CacheLine::new(back, there));
     }
 
     #[test]
-    fn balls_come_back_over_a_futex() {
-        let board = Shared::<Lanes>::new().unwrap();
-        let [there, back] = &board.0;
+    fn samples_come_back_over_a_futex() {
+        let memory = Shared::<Lanes>::new().unwrap();
+        let [there, back] = &memory.0;
         there_and_back(Futex::new(there, back), Futex::new(back, there));
     }
 
     #[test]
-    fn balls_come_back_over_an_eventfd() {
+    fn samples_come_back_over_an_eventfd() {
         use rustix::event::{EventfdFlags, eventfd};
-        let board = Shared::<Lanes>::new().unwrap();
+        let memory = Shared::<Lanes>::new().unwrap();
         let bells = [0, 1].map(|_| eventfd(0, EventfdFlags::CLOEXEC).unwrap());
-        let there = (&board.0[0], &bells[0]);
-        let back = (&board.0[1], &bells[1]);
+        let there = (&memory.0[0], &bells[0]);
+        let back = (&memory.0[1], &bells[1]);
         there_and_back(EventFd::new(there, back), EventFd::new(back, there));
     }
 }

@@ -12,22 +12,23 @@ pub(crate) mod zenoh;
 use core::time::Duration;
 use std::time::Instant;
 
-use crate::ball::Ball;
+use crate::error::BenchError;
+use crate::sample::Sample;
 
 /// How long a sleeping receiver sleeps before it looks whether it was forgotten: the same for the
 /// typed ports and for every baseline that has a time-out.
 pub(crate) const TIME_OUT: Duration = Duration::from_millis(100);
 
-/// How long a receiver waits for a ball before it gives up the measurement.
+/// How long a receiver waits for a sample before it gives up the measurement.
 pub(crate) const LIMIT: Duration = Duration::from_secs(5);
 
 /// One end of a line between two processes; stays in its thread.
 pub(crate) trait End {
-    /// Hands the ball over.
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault>;
+    /// Hands the sample over.
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault>;
 
-    /// Waits for the next ball in the end's own way.
-    fn receive(&mut self) -> Result<Ball, Fault>;
+    /// Waits for the next sample in the end's own way.
+    fn receive(&mut self) -> Result<Sample, Fault>;
 }
 
 /// Why an end does not work.
@@ -37,6 +38,26 @@ pub(crate) enum Fault {
     Silent,
     /// The carrier failed; it says why.
     Broken(String),
+}
+
+impl Fault {
+    /// As the fault of what carries sample number `expected`.
+    pub(crate) fn of(self, contender: &str, expected: u64) -> BenchError {
+        let contender = contender.to_owned();
+        match self {
+            Self::Silent => BenchError::NoSample {
+                contender,
+                expected: expected & u64::from(u32::MAX),
+                limit: LIMIT,
+            },
+            Self::Broken(detail) => BenchError::Carrier { contender, detail },
+        }
+    }
+}
+
+/// A fault of a port of ours.
+pub(crate) fn broken(error: impl core::fmt::Display) -> Fault {
+    Fault::Broken(error.to_string())
 }
 
 impl From<rustix::io::Errno> for Fault {

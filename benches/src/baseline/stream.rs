@@ -9,7 +9,7 @@ use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
 use rustix::pipe::pipe;
 
 use super::{End, Fault};
-use crate::ball::{Ball, SIZE};
+use crate::sample::{SIZE, Sample};
 
 /// An end that writes into one descriptor and reads from one.
 pub(crate) struct Stream<'line> {
@@ -18,9 +18,9 @@ pub(crate) struct Stream<'line> {
 }
 
 impl End for Stream<'_> {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        // All three take 64 bytes whole while there is room, and one ball is on its way at a time.
-        match write(self.out, &ball.bytes())? {
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        // All three take 64 bytes whole while there is room, and one sample is on its way at a time.
+        match write(self.out, &sample.bytes())? {
             SIZE => Ok(()),
             short => Err(Fault::Broken(format!(
                 "only {short} of {SIZE} bytes went out"
@@ -28,7 +28,7 @@ impl End for Stream<'_> {
         }
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
+    fn receive(&mut self) -> Result<Sample, Fault> {
         let mut bytes = [0; SIZE];
         let mut filled = 0;
         while filled < SIZE {
@@ -39,16 +39,16 @@ impl End for Stream<'_> {
                 Err(other) => return Err(other.into()),
             }
         }
-        Ok(Ball::from_bytes(&bytes))
+        Ok(Sample::from_bytes(&bytes))
     }
 }
 
-/// A pipe: what to read from, what to write into. Players inherit both.
+/// A pipe: what to read from, what to write into. Children inherit both.
 pub(crate) fn a_pipe() -> rustix::io::Result<(OwnedFd, OwnedFd)> {
     pipe()
 }
 
-/// Both ends of a Unix datagram socket. Players inherit them.
+/// Both ends of a Unix datagram socket. Children inherit them.
 pub(crate) fn datagrams() -> rustix::io::Result<(OwnedFd, OwnedFd)> {
     socketpair(
         AddressFamily::UNIX,
@@ -58,7 +58,7 @@ pub(crate) fn datagrams() -> rustix::io::Result<(OwnedFd, OwnedFd)> {
     )
 }
 
-/// Both ends of a TCP connection over loopback, without delay. Players inherit them.
+/// Both ends of a TCP connection over loopback, without delay. Children inherit them.
 pub(crate) fn loopback() -> std::io::Result<(OwnedFd, OwnedFd)> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     let one = TcpStream::connect(listener.local_addr()?)?;
@@ -75,23 +75,23 @@ pub(crate) fn loopback() -> std::io::Result<(OwnedFd, OwnedFd)> {
 mod tests {
     use super::*;
 
-    fn a_ball_passes(out: &OwnedFd, back: &OwnedFd) {
+    fn a_sample_passes(out: &OwnedFd, back: &OwnedFd) {
         let mut sender = Stream { out, back: out };
         let mut receiver = Stream { out: back, back };
-        sender.send(&Ball::new(5)).unwrap();
-        assert_eq!(receiver.receive().unwrap(), Ball::new(5));
+        sender.send(&Sample::new(5)).unwrap();
+        assert_eq!(receiver.receive().unwrap(), Sample::new(5));
     }
 
     #[test]
-    fn a_ball_passes_through_each_of_them() {
+    fn a_sample_passes_through_each_of_them() {
         let (reader, writer) = a_pipe().unwrap();
-        a_ball_passes(&writer, &reader);
+        a_sample_passes(&writer, &reader);
         let (one, other) = datagrams().unwrap();
-        a_ball_passes(&one, &other);
-        a_ball_passes(&other, &one);
+        a_sample_passes(&one, &other);
+        a_sample_passes(&other, &one);
         let (one, other) = loopback().unwrap();
-        a_ball_passes(&one, &other);
-        a_ball_passes(&other, &one);
+        a_sample_passes(&one, &other);
+        a_sample_passes(&other, &one);
     }
 
     #[test]

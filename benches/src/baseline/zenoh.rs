@@ -2,15 +2,15 @@
 //! a publisher and a subscriber, nothing between.
 //!
 //! ```text
-//!   player ─ put ─> socket ─> Zenoh's receiving thread ─ channel ─> player, asleep in `recv`
+//!   process ─ put ─> socket ─> Zenoh's receiving thread ─ channel ─> process, asleep in `recv`
 //! ```
 //!
-//! A receiver is woken twice: the kernel wakes a thread of Zenoh's, which hands the ball to the
-//! player through the channel that is Zenoh's default. Sending is the player's own thread's work
-//! down to the socket. All of Zenoh's threads stay on the core of the player they belong to,
-//! because the player is bound to it before there are any.
+//! A receiver is woken twice: the kernel wakes a thread of Zenoh's, which hands the sample to the
+//! process through the channel that is Zenoh's default. Sending is the process's own thread's work
+//! down to the socket. All of Zenoh's threads stay on the core of the process they belong to,
+//! because the process is bound to it before there are any.
 //!
-//! Nobody is looked for and nothing is announced: the second player is told the socket of the
+//! Nobody is looked for and nothing is announced: the second process is told the socket of the
 //! first, and neither listens anywhere else. Zenoh's shared memory has no part in it, because Zenoh
 //! itself uses it only for samples of some thousand bytes.
 
@@ -22,12 +22,12 @@ use serde_json::json;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
-use zenoh::sample::Sample;
+use zenoh::sample::Sample as Received;
 use zenoh::{Config, Session, Wait};
 
-use super::{End, Fault, LIMIT};
-use crate::ball::{Ball, SIZE};
+use super::{End, Fault, LIMIT, broken};
 use crate::error::BenchError;
+use crate::sample::{SIZE, Sample};
 
 /// Which side of the socket an end is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,14 +41,14 @@ pub(crate) enum Side {
 /// An end that puts to one key and subscribes to another.
 pub(crate) struct Peer {
     publisher: Publisher<'static>,
-    subscriber: Subscriber<FifoChannelHandler<Sample>>,
+    subscriber: Subscriber<FifoChannelHandler<Received>>,
     // Dropped last: it closes what the others need.
     _session: Session,
 }
 
 impl Peer {
     /// Puts to `out` and subscribes to `back`. Returns when the other end subscribes to `out`, so
-    /// that not even the first ball is lost. The socket is gone when the end is.
+    /// that not even the first sample is lost. The socket is gone when the end is.
     pub(crate) fn meet(
         socket: &Path,
         side: Side,
@@ -58,7 +58,7 @@ impl Peer {
         let subscriber = session.declare_subscriber(back).wait().map_err(failed)?;
         let publisher = session
             .declare_publisher(out)
-            // Neither dropped nor gathered into batches: one ball is on its way at a time.
+            // Neither dropped nor gathered into batches: one sample is on its way at a time.
             .congestion_control(CongestionControl::Block)
             .express(true)
             .wait()
@@ -84,18 +84,18 @@ impl Peer {
 }
 
 impl End for Peer {
-    fn send(&mut self, ball: &Ball) -> Result<(), Fault> {
-        self.publisher.put(ball.bytes()).wait().map_err(broken)
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.publisher.put(sample.bytes()).wait().map_err(broken)
     }
 
-    fn receive(&mut self) -> Result<Ball, Fault> {
-        let sample = self.subscriber.recv_timeout(LIMIT).map_err(broken)?;
-        let sample = sample.ok_or(Fault::Silent)?;
-        let bytes = sample.payload().to_bytes();
+    fn receive(&mut self) -> Result<Sample, Fault> {
+        let received = self.subscriber.recv_timeout(LIMIT).map_err(broken)?;
+        let received = received.ok_or(Fault::Silent)?;
+        let bytes = received.payload().to_bytes();
         match <&[u8; SIZE]>::try_from(&*bytes) {
-            Ok(bytes) => Ok(Ball::from_bytes(bytes)),
+            Ok(bytes) => Ok(Sample::from_bytes(bytes)),
             Err(_) => Err(Fault::Broken(format!(
-                "{} bytes came, and a ball has {SIZE}",
+                "{} bytes came, and a sample has {SIZE}",
                 bytes.len()
             ))),
         }
@@ -134,16 +134,12 @@ fn failed(error: impl Display) -> BenchError {
     }
 }
 
-fn broken(error: impl Display) -> Fault {
-    Fault::Broken(error.to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn balls_pass_both_ways_and_the_socket_goes_with_the_ends() {
+    fn samples_pass_both_ways_and_the_socket_goes_with_the_ends() {
         let folder =
             std::env::temp_dir().join(format!("lager-benches-zenoh-{}", std::process::id()));
         std::fs::create_dir(&folder).unwrap();
@@ -152,16 +148,16 @@ mod tests {
         let second = std::thread::spawn(move || {
             let mut end = Peer::meet(&there, Side::Connects, ("back", "there")).unwrap();
             for _ in 0..3 {
-                let ball = end.receive().unwrap();
-                end.send(&ball).unwrap();
+                let sample = end.receive().unwrap();
+                end.send(&sample).unwrap();
             }
-            // Whoever closes first might take the last ball with it.
+            // Whoever closes first might take the last sample with it.
             end
         });
         let mut first = Peer::meet(&socket, Side::Listens, ("there", "back")).unwrap();
         for number in 1..=3 {
-            first.send(&Ball::new(number)).unwrap();
-            assert_eq!(first.receive().unwrap(), Ball::new(number));
+            first.send(&Sample::new(number)).unwrap();
+            assert_eq!(first.receive().unwrap(), Sample::new(number));
         }
         drop(second.join().unwrap());
         drop(first);

@@ -2,13 +2,16 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
+use std::error::Error;
 use std::os::fd::RawFd;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use iceoryx2::port::subscriber::Subscriber as BareSubscriber;
 use iceoryx2::prelude::ipc;
-use lager_ports::{Bus, BusConfig, Subscriber};
+use lager_ports::{Bus, Subscriber};
+use lager_rig::process::Main;
+use lager_rig::{Parent, Shareable, Shared, bus_at};
 use lager_topics::{Role, Stamp};
 use serde::{Deserialize, Serialize};
 
@@ -17,13 +20,11 @@ use super::{KIB_64, MIB_1, SMALL, bare_service, failed};
 use crate::baseline::iceoryx::Member;
 use crate::error::BenchError;
 use crate::machine;
-use crate::parts::{Play, Stage};
-use crate::shared::{Board, Shared};
 
 /// The process's name.
 pub(super) const READERS: &str = "readers of the fan-out";
 
-pub(crate) const PARTS: &[(&str, Play)] = &[(READERS, read)];
+pub(crate) const PROCESSES: &[(&str, Main)] = &[(READERS, read)];
 
 /// How long a reader waits for what was announced, and a writer for its readers.
 pub(super) const LIMIT: Duration = Duration::from_secs(5);
@@ -41,11 +42,11 @@ pub(super) struct Counter {
 
 // SAFETY: atomics only, and zeros are valid.
 #[allow(unsafe_code)]
-unsafe impl Board for Counter {}
+unsafe impl Shareable for Counter {}
 
 /// What the readers are told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Script {
+pub(super) struct Setup {
     pub(super) core: usize,
     pub(super) folder: PathBuf,
     pub(super) words: usize,
@@ -53,15 +54,15 @@ pub(super) struct Script {
     pub(super) counter: RawFd,
 }
 
-fn read(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(script) = stage.hear::<Script>()? else {
+fn read(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(setup) = parent.hear::<Setup>()? else {
         return Ok(());
     };
-    machine::pin(script.core)?;
-    match script.words {
-        SMALL => Readers::<SMALL>::attach(&script)?.read(stage, &script),
-        KIB_64 => Readers::<KIB_64>::attach(&script)?.read(stage, &script),
-        _ => Readers::<MIB_1>::attach(&script)?.read(stage, &script),
+    machine::pin(setup.core)?;
+    match setup.words {
+        SMALL => Readers::<SMALL>::attach(&setup)?.read(parent, &setup),
+        KIB_64 => Readers::<KIB_64>::attach(&setup)?.read(parent, &setup),
+        _ => Readers::<MIB_1>::attach(&setup)?.read(parent, &setup),
     }
 }
 
@@ -74,20 +75,17 @@ struct Readers<const WORDS: usize> {
 }
 
 impl<const WORDS: usize> Readers<WORDS> {
-    fn attach(script: &Script) -> Result<Self, BenchError> {
-        let config = BusConfig {
-            folder: Some(script.folder.clone()),
-            ..BusConfig::default()
-        };
+    fn attach(setup: &Setup) -> Result<Self, BenchError> {
+        let config = bus_at(&setup.folder);
         let bus = Bus::open(&config, Role::Observer).map_err(failed)?;
         let member = Member::join(&config)?;
         let service = bare_service::<WORDS>(&member)?;
         let one = |_| service.subscriber_builder().create();
         Ok(Self {
-            ours: (0..script.readers)
+            ours: (0..setup.readers)
                 .map(|_| bus.subscriber().map_err(failed))
                 .collect::<Result<_, _>>()?,
-            bare: (0..script.readers)
+            bare: (0..setup.readers)
                 .map(one)
                 .collect::<Result<_, _>>()
                 .map_err(failed)?,
@@ -96,9 +94,9 @@ impl<const WORDS: usize> Readers<WORDS> {
     }
 
     /// Reads whatever is announced, until the process is killed.
-    fn read(mut self, stage: &mut Stage, script: &Script) -> Result<(), BenchError> {
-        let counter = Shared::<Counter>::inherited(script.counter)?;
-        stage.tell(&())?;
+    fn read(mut self, parent: &mut Parent, setup: &Setup) -> Result<(), Box<dyn Error>> {
+        let counter = Shared::<Counter>::inherited(setup.counter)?;
+        parent.say(&())?;
         let mut seen = 0;
         loop {
             let published = counter.published.load(Ordering::Acquire);

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use lager_benches::Scenario;
 use serde::Deserialize;
 
 use crate::figures::RatioName;
@@ -101,9 +102,6 @@ pub(crate) enum LimitsError {
     Margin { source_name: String },
 }
 
-/// The sources that are timed, and therefore yield ratios.
-pub(crate) const SCENARIOS: [&str; 3] = ["hop", "path", "fanout"];
-
 impl Limits {
     /// Reads and checks a file.
     pub(crate) fn load(file: &Path) -> Result<Self, LimitsError> {
@@ -188,7 +186,7 @@ impl Limit {
                 });
             }
         }
-        let timed = SCENARIOS.contains(&self.source.as_str());
+        let timed = Scenario::named(&self.source).is_some();
         match (timed, self.at_most, self.at_least, self.measured) {
             (true, Some(_), None, None) if self.margin_percent.is_none() => self
                 .figure

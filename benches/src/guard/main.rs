@@ -18,12 +18,12 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use lager_benches::chip::{self, Programs};
-use lager_benches::{BenchError, machine, median};
+use lager_benches::{BenchError, Scenario, machine, median};
 use serde::Serialize;
 
 use crate::figures::{Built, Figures, FiguresError};
 use crate::judge::{Judgement, Verdict, judge};
-use crate::limits::{Limits, LimitsError, SCENARIOS};
+use crate::limits::{Limits, LimitsError};
 use crate::measure::{MeasureError, Thoroughness, measure};
 
 /// Holds the bus, the path and the boards' images to their limits: ratios measured in one run, and
@@ -108,37 +108,26 @@ struct Findings {
 }
 
 fn main() -> ExitCode {
-    lager_benches::cast::play_if_asked();
+    lager_benches::run_if_asked();
     lager_benches::slow::refuse_in_vain();
     let arguments = Arguments::parse();
-    if let Some(times) = arguments.spread {
-        return match spread(&arguments, times) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(error) => {
-                eprintln!("benches/guard: {error}");
-                ExitCode::from(2)
-            }
-        };
-    }
-    if arguments.trial {
-        return match try_limits(&arguments) {
-            Ok(all_noticed) => ExitCode::from(u8::from(!all_noticed)),
-            Err(error) => {
-                eprintln!("benches/guard: {error}");
-                ExitCode::from(2)
-            }
-        };
-    }
-    match guard(&arguments) {
-        Ok(findings) => {
+    let kept = if let Some(times) = arguments.spread {
+        spread(&arguments, times).map(|()| true)
+    } else if arguments.trial {
+        try_limits(&arguments)
+    } else {
+        guard(&arguments).map(|findings| {
             if arguments.json {
                 let json = serde_json::to_string(&findings).expect("names and numbers are JSON");
                 println!("{json}");
             } else {
                 print(&findings);
             }
-            ExitCode::from(u8::from(!findings.kept))
-        }
+            findings.kept
+        })
+    };
+    match kept {
+        Ok(kept) => ExitCode::from(u8::from(!kept)),
         Err(error) => {
             eprintln!("benches/guard: {error}");
             ExitCode::from(2)
@@ -162,10 +151,10 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
     };
     for source in sources {
         let counted = counts.iter().find(|figures| figures.source == source);
-        let figures = match counted {
-            Some(figures) => figures.clone(),
-            None if SCENARIOS.contains(&source.as_str()) => {
-                let measured = measure(&limits, &source, how)?;
+        let figures = match (counted, Scenario::named(&source)) {
+            (Some(figures), _) => figures.clone(),
+            (None, Some(scenario)) => {
+                let measured = measure(&limits, scenario, how)?;
                 if measured.attempts > 1 {
                     let times = measured.attempts;
                     findings.notes.push(format!(
@@ -174,7 +163,7 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
                 }
                 measured.figures
             }
-            None if source == CYCLES => {
+            (None, None) if source == CYCLES => {
                 // `benches/guard` runs this in the source tree.
                 let here = Path::new("");
                 let traces =
@@ -182,7 +171,7 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
                 let limited = |name: &str| limits.of(CYCLES).any(|limit| limit.figure == name);
                 Figures::of_traces(CYCLES, &traces, limited)?
             }
-            None => return Err(GuardError::NoCounts(source)),
+            (None, None) => return Err(GuardError::NoCounts(source)),
         };
         let (judgements, notes) = judge(&limits, &figures);
         findings.kept &= !judgements.iter().any(|one| one.verdict.fails());
@@ -195,16 +184,15 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
 /// Shows how far the ratios that have limits spread from one measurement to the next.
 fn spread(arguments: &Arguments, times: usize) -> Result<(), GuardError> {
     let limits = Limits::load(&arguments.limits)?;
-    let mut sources = sources(&limits, &arguments.only)?;
-    sources.retain(|source| SCENARIOS.contains(&source.as_str()));
+    let scenarios = scenarios(&limits, arguments)?;
     println!("{}\n", machine::describe());
     println!(
         "{:<70} {:>7} {:>7} {:>7} {:>7} {:>7}",
         "figure", "lowest", "median", "highest", "limit", "goal"
     );
-    for source in sources {
-        let measured = measure::spread(&limits, &source, arguments.runs, times)?;
-        for limit in limits.of(&source) {
+    for scenario in scenarios {
+        let measured = measure::spread(&limits, scenario, arguments.runs, times)?;
+        for limit in limits.of(scenario.as_str()) {
             let mut values: Vec<f64> = measured
                 .iter()
                 .filter_map(|figures| figures.figures.get(&limit.figure).copied())
@@ -228,8 +216,7 @@ fn spread(arguments: &Arguments, times: usize) -> Result<(), GuardError> {
 /// Plants a slow-down just above each limit on a ratio; whether the guard has noticed each.
 fn try_limits(arguments: &Arguments) -> Result<bool, GuardError> {
     let limits = Limits::load(&arguments.limits)?;
-    let mut sources = sources(&limits, &arguments.only)?;
-    sources.retain(|source| SCENARIOS.contains(&source.as_str()));
+    let scenarios = scenarios(&limits, arguments)?;
     let how = Thoroughness {
         runs: arguments.runs,
         attempts: 1,
@@ -242,10 +229,11 @@ fn try_limits(arguments: &Arguments) -> Result<bool, GuardError> {
             "figure", "limit", "before", "slower by ns", "with it"
         );
     }
-    for source in sources {
-        let measured = measure(&limits, &source, how)?;
+    for scenario in scenarios {
+        let measured = measure(&limits, scenario, how)?;
         for mut trial in trial::trials(&limits, &measured.figures) {
-            trial::run(&mut trial, &arguments.limits, &source, arguments.runs)
+            let source = scenario.as_str();
+            trial::run(&mut trial, &arguments.limits, source, arguments.runs)
                 .map_err(GuardError::Trial)?;
             for planted in trial {
                 all_noticed &= planted.noticed;
@@ -282,6 +270,13 @@ fn sources(limits: &Limits, only: &[String]) -> Result<Vec<String>, GuardError> 
     }
     all.retain(|source| only.is_empty() || only.contains(source));
     Ok(all)
+}
+
+/// Those of the sources that are timed.
+fn scenarios(limits: &Limits, arguments: &Arguments) -> Result<Vec<Scenario>, GuardError> {
+    let sources = sources(limits, &arguments.only)?;
+    let scenario = |source: &String| Scenario::named(source);
+    Ok(sources.iter().filter_map(scenario).collect())
 }
 
 fn counts(arguments: &Arguments) -> Result<Vec<Figures>, GuardError> {

@@ -4,11 +4,11 @@
 //! is measured again is put together with what was measured before, and the median of all runs
 //! counts. So a single lucky run does not hide code that is slower than its limit.
 
-use lager_benches::{BenchError, Mode, Options, Regime, Report};
+use lager_benches::{BenchError, Mode, Options, Regime, Scenario};
 
 use crate::figures::{Figures, FiguresError, RatioName};
 use crate::judge::judge;
-use crate::limits::{Limits, SCENARIOS};
+use crate::limits::Limits;
 
 /// How thoroughly to measure.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +23,10 @@ pub(crate) struct Thoroughness {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MeasureError {
     #[error("{scenario}: {error}")]
-    Bench { scenario: String, error: BenchError },
+    Bench {
+        scenario: Scenario,
+        error: BenchError,
+    },
     #[error(transparent)]
     Figures(#[from] FiguresError),
 }
@@ -38,7 +41,7 @@ pub(crate) struct Measured {
 /// Measures `scenario` until its limits are kept, at most as often as allowed.
 pub(crate) fn measure(
     limits: &Limits,
-    scenario: &str,
+    scenario: Scenario,
     how: Thoroughness,
 ) -> Result<Measured, MeasureError> {
     let options = options(limits, scenario, how.runs);
@@ -65,7 +68,7 @@ pub(crate) fn measure(
 /// Measures `scenario` so many times and returns the figures of each, for whoever chooses limits.
 pub(crate) fn spread(
     limits: &Limits,
-    scenario: &str,
+    scenario: Scenario,
     runs: usize,
     times: usize,
 ) -> Result<Vec<Figures>, MeasureError> {
@@ -73,14 +76,13 @@ pub(crate) fn spread(
     (0..times).map(|_| once(scenario, &options)).collect()
 }
 
-fn once(scenario: &str, options: &Options) -> Result<Figures, MeasureError> {
-    let report = run(scenario, options).map_err(|error| MeasureError::Bench {
-        scenario: scenario.to_owned(),
-        error,
-    })?;
-    let mut figures = Figures::of_report(scenario, &report)?;
-    if scenario == "path"
-        && let Err(error) = lager_benches::path::may_have_real_time()
+fn once(scenario: Scenario, options: &Options) -> Result<Figures, MeasureError> {
+    let report = scenario
+        .measure(options)
+        .map_err(|error| MeasureError::Bench { scenario, error })?;
+    let mut figures = Figures::of_report(scenario.as_str(), &report)?;
+    if scenario == Scenario::Path
+        && let Err(error) = lager_benches::may_have_real_time()
     {
         let note = format!("path@observed: {error}");
         figures.unmeasured.insert("path@observed".to_owned(), note);
@@ -88,21 +90,10 @@ fn once(scenario: &str, options: &Options) -> Result<Figures, MeasureError> {
     Ok(figures)
 }
 
-fn run(scenario: &str, options: &Options) -> Result<Report, BenchError> {
-    match scenario {
-        "hop" => lager_benches::hop::measure(options),
-        "path" => lager_benches::path::measure(options),
-        "fanout" => lager_benches::fanout::measure(options),
-        other => {
-            unreachable!("`{other}` is none of {SCENARIOS:?}, checked when the limits are read")
-        }
-    }
-}
-
 /// Only the modes and regimes that some limit is about: the rest would cost minutes.
-fn options(limits: &Limits, scenario: &str, runs: usize) -> Options {
+fn options(limits: &Limits, scenario: Scenario, runs: usize) -> Options {
     let names: Vec<RatioName> = limits
-        .of(scenario)
+        .of(scenario.as_str())
         .filter_map(|limit| limit.figure.parse().ok())
         .collect();
     Options {

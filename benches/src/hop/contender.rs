@@ -4,12 +4,12 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::group::Entry;
 use crate::report::{Mode, Regime};
-use crate::run::Entry;
 
-/// What carries the balls.
+/// What carries the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Contender {
+pub(super) enum Contender {
     /// The typed ports, waiting that way.
     Lager(Mode),
     /// Bare iceoryx2 with the typed ports' header and limits, polled without pause.
@@ -42,7 +42,7 @@ const COUNT: usize = if cfg!(feature = "zenoh") { 14 } else { 13 };
 
 impl Contender {
     /// Everything that takes part, in the order of the tables.
-    pub const ALL: [Self; COUNT] = [
+    pub(super) const ALL: [Self; COUNT] = [
         Self::Lager(Mode::Spin),
         Self::IceoryxHeader,
         Self::IceoryxBare,
@@ -61,67 +61,43 @@ impl Contender {
     ];
 
     /// How its receiver waits.
-    #[must_use]
-    pub const fn mode(self) -> Mode {
-        match self {
-            Self::Lager(mode) => mode,
-            Self::IceoryxHeader | Self::IceoryxBare | Self::IceoryxDefaults | Self::CacheLine => {
-                Mode::Spin
-            }
-            Self::IceoryxEvent
-            | Self::Futex
-            | Self::EventFd
-            | Self::Pipe
-            | Self::Uds
-            | Self::Tcp => Mode::Block,
-            #[cfg(feature = "zenoh")]
-            Self::Zenoh => Mode::Block,
-        }
-    }
-
-    /// What the rows of a report call it.
-    #[must_use]
-    pub fn label(self) -> String {
-        self.entry().label()
+    pub(super) const fn mode(self) -> Mode {
+        self.entry().mode
     }
 
     /// Whether it works in `regime`: on a shared core, whoever looks without pause keeps the
     /// sender from sending.
-    #[must_use]
-    pub fn works_in(self, regime: Regime) -> bool {
+    pub(super) fn works_in(self, regime: Regime) -> bool {
         regime != Regime::SameCore || self.mode() == Mode::Block
     }
 
-    pub(crate) fn entry(self) -> Entry {
-        let (name, variant) = match self {
-            Self::Lager(_) => ("lager", ""),
-            Self::IceoryxHeader => ("iceoryx2", "header"),
-            Self::IceoryxBare => ("iceoryx2", "bare"),
-            Self::IceoryxDefaults => ("iceoryx2", "defaults"),
-            Self::IceoryxEvent => ("iceoryx2", "event"),
-            Self::CacheLine => ("cacheline", ""),
-            Self::Futex => ("futex", ""),
-            Self::EventFd => ("eventfd", ""),
-            Self::Pipe => ("pipe", ""),
-            Self::Uds => ("uds", ""),
-            Self::Tcp => ("tcp", ""),
+    /// Its row, and what that is compared with.
+    pub(super) const fn entry(self) -> Entry {
+        const SPINNING: &[&str] = &["iceoryx2/header"];
+        const SLEEPING: &[&str] = &["iceoryx2/event"];
+        const SPIN: &[&str] = &["iceoryx2/header", "iceoryx2/bare", "iceoryx2/defaults"];
+        const BLOCK: &[&str] = &["iceoryx2/event", "futex"];
+        let (name, variant, mode, against): (_, _, _, &[&str]) = match self {
+            Self::Lager(Mode::Spin) => ("lager", "", Mode::Spin, SPIN),
+            Self::Lager(Mode::Adaptive) => ("lager", "", Mode::Adaptive, SPINNING),
+            Self::Lager(Mode::Block) => ("lager", "", Mode::Block, BLOCK),
+            Self::IceoryxHeader => ("iceoryx2", "header", Mode::Spin, &[]),
+            Self::IceoryxBare => ("iceoryx2", "bare", Mode::Spin, SPINNING),
+            Self::IceoryxDefaults => ("iceoryx2", "defaults", Mode::Spin, SPINNING),
+            Self::IceoryxEvent => ("iceoryx2", "event", Mode::Block, &[]),
+            Self::CacheLine => ("cacheline", "", Mode::Spin, SPINNING),
+            Self::Futex => ("futex", "", Mode::Block, SLEEPING),
+            Self::EventFd => ("eventfd", "", Mode::Block, SLEEPING),
+            Self::Pipe => ("pipe", "", Mode::Block, SLEEPING),
+            Self::Uds => ("uds", "", Mode::Block, SLEEPING),
+            Self::Tcp => ("tcp", "", Mode::Block, SLEEPING),
             #[cfg(feature = "zenoh")]
-            Self::Zenoh => ("zenoh", ""),
-        };
-        let against: &[&str] = match self {
-            Self::Lager(Mode::Spin) => &["iceoryx2/header", "iceoryx2/bare", "iceoryx2/defaults"],
-            Self::Lager(Mode::Adaptive) => &["iceoryx2/header"],
-            Self::Lager(Mode::Block) => &["iceoryx2/event", "futex"],
-            Self::IceoryxHeader | Self::IceoryxEvent => &[],
-            Self::IceoryxBare | Self::IceoryxDefaults | Self::CacheLine => &["iceoryx2/header"],
-            Self::Futex | Self::EventFd | Self::Pipe | Self::Uds | Self::Tcp => &["iceoryx2/event"],
-            #[cfg(feature = "zenoh")]
-            Self::Zenoh => &["iceoryx2/event"],
+            Self::Zenoh => ("zenoh", "", Mode::Block, SLEEPING),
         };
         Entry {
             name,
             variant,
-            mode: self.mode(),
+            mode,
             against,
         }
     }

@@ -11,9 +11,12 @@
 //! is its software's.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};
 use std::path::PathBuf;
 
+use lager_rig::process::Main;
+use lager_rig::{Cable, Parent, Process, Refused, Shareable, Shared, timespec};
 use lager_wire::PACKET_LENGTH;
 use rustix::fs::{Mode as FileMode, OFlags};
 use rustix::io::Errno;
@@ -21,18 +24,15 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use rustix::thread::futex;
 use serde::{Deserialize, Serialize};
 
-use super::cable::{Cable, timespec};
 use super::pace::{ANSWER_WITHIN, Chain, now_ns, sleep_until_due};
-use super::players::Place;
 use super::processes::Processes;
+use super::services::Place;
 use crate::error::BenchError;
-use crate::parts::{Part, Play, Stage};
-use crate::shared::{Board, Shared};
 
 const ENDS: &str = "path, floor's ends";
 const MIDDLE: &str = "path, floor's middle";
 
-pub(crate) const PARTS: &[(&str, Play)] = &[(ENDS, ends), (MIDDLE, middle)];
+pub(crate) const PROCESSES: &[(&str, Main)] = &[(ENDS, ends), (MIDDLE, middle)];
 
 /// Longest sleep in a futex, in ns: as long as the robot's services sleep.
 const LONGEST_WAIT_NS: u64 = 20_000_000;
@@ -55,7 +55,7 @@ struct Slots([Slot; 2]);
 
 // SAFETY: atomics only, and zeros are valid.
 #[allow(unsafe_code)]
-unsafe impl Board for Slots {}
+unsafe impl Shareable for Slots {}
 
 impl Slot {
     /// Writes the sample and wakes who waits for it.
@@ -96,20 +96,20 @@ impl Slot {
 
 /// What the floor's processes are told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Script {
+struct Setup {
     place: Place,
     slots: RawFd,
     ports: [PathBuf; 2],
 }
 
-fn ends(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(script) = stage.hear::<Script>()? else {
+fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(setup) = parent.hear::<Setup>()? else {
         return Ok(());
     };
-    script.place.take()?;
-    let slots = Shared::<Slots>::inherited(script.slots)?;
-    let [sensor, steering] = [open(&script.ports[0])?, open(&script.ports[1])?];
-    stage.tell(&())?;
+    setup.place.take()?;
+    let slots = Shared::<Slots>::inherited(setup.slots)?;
+    let [sensor, steering] = [open(&setup.ports[0])?, open(&setup.ports[1])?];
+    parent.say(&())?;
     let [first, second] = &slots.0;
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -121,18 +121,18 @@ fn ends(stage: &mut Stage) -> Result<(), BenchError> {
         let mut seen = 0;
         loop {
             let bytes = second.take(&mut seen);
-            rustix::io::write(&steering, &bytes).map_err(|errno| port_error(&errno))?;
+            rustix::io::write(&steering, &bytes).map_err(port_error)?;
         }
     })
 }
 
-fn middle(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(script) = stage.hear::<Script>()? else {
+fn middle(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(setup) = parent.hear::<Setup>()? else {
         return Ok(());
     };
-    script.place.take()?;
-    let slots = Shared::<Slots>::inherited(script.slots)?;
-    stage.tell(&())?;
+    setup.place.take()?;
+    let slots = Shared::<Slots>::inherited(setup.slots)?;
+    parent.say(&())?;
     let [first, second] = &slots.0;
     let mut seen = 0;
     loop {
@@ -141,7 +141,7 @@ fn middle(stage: &mut Stage) -> Result<(), BenchError> {
 }
 
 /// A serial port whose `read` blocks, as one would open it without further needs.
-fn open(path: &PathBuf) -> Result<OwnedFd, BenchError> {
+fn open(path: &PathBuf) -> Result<OwnedFd, Refused> {
     let opened = || -> Result<OwnedFd, Errno> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
         let port = rustix::fs::open(path, flags, FileMode::empty())?;
@@ -150,14 +150,11 @@ fn open(path: &PathBuf) -> Result<OwnedFd, BenchError> {
         tcsetattr(&port, OptionalActions::Now, &termios)?;
         Ok(port)
     };
-    opened().map_err(|errno| port_error(&errno))
+    opened().map_err(port_error)
 }
 
-fn port_error(errno: &Errno) -> BenchError {
-    BenchError::Kernel {
-        what: "the floor's end of a pseudo terminal",
-        detail: errno.to_string(),
-    }
+fn port_error(errno: Errno) -> Refused {
+    Refused::to_make("the floor's end of a pseudo terminal")(errno)
 }
 
 fn read_whole(port: &OwnedFd, bytes: &mut Bytes) -> Result<(), Errno> {
@@ -183,23 +180,23 @@ pub(super) struct Floor {
 }
 
 impl Floor {
-    /// Starts it; `ends` is where the bridge would be, `mind` where logic would be.
-    pub(super) fn start(ends: Place, mind: Place) -> Result<Self, BenchError> {
+    /// Starts it; `ends` is where the bridge would be, `logic` where logic would be.
+    pub(super) fn start(ends: Place, logic: Place) -> Result<Self, BenchError> {
         let slots = Shared::<Slots>::new()?;
         let cables = [Cable::new()?, Cable::new()?];
-        let script = |place| Script {
+        let setup = |place| Setup {
             place,
             slots: slots.number(),
             ports: [0, 1].map(|cable: usize| cables[cable].path().clone()),
         };
-        let mut parts = Vec::new();
-        for (name, place) in [(MIDDLE, mind), (ENDS, ends)] {
-            let mut part = Part::start(name)?;
-            let () = part.ask(&script(place))?;
-            parts.push(part);
+        let mut processes = Vec::new();
+        for (name, place) in [(MIDDLE, logic), (ENDS, ends)] {
+            let mut process = Process::start(name)?;
+            let () = process.ask(&setup(place))?;
+            processes.push(process);
         }
         Ok(Self {
-            processes: Processes::new(parts),
+            processes: Processes::new(processes),
             _slots: slots,
             cables,
             sent: 0,

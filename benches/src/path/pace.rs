@@ -5,12 +5,11 @@
 //! slower than one that did not.
 
 use lager_ports::Clock;
+use lager_rig::{interrupted, timespec};
 use rustix::thread::{ClockId, clock_nanosleep_absolute};
 
-use super::cable::timespec;
 use super::stages::Counted;
 use crate::error::BenchError;
-use crate::parts::interrupted;
 
 /// Time between frames, in ns.
 const PERIOD: u64 = 1_000_000;

@@ -3,15 +3,15 @@
 
 use core::time::Duration;
 
+use lager_rig::{Process, ProcessError};
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::pace::{ANSWER_WITHIN, now_ns};
 use crate::error::BenchError;
-use crate::parts::Part;
 
 /// The processes of one chain.
 pub(super) struct Processes {
-    parts: Vec<Part>,
+    processes: Vec<Process>,
     /// Of these the processor time is counted: the services, not their observers.
     counted: usize,
     /// Processor time and real time when the turn's counting began, in ns.
@@ -21,19 +21,19 @@ pub(super) struct Processes {
 }
 
 impl Processes {
-    /// All of `parts` are counted.
-    pub(super) fn new(parts: Vec<Part>) -> Self {
+    /// All of `processes` are counted.
+    pub(super) fn new(processes: Vec<Process>) -> Self {
         Self {
-            counted: parts.len(),
-            parts,
+            counted: processes.len(),
+            processes,
             began: None,
             total: (0, 0),
         }
     }
 
     /// More processes, which are not counted.
-    pub(super) fn add(&mut self, parts: Vec<Part>) {
-        self.parts.extend(parts);
+    pub(super) fn add(&mut self, processes: Vec<Process>) {
+        self.processes.extend(processes);
     }
 
     /// Lets them run.
@@ -65,11 +65,11 @@ impl Processes {
     /// Why frame `number` has no answer: what a process says, that the kernel does not let it run,
     /// or that it is silent.
     pub(super) fn fault(&mut self, contender: &str, number: u64) -> BenchError {
-        let starved = self.parts[..self.counted].iter().any(wants_to_run);
-        for part in &mut self.parts {
-            match part.hear_within::<()>(Duration::ZERO) {
-                Ok(()) | Err(BenchError::PartSilent { .. }) => {}
-                Err(said) => return said,
+        let starved = self.processes[..self.counted].iter().any(wants_to_run);
+        for process in &mut self.processes {
+            match process.hear_within::<()>(Duration::ZERO) {
+                Ok(()) | Err(ProcessError::Silent { .. }) => {}
+                Err(said) => return said.into(),
             }
         }
         let (contender, limit) = (contender.to_owned(), Duration::from_nanos(ANSWER_WITHIN));
@@ -85,8 +85,8 @@ impl Processes {
     }
 
     fn signal(&self, signal: Signal) -> Result<(), BenchError> {
-        for part in &self.parts {
-            let pid = i32::try_from(part.pid()).ok().and_then(Pid::from_raw);
+        for process in &self.processes {
+            let pid = i32::try_from(process.pid()).ok().and_then(Pid::from_raw);
             // One that has ended is found out with the next frame.
             let _ = pid.map(|pid| kill_process(pid, signal));
         }
@@ -95,13 +95,16 @@ impl Processes {
 
     /// Processor time of all threads of the counted processes, in ns.
     fn processor_ns(&self) -> u64 {
-        self.parts[..self.counted].iter().map(processor_ns).sum()
+        self.processes[..self.counted]
+            .iter()
+            .map(processor_ns)
+            .sum()
     }
 }
 
 /// The kernel counts each thread's time on a processor in ns, first in its `schedstat`.
-fn processor_ns(part: &Part) -> u64 {
-    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", part.pid())) else {
+fn processor_ns(process: &Process) -> u64 {
+    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", process.pid())) else {
         return 0;
     };
     threads
@@ -113,8 +116,8 @@ fn processor_ns(part: &Part) -> u64 {
 
 /// Whether a thread of it is ready to run. Asked of a process that should have answered long ago:
 /// one that waits for a wake-up sleeps.
-fn wants_to_run(part: &Part) -> bool {
-    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", part.pid())) else {
+fn wants_to_run(process: &Process) -> bool {
+    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", process.pid())) else {
         return false;
     };
     threads

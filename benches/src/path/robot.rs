@@ -13,8 +13,8 @@
 //! repetitions of the command in force carry the old one. On a machine that keeps logic from
 //! running for half a millisecond, logic may go blind right after it saw, and the bridge then
 //! writes the later of both orders alone. Such a frame counts with the time until that command was
-//! read, and how many they are is a row of its own (`path-overtaken`). The steering board reports that its wheels stand, so the robot drives towards its goods for as long as it is
-//! measured.
+//! read, and how many they are is a row of its own (`path-overtaken`). The steering board reports
+//! that its wheels stand, so the robot drives towards its goods for as long as it is measured.
 
 mod chain;
 
@@ -22,22 +22,20 @@ use core::time::Duration;
 use std::time::Instant;
 
 use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
+use lager_rig::{
+    Board, Domain, Process, ProcessError, board_us, interrupted, one_square, wheels_in_the_air,
+};
 use lager_topics::{
     Ask, AskKind, BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, MissionOrder,
     Mode as Driver, NavMap, NavStatus, Order, Phase, Role,
 };
 use lager_wire::link::BoardEvent;
-use lager_wire::{
-    Callsign, Centimetres, Command, LineState, Payload, SteerData, SteerFlags, WheelCommand,
-};
+use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelCommand};
 
-use super::board::{Board, map, now_us};
 use super::pace::{now_ns, sleep_until_due};
-use super::players::{BRIDGE, LOGIC, OBSERVER, Place, RealTime, Script, bus_error};
 use super::processes::Processes;
-use crate::domain::Domain;
+use super::services::{BRIDGE, LOGIC, OBSERVER, Place, RealTime, Setup, bus_error};
 use crate::error::BenchError;
-use crate::parts::{Part, interrupted};
 use crate::report::Mode;
 use crate::slow;
 
@@ -92,7 +90,7 @@ pub(super) struct Robot {
     orders: Publisher<MissionOrder>,
     requests: Client<BridgeRequest>,
     bus: Bus,
-    script: Script,
+    setup: Setup,
     domain: Domain,
 }
 
@@ -104,32 +102,32 @@ impl Robot {
         bridge: Place,
         logic: Place,
     ) -> Result<Self, BenchError> {
-        let domain = Domain::new()?;
+        let domain = Domain::new(crate::FAMILY)?;
         let [sensor, steering] = [
             Board::new(Callsign::Sensor)?,
             Board::new(Callsign::Steering)?,
         ];
-        let script = Script {
+        let setup = Setup {
             place: Place::default(),
             folder: domain.folder().to_owned(),
             mode,
             ports: [sensor.cable.path().clone(), steering.cable.path().clone()],
         };
-        let bus = script.open(Role::Operator)?;
-        let mut parts = Vec::new();
-        for (part, place) in [(LOGIC, logic), (BRIDGE, bridge)] {
-            let mut part = Part::start(part)?;
-            let () = part.ask(&Script {
+        let bus = setup.open(Role::Operator)?;
+        let mut processes = Vec::new();
+        for (name, place) in [(LOGIC, logic), (BRIDGE, bridge)] {
+            let mut process = Process::start(name)?;
+            let () = process.ask(&Setup {
                 place,
-                ..script.clone()
+                ..setup.clone()
             })?;
-            parts.push(part);
+            processes.push(process);
         }
         let mut robot = Self {
             urgent: None,
             boards_priority: None,
             name: name.to_owned(),
-            processes: Processes::new(parts),
+            processes: Processes::new(processes),
             sensor,
             steering,
             last: (0, 0),
@@ -145,7 +143,7 @@ impl Robot {
             orders: bus.publisher().map_err(bus_error(OPERATOR))?,
             requests: bus.client().map_err(bus_error(OPERATOR))?,
             bus,
-            script,
+            setup,
             domain,
         };
         robot.set_out()?;
@@ -164,8 +162,8 @@ impl Robot {
     pub(super) fn observed_by(&mut self, count: usize) -> Result<(), BenchError> {
         let mut observers = Vec::new();
         for _ in 0..count {
-            let mut observer = Part::start(OBSERVER)?;
-            observer.tell(&self.script)?;
+            let mut observer = Process::start(OBSERVER)?;
+            observer.tell(&self.setup);
             observers.push(observer);
         }
         // They start together; the last of them waits for the others' processor time.
@@ -179,7 +177,7 @@ impl Robot {
     /// From two silent boards to a robot on its way.
     fn set_out(&mut self) -> Result<(), BenchError> {
         self.map
-            .send(Cause::OWN, map())
+            .send(Cause::OWN, one_square())
             .map_err(bus_error(OPERATOR))?;
         self.until("both boards are up", |robot| {
             let health = robot.health.latest();
@@ -227,10 +225,11 @@ impl Robot {
             }
             if start.elapsed() > UP_WITHIN {
                 return Err(match self.processes.fault(&self.name, 0) {
-                    BenchError::NoSample { .. } => BenchError::PartSilent {
-                        part: format!("{}, until {what}", self.name),
+                    BenchError::NoSample { .. } => ProcessError::Silent {
+                        process: format!("{}, until {what}", self.name),
                         limit: UP_WITHIN,
-                    },
+                    }
+                    .into(),
                     said => said,
                 });
             }
@@ -244,7 +243,7 @@ impl Robot {
 
     /// All that the boards do beside sending frames.
     fn play_boards(&mut self) -> Result<(), BenchError> {
-        self.sensor.drain()?;
+        self.sensor.take(|_| ())?;
         self.sensor.shake_hands()?;
         self.drain_commands()?;
         self.steering.shake_hands()?;
@@ -258,16 +257,7 @@ impl Robot {
             return Ok(());
         }
         self.reported_ns = now;
-        self.steering.send(Payload::SteerData(SteerData {
-            code: self.last.0,
-            left_duty: 0,
-            right_duty: 0,
-            flags: SteerFlags::ARM_LOCKED,
-            line_error: 0,
-            finished_seq: 0,
-            servo_errors: 0,
-            battery_decivolts: 111,
-        }))
+        Ok(self.steering.send(wheels_in_the_air(self.last.0))?)
     }
 
     /// Takes commands that nobody has asked for by a frame.
@@ -286,7 +276,7 @@ impl Robot {
     fn take(&mut self, bytes: &[u8]) -> Option<u8> {
         let mut new = None;
         for byte in bytes {
-            if let Some(BoardEvent::Packet(packet)) = self.steering.link.push(*byte, now_us())
+            if let Some(BoardEvent::Packet(packet)) = self.steering.link.push(*byte, board_us())
                 && let Payload::SteerCommand(command) = packet.payload
             {
                 if command.seq != self.last.1 {

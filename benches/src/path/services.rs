@@ -4,26 +4,29 @@
 //! `lager up` starts it; nothing of a service is left out or put in.
 
 use core::time::Duration;
+use std::error::Error;
 use std::path::PathBuf;
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, BusConfig, Policy, Shutdown, Subscriber};
+use lager_ports::{Bus, Shutdown, Subscriber};
+use lager_rig::process::Main;
+use lager_rig::schedule::schedule;
+use lager_rig::{Parent, bus_at};
 use lager_topics::{Role, SensorLine, SteeringCommand, Topic};
 use serde::{Deserialize, Serialize};
 
 use crate::error::BenchError;
 use crate::machine;
-use crate::parts::{Play, Stage};
 use crate::report::Mode;
-use crate::schedule::schedule;
 
-/// The parts of this file.
+/// The names of the processes.
 pub(super) const BRIDGE: &str = "path, bridge";
 pub(super) const LOGIC: &str = "path, logic";
 pub(super) const OBSERVER: &str = "path, observer";
 
-pub(crate) const PARTS: &[(&str, Play)] = &[(BRIDGE, bridge), (LOGIC, logic), (OBSERVER, observer)];
+pub(crate) const PROCESSES: &[(&str, Main)] =
+    &[(BRIDGE, bridge), (LOGIC, logic), (OBSERVER, observer)];
 
 /// How often an observer looks: often enough for a person's eye.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -53,7 +56,7 @@ impl Place {
 
 /// What a process of the path is told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Script {
+pub(super) struct Setup {
     pub(super) place: Place,
     pub(super) folder: PathBuf,
     /// How bridge and logic wait.
@@ -62,21 +65,9 @@ pub(super) struct Script {
     pub(super) ports: [PathBuf; 2],
 }
 
-impl Script {
+impl Setup {
     pub(super) fn open(&self, role: Role) -> Result<Bus, BenchError> {
-        let config = BusConfig {
-            folder: Some(self.folder.clone()),
-            ..BusConfig::default()
-        };
-        Bus::open(&config, role).map_err(bus_error("joining the bus"))
-    }
-
-    fn policy(&self) -> Policy {
-        match self.mode {
-            Mode::Spin => Policy::Spin,
-            Mode::Adaptive => Policy::ADAPTIVE,
-            Mode::Block => Policy::Block,
-        }
+        Bus::open(&bus_at(&self.folder), role).map_err(bus_error("joining the bus"))
     }
 }
 
@@ -88,53 +79,55 @@ pub(super) fn bus_error<E: core::fmt::Display>(what: &'static str) -> impl FnOnc
     }
 }
 
-fn bridge(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(script) = stage.hear::<Script>()? else {
+fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(setup) = parent.hear::<Setup>()? else {
         return Ok(());
     };
-    script.place.take()?;
-    let bus = script.open(Role::Bridge)?;
+    setup.place.take()?;
+    let bus = setup.open(Role::Bridge)?;
     let config = BridgeConfig {
-        ports: script.ports.clone(),
-        waiting: script.policy(),
+        ports: setup.ports.clone(),
+        waiting: setup.mode.policy(),
         ..BridgeConfig::default()
     };
-    stage.tell(&())?;
-    // Ends with the process, which the director ends.
-    lager_bridge::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running the bridge"))
+    parent.say(&())?;
+    // Ends with the process, which the parent ends.
+    lager_bridge::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running the bridge"))?;
+    Ok(())
 }
 
-fn logic(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(script) = stage.hear::<Script>()? else {
+fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(setup) = parent.hear::<Setup>()? else {
         return Ok(());
     };
-    script.place.take()?;
-    let bus = script.open(Role::Logic)?;
+    setup.place.take()?;
+    let bus = setup.open(Role::Logic)?;
     let config = LogicConfig {
         // With it every frame makes a new order: a line frame lets the robot see and drive, any
         // other frame, a millisecond later, finds the line long unseen and lets it stand.
         blind_after: Duration::from_micros(400),
-        waiting: script.policy(),
+        waiting: setup.mode.policy(),
         ..LogicConfig::default()
     };
-    stage.tell(&())?;
-    lager_logic::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running logic"))
+    parent.say(&())?;
+    lager_logic::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running logic"))?;
+    Ok(())
 }
 
 /// An observer: reads ten times a second all that has come, and is never woken.
-fn observer(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(script) = stage.hear::<Script>()? else {
+fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(setup) = parent.hear::<Setup>()? else {
         return Ok(());
     };
-    script.place.take()?;
-    let bus = script.open(Role::Observer)?;
+    setup.place.take()?;
+    let bus = setup.open(Role::Observer)?;
     let mut line = bus
         .subscriber::<SensorLine>()
         .map_err(bus_error("observing"))?;
     let mut commands = bus
         .subscriber::<SteeringCommand>()
         .map_err(bus_error("observing"))?;
-    stage.tell(&())?;
+    parent.say(&())?;
     loop {
         drain(&mut line)?;
         drain(&mut commands)?;

@@ -3,6 +3,7 @@
 use lager_topics::{CommandLatency, Durations, PathLatency};
 
 use crate::report::{Mode, Regime, Row};
+use crate::stats::Quantiles;
 
 /// What the robot has counted so far.
 #[derive(Clone, Copy, Debug)]
@@ -49,20 +50,15 @@ pub(super) fn rows(before: &Counted, after: &Counted, regime: Regime, mode: Mode
 }
 
 fn row(stage: &str, counted: &Durations, regime: Regime, mode: Mode) -> Row {
-    Row {
-        name: "lager".to_owned(),
-        variant: stage.to_owned(),
-        what: "path-stages".to_owned(),
-        mode,
-        regime,
+    let times = Quantiles {
         n: counted.count,
         p50_ns: counted.quantile_ns(0.5),
         p99_ns: counted.quantile_ns(0.99),
         p999_ns: counted.quantile_ns(0.999),
-        ratio_to: String::new(),
-        ratio_p50: 1.0,
-        ratio_p99: 1.0,
-        ratios: Vec::new(),
-        cpu_percent: None,
+    };
+    Row {
+        name: "lager".to_owned(),
+        variant: stage.to_owned(),
+        ..Row::of("path-stages", mode, regime, Some(times))
     }
 }

@@ -1,40 +1,41 @@
 //! The readers of `ring-64`, all in one process: an actor that is rung, and observers.
 
 use core::sync::atomic::Ordering;
+use std::error::Error;
 use std::time::Instant;
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::subscriber::Subscriber as BareSubscriber;
 use iceoryx2::prelude::ipc;
-use lager_ports::{Policy, Subscriber, Waiter};
+use lager_ports::{Subscriber, Waiter};
+use lager_rig::Parent;
 use lager_topics::{OBSERVERS, Role, SensorLine, Stamp, Topic};
 
-use super::{Contender, Place, Round, Unheard, broken};
-use crate::ball::{Ball, Ping, SECOND};
-use crate::baseline::iceoryx;
-use crate::baseline::{Fault, LIMIT, TIME_OUT};
-use crate::error::BenchError;
-use crate::error::no_bus;
-use crate::parts::Stage;
+use super::{Contender, Observed, Own, Round};
+use crate::baseline::iceoryx::{self, Member};
+use crate::baseline::{Fault, LIMIT, TIME_OUT, broken};
+use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
+use crate::sample::{Ping, RECEIVER, Sample};
 
-pub(super) fn audience(stage: &mut Stage) -> Result<(), BenchError> {
-    let Some(place) = Place::enter(stage)? else {
+pub(super) fn readers(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let Some(own) = Own::enter(parent)? else {
         return Ok(());
     };
-    while let Some(round) = stage.hear::<Round>()? {
-        let mut seats = Seats::take(&place, round.contender, round.mode)?;
-        place.meet(&round, 1)?;
-        for number in round.all() {
-            seats.drain().map_err(|fault| round.failed(number, fault))?;
-            place.hall.ready.store(number, Ordering::Release);
-            seats
-                .until_rung(round.mode)
-                .map_err(|fault| round.failed(number, fault))?;
-        }
-        place.meet(&round, 2)?;
-        drop(seats);
-        stage.tell(&())?;
+    while let Some(round) = parent.hear::<Round>()? {
+        let mut ports = Ports::open(&own, round.contender, round.mode)?;
+        own.together(round.number, || {
+            for number in round.all() {
+                ports.drain().map_err(|fault| round.failed(number, fault))?;
+                own.memory().number.store(number, Ordering::Release);
+                ports
+                    .until_rung(round.mode)
+                    .map_err(|fault| round.failed(number, fault))?;
+            }
+            Ok(())
+        })?;
+        drop(ports);
+        parent.say(&())?;
     }
     Ok(())
 }
@@ -42,44 +43,39 @@ pub(super) fn audience(stage: &mut Stage) -> Result<(), BenchError> {
 /// The readers' ports.
 // One of them lives at a time, so nothing is saved by making it smaller.
 #[allow(clippy::large_enum_variant)]
-enum Seats {
+enum Ports {
     Lager {
         actor: Subscriber<Ping>,
         waiter: Waiter,
         observers: Vec<Subscriber<Ping>>,
-        unheard: Vec<Subscriber<Unheard>>,
+        observed: Vec<Subscriber<Observed>>,
     },
     Bare {
         listeners: Vec<Listener<ipc::Service>>,
-        subscribers: Vec<BareSubscriber<ipc::Service, Ball, Stamp>>,
+        subscribers: Vec<BareSubscriber<ipc::Service, Sample, Stamp>>,
     },
 }
 
-impl Seats {
-    fn take(place: &Place, contender: Contender, mode: Mode) -> Result<Self, BenchError> {
-        let policy = match mode {
-            Mode::Spin => Policy::Spin,
-            Mode::Adaptive => Policy::ADAPTIVE,
-            Mode::Block => Policy::Block,
-        };
+impl Ports {
+    fn open(own: &Own, contender: Contender, mode: Mode) -> Result<Self, BenchError> {
         Ok(match contender {
             Contender::Lager | Contender::Ring => {
-                let actor = place.bus(SECOND)?;
-                let mut unheard = Vec::new();
+                let actor = own.bus(RECEIVER)?;
+                let mut observed = Vec::new();
                 if contender == Contender::Ring {
                     // As many readers as the other topic has; one of them is not an observer.
-                    unheard = observers(place, OBSERVERS)?;
-                    unheard.push(actor.subscriber().map_err(no_bus)?);
+                    observed = observers(own, OBSERVERS)?;
+                    observed.push(actor.subscriber().map_err(no_bus)?);
                 }
                 Self::Lager {
                     actor: actor.subscriber().map_err(no_bus)?,
-                    waiter: actor.waiter(policy).map_err(no_bus)?,
-                    observers: observers(place, OBSERVERS)?,
-                    unheard,
+                    waiter: actor.waiter(mode.policy()).map_err(no_bus)?,
+                    observers: observers(own, OBSERVERS)?,
+                    observed,
                 }
             }
             Contender::Notify(listeners) | Contender::Event(listeners) => {
-                let member = place.member()?;
+                let member = Member::join(&own.config)?;
                 let (service, count) = (listeners.service(), listeners.count());
                 Self::Bare {
                     listeners: (0..count)
@@ -99,12 +95,12 @@ impl Seats {
             Self::Lager {
                 actor,
                 observers,
-                unheard,
+                observed,
                 ..
             } => {
                 drain(actor)?;
                 observers.iter_mut().try_for_each(drain)?;
-                unheard.iter_mut().try_for_each(drain)
+                observed.iter_mut().try_for_each(drain)
             }
             Self::Bare {
                 listeners,
@@ -150,8 +146,8 @@ impl Seats {
     }
 }
 
-fn observers<T: Topic>(place: &Place, number: usize) -> Result<Vec<Subscriber<T>>, BenchError> {
-    let bus = place.bus(Role::Observer)?;
+fn observers<T: Topic>(own: &Own, number: usize) -> Result<Vec<Subscriber<T>>, BenchError> {
+    let bus = own.bus(Role::Observer)?;
     (0..number)
         .map(|_| bus.subscriber().map_err(no_bus))
         .collect()

@@ -12,7 +12,7 @@ use std::fmt;
 
 use anyhow::{Context, Result, ensure};
 use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::{Mode, Options, Regime, fanout, hop, path};
+use lager_benches::{Mode, Options, Regime, Scenario as Timed};
 use serde::Serialize;
 
 use crate::cli::{BenchArgs, Scenario};
@@ -22,14 +22,15 @@ use crate::exit::Usage;
 /// Measures and returns what is to be printed.
 pub fn run(args: &BenchArgs) -> Result<String> {
     let options = options(args);
-    let (name, measured) = match args.scenario {
-        Scenario::Hop => ("hop", hop::measure(&options)),
-        Scenario::Path => ("path", path::measure(&options)),
-        Scenario::Fanout => ("fanout", fanout::measure(&options)),
+    let scenario = match args.scenario {
+        Scenario::Hop => Timed::Hop,
+        Scenario::Path => Timed::Path,
+        Scenario::Fanout => Timed::Fanout,
         Scenario::Chip => return run_chip(args),
         Scenario::Stop | Scenario::Command | Scenario::Link => return run_robot(args),
     };
-    let report = measured.with_context(|| format!("`lager bench {name}` has no result"))?;
+    let measured = scenario.measure(&options);
+    let report = measured.with_context(|| format!("`lager bench {scenario}` has no result"))?;
     Ok(if args.json {
         report.to_json()
     } else {

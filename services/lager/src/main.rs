@@ -66,7 +66,7 @@ use crate::steer::{Obstacle, Operator};
 use crate::voice::Speaker;
 
 fn main() -> ExitCode {
-    lager_benches::cast::play_if_asked();
+    lager_benches::run_if_asked();
     let cli = Cli::from_arg_matches(&cli::help::command().get_matches())
         .unwrap_or_else(|error| error.exit());
     let mut speaker = Speaker::Tool;

@@ -3,11 +3,12 @@
 
 use std::time::Instant;
 
+use lager_rig::interrupted;
+
 use super::{Answer, FOLLOW, IN_A_ROW, Robot, UP_WITHIN};
 use crate::error::BenchError;
-use crate::parts::interrupted;
 use crate::path::pace::{ANSWER_WITHIN, Chain};
-use crate::path::players::{RealTime, bus_error};
+use crate::path::services::{RealTime, bus_error};
 use crate::path::stages::Counted;
 
 impl Chain for Robot {

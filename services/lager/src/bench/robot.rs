@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use lager_benches::{BenchError, Domain, heed_interrupts, interrupted};
+use lager_benches::{BenchError, Domain, FAMILY, heed_interrupts, interrupted};
 use lager_ports::{Bus, StopPage, StopTold, StopWord};
 use lager_topics::{Ask, AskKind, Role};
 use rustix::process::{Pid, Signal, kill_process};
@@ -83,7 +83,7 @@ impl Robot {
     /// With more flags for `up`.
     pub(super) fn start_with(flags: &[&str]) -> Result<Self> {
         heed_interrupts();
-        let domain = Domain::new()?;
+        let domain = Domain::new(FAMILY)?;
         let config = domain.config();
         let place = config.place()?;
         let [sensor, steering] = ["sensor", "steering"].map(|name| place.folder().join(name));

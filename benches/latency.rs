@@ -1,0 +1,46 @@
+//! `latency/<what>/<mode>/<row>`: every row of every scenario on two cores, as `lager bench` has it.
+//! criterion measures one after the other, so compare what `lager bench` prints, where they take
+//! turns.
+
+use std::time::Duration;
+
+use criterion::{Criterion, SamplingMode};
+use lager_benches::{Options, Regime, Scenario, Session};
+
+fn main() {
+    lager_benches::run_if_asked();
+    let mut criterion = Criterion::default().configure_from_args();
+    let options = Options {
+        regimes: vec![Regime::Plain],
+        ..Options::default()
+    };
+    for scenario in Scenario::ALL {
+        for group in scenario.groups(&options) {
+            let mut benches = criterion.benchmark_group(format!("latency/{}", group.what));
+            benches
+                .sampling_mode(SamplingMode::Flat)
+                .sample_size(10)
+                .warm_up_time(Duration::from_millis(100))
+                .measurement_time(Duration::from_secs(1));
+            // Opened when it is measured: a name that was filtered out starts no process.
+            let mut session: Option<Box<dyn Session>> = None;
+            for (index, entry) in group.entries.iter().enumerate() {
+                let name = format!("{}/{}", entry.mode, entry.label());
+                benches.bench_function(name, |bencher| {
+                    bencher.iter_custom(|samples| {
+                        let session = session.get_or_insert_with(|| {
+                            group.open().unwrap_or_else(|error| panic!("{error}"))
+                        });
+                        let samples = usize::try_from(samples).unwrap_or(usize::MAX);
+                        match session.round(index, samples) {
+                            Ok(times) => Duration::from_nanos(times.iter().sum()),
+                            Err(error) => panic!("{error}"),
+                        }
+                    });
+                });
+            }
+            benches.finish();
+        }
+    }
+    criterion.final_summary();
+}

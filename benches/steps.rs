@@ -1,0 +1,92 @@
+//! `codec/*`, `publish/*`, `receive`, `decide` and `arbitrate`: the steps of the path within this
+//! process (`lager_benches::steps`), in time. What they take of the processor is counted by
+//! `instructions`, which a busy machine does not disturb.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use lager_benches::steps::{self, Ports, a_second_of_bytes, a_second_of_packets};
+
+/// Beside decoding stands copying the same bytes, which is the least any decoder can do.
+fn codec(criterion: &mut Criterion) {
+    let (bytes, packets) = (a_second_of_bytes(), a_second_of_packets());
+    let mut group = criterion.benchmark_group("codec");
+    group.throughput(Throughput::Elements(packets.len() as u64));
+    group.bench_function("decode/baseline-copy", |bencher| {
+        let mut target = vec![0; bytes.len()];
+        bencher.iter(|| {
+            for (to, from) in target.iter_mut().zip(black_box(&bytes)) {
+                *to = *from;
+            }
+            black_box(&target);
+        });
+    });
+    group.bench_function("decode/version-1", |bencher| {
+        bencher.iter(|| assert_eq!(steps::decode(&bytes), packets.len()));
+    });
+    group.bench_function("encode/version-1", |bencher| {
+        bencher.iter(|| steps::encode(&packets));
+    });
+    group.finish();
+}
+
+/// How long `step` takes so many times, each time after `before`.
+fn timed(
+    samples: u64,
+    ports: &mut Ports,
+    before: impl Fn(&mut Ports),
+    step: impl Fn(&mut Ports),
+) -> Duration {
+    let mut total = Duration::ZERO;
+    for _ in 0..samples {
+        before(ports);
+        let start = Instant::now();
+        step(ports);
+        total += start.elapsed();
+    }
+    total
+}
+
+/// Nobody's queue is ever full: what was published before is received first.
+fn publish(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("publish");
+    for subscribers in [1, 8, 64] {
+        group.bench_function(format!("to-{subscribers}"), |bencher| {
+            let mut ports = Ports::meet(subscribers);
+            let drain = |ports: &mut Ports| {
+                ports.drain();
+            };
+            bencher
+                .iter_custom(|samples| timed(samples, &mut ports, drain, |ports| ports.publish()));
+        });
+    }
+    group.finish();
+}
+
+fn receive(criterion: &mut Criterion) {
+    criterion.bench_function("receive", |bencher| {
+        let mut ports = Ports::meet(1);
+        let publish = |ports: &mut Ports| ports.publish();
+        let receive = |ports: &mut Ports| assert!(ports.receive().is_some());
+        bencher.iter_custom(|samples| timed(samples, &mut ports, publish, receive));
+    });
+}
+
+/// One iteration decides on the line frames of a second.
+fn decide(criterion: &mut Criterion) {
+    criterion.bench_function("decide/second-of-frames", |bencher| {
+        let decide = |navigator: &mut _| steps::navigate(navigator, Duration::ZERO);
+        bencher.iter_batched_ref(steps::driving, decide, BatchSize::SmallInput);
+    });
+}
+
+fn arbitrate(criterion: &mut Criterion) {
+    criterion.bench_function("arbitrate/new-order", |bencher| {
+        let arbitrate = |arbiter: &mut _| steps::arbitrate(arbiter, 2);
+        bencher.iter_batched_ref(steps::steering, arbitrate, BatchSize::SmallInput);
+    });
+}
+
+criterion_group!(benches, codec, publish, receive, decide, arbitrate);
+criterion_main!(benches);
