@@ -10,6 +10,7 @@ use core::cell::Cell;
 use core::time::Duration;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -101,6 +102,14 @@ impl Clock {
         let now = clock_gettime(ClockId::Monotonic);
         // The kernel's monotonic clock starts at 0 with the machine and is never negative.
         now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+    }
+
+    /// What is added to a time of `CLOCK_MONOTONIC` to get ns since 1970, now. Whoever shows dates
+    /// for a while takes it once, so that a calendar that is set meanwhile does not bend them.
+    pub fn unix_offset_ns() -> i64 {
+        let unix = SystemTime::now().duration_since(UNIX_EPOCH);
+        let unix = unix.map_or(0, |since| since.as_nanos() as i64);
+        unix - Self::monotonic_ns() as i64
     }
 
     fn follow(&self, page: &Page, speed: f64, monotonic_ns: u64) -> Duration {

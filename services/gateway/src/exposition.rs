@@ -5,7 +5,6 @@
 //! Prometheus makes an age (`time() - ...`) that also grows while the robot is silent.
 
 use std::fmt::{Display, Write};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use lager_ports::{Clock, Stop};
 use lager_topics::{BoardHealth, Coded, Durations, Hold, Mode, Phase, StopCause};
@@ -20,7 +19,7 @@ pub(crate) fn text(figures: &Figures, stop: Option<Option<Stop>>) -> String {
     let mut text = Text {
         out: String::with_capacity(32 << 10),
         robot: figures.robot.clone(),
-        unix_offset_ns: unix_offset_ns(),
+        unix_offset_ns: Clock::unix_offset_ns(),
     };
     let mut build = text.gauge("lager_build_info", "1, with the version of the gateway.");
     build.add(&[("version", env!("CARGO_PKG_VERSION"))], 1);
@@ -260,13 +259,6 @@ fn processes(text: &mut Text, figures: &Figures) {
         let labels = [("role", process.role.as_str()), ("pid", &pid)];
         memory.add(&labels, process.resident_bytes);
     }
-}
-
-/// What is added to a time of CLOCK_MONOTONIC to get ns since 1970, now.
-fn unix_offset_ns() -> i64 {
-    let unix = SystemTime::now().duration_since(UNIX_EPOCH);
-    let unix = unix.map_or(0, |since| since.as_nanos() as i64);
-    unix - Clock::monotonic_ns() as i64
 }
 
 /// The text as far as it is written.

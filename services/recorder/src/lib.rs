@@ -14,14 +14,13 @@
 //! (lost, from the stamps), or find the queue full because the disk is slow (dropped). Both stand in
 //! each message and in the file's counts.
 //!
-//! **What survives.** The keeper ends a chunk and calls `fdatasync` five times a second. A recorder
+//! **What survives.** The keeper ends a chunk and calls `fdatasync` every 150 ms. A recorder
 //! that is killed loses at most what came since, and its file needs `lager bag recover`. On a full
 //! disk the file is ended in room that was reserved beforehand, so it is whole.
 //!
 //! **A player moves nothing.** See `play.rs`.
 
 mod bag;
-mod clock;
 mod config;
 mod disk;
 mod error;

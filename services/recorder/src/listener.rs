@@ -5,12 +5,9 @@ use std::sync::Arc;
 
 use lager_journal::{Envelope, EnvelopeSchema, Times};
 use lager_ports::{Bus, Clock, Layout, Look, PortError, ReceiveError, Source, Watchdog};
-use lager_topics::{
-    Description, Field, Make, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, describe, visit,
-};
+use lager_topics::{Description, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, visit};
 use serde::Serialize;
 
-use crate::clock::to_unix;
 use crate::error::RecordError;
 use crate::tally::{Item, QueueIn, Topic, Topics};
 
@@ -45,8 +42,8 @@ impl Timing {
         let now = Clock::monotonic_ns().max(self.began_ns);
         let log = stamp.publish_time_ns.clamp(self.began_ns, now);
         Times {
-            log: to_unix(log, self.offset_ns),
-            publish: to_unix(stamp.publish_time_ns, self.offset_ns),
+            log: log.saturating_add_signed(self.offset_ns),
+            publish: stamp.publish_time_ns.saturating_add_signed(self.offset_ns),
         }
     }
 }
@@ -170,14 +167,9 @@ impl TopicVisitor for Open<'_, '_> {
     fn visit<T: TableTopic>(self) -> Self::Output {
         let listener = self.listener;
         let from = listener.bus.subscriber::<T>()?;
-        Ok(listener.feed(from, T::NAME, schema(&T::Payload::MAKE)))
+        let schema = EnvelopeSchema::of(&Description::of::<T::Payload>());
+        Ok(listener.feed(from, T::NAME, schema))
     }
-}
-
-/// The schema of a topic of the table, by the same way as that of any other topic.
-fn schema(make: &Make) -> EnvelopeSchema {
-    let description = Description::parse(&describe(make)).expect("our own description");
-    EnvelopeSchema::of(&description)
 }
 
 struct FeedOf<S> {

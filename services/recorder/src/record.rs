@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 use lager_journal::{Count, Start};
 use lager_ports::{Bus, Clock, Shutdown, Watchdog};
 
-use crate::clock::unix_offset_ns;
 use crate::config::RecordConfig;
 use crate::error::RecordError;
 use crate::keeper::Keeper;
@@ -89,7 +88,7 @@ pub fn record(
     let began = Instant::now();
     let topics = Topics::default();
     let times = Timing {
-        offset_ns: unix_offset_ns(),
+        offset_ns: Clock::unix_offset_ns(),
         began_ns: Clock::monotonic_ns(),
     };
     let start = Start {

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_topics::{
-    Description, Event, Field, Make, MissionEvent, NavStatus, NavigatorStatus, Origin, Payload,
-    Sent, SteeringCommand, SteeringOrder, StructInfo, ToldInputs, Topic, bytes_of, describe,
+    Description, Event, Field, MissionEvent, NavStatus, NavigatorStatus, Origin, Payload, Sent,
+    SteeringCommand, SteeringOrder, ToldInputs, Topic, bytes_of,
 };
 
 use super::outcome::{Compared, OfTopic, SampleDifference, VerifyError};
@@ -30,9 +30,7 @@ pub(super) fn must_fit_as_compared(topic: &str, schema: &[u8]) -> Result<(), Ver
 
 /// Refuses samples that this build lays out otherwise.
 pub(super) fn must_fit<P: Payload>(topic: &'static str, schema: &[u8]) -> Result<(), VerifyError> {
-    let make = Make::Record(StructInfo::of::<P>());
-    let description = Description::parse(&describe(&make)).expect("our own description");
-    match EnvelopeSchema::of(&description).fits(schema) {
+    match EnvelopeSchema::of(&Description::of::<P>()).fits(schema) {
         true => Ok(()),
         false => Err(VerifyError::Layout { topic }),
     }
