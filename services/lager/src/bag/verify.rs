@@ -147,8 +147,8 @@ fn gap(gap: &Gap) -> String {
     match gap.why {
         Why::BegunBefore => format!(
             "not verified: {inputs} inputs from the begin on. The navigator had begun before the \
-             recording, and is verified from its begin only: start `lager bag record --wait` before \
-             `lager up`"
+             recording, and only at its begin is all told that it knows: start `lager bag record \
+             --wait` before `lager up`"
         ),
         Why::Missing(samples) => format!(
             "not verified: {inputs} inputs from {at} s on, since {samples} samples of nav/inputs are \
