@@ -6,18 +6,18 @@ import ctypes
 import json
 import keyword
 import os
-from types import TracebackType
-from typing import Any, AsyncIterator, Dict, Generic, Iterator, List, Optional, Type, TypeVar, Union
+from typing import Any, AsyncIterator, Dict, Generic, Iterator, Optional, TypeVar, Union
 
 from ._errors import NoRecording, OtherLayout, Unread
 from ._layout import Layout, TopicEntry
+from ._open import Open
 from ._reader import Reader, Sample
-from .layouts import TOPICS, ByName, Stamp
+from .layouts import Stamp
 
 P = TypeVar("P", bound=Layout)
 
 
-class Bag(ByName):
+class Bag(Open):
     """The recording in `path`, which `lager bag record` has made.
 
     `bag.topic("sensor/line")` reads a topic from its first sample to its last. Use it as a context
@@ -30,8 +30,8 @@ class Bag(ByName):
             from mcap.reader import make_reader
         except ImportError as error:
             raise NoRecording("recordings need mcap: pip install './bus/python[bag]'") from error
+        super().__init__()
         self.path = os.fspath(path)
-        self._readers: List[FileReader[Any]] = []
         try:
             self._file = open(self.path, "rb")
         except OSError as error:
@@ -73,31 +73,13 @@ class Bag(ByName):
 
     def close(self) -> None:
         """Closes the file. What was not copied is gone."""
-        for reader in self._readers:
-            reader.close()
-        self._readers.clear()
+        super().close()
         self._file.close()
 
-    def __enter__(self) -> Bag:
-        return self
-
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
-        self.close()
-
-    def _open(self, name: str) -> Reader[Any]:
-        entry = TOPICS.get(name)
-        if entry is None:
-            raise Unread(f"there is no topic `{name}`; the topics are {' '.join(TOPICS)}")
+    def _read(self, entry: TopicEntry) -> Reader[Any]:
         if self._file.closed:
             raise Unread("this recording is closed")
-        reader: FileReader[Any] = FileReader(self.path, entry, self._is_first)
-        self._readers.append(reader)
-        return reader
+        return FileReader(self.path, entry, self._is_first)
 
 
 class FileReader(Reader[P], Generic[P]):

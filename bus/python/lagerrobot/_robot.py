@@ -8,16 +8,16 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import re
-from types import TracebackType
-from typing import Any, List, Literal, Optional, Type, Union
+from typing import Any, Literal, Optional, Union
 
 import iceoryx2 as iox2
 
 from . import _orders, _place
 from ._errors import NoBus, NotOperator, OtherLayout, OtherVersion, Unread
 from ._layout import TopicEntry
+from ._open import Open
 from ._reader import Reader
-from .layouts import TOPICS, ByName, Stamp
+from .layouts import Stamp
 
 # All processes on one bus need this one.
 ICEORYX2 = "0.10.0"
@@ -33,7 +33,7 @@ _NAME = re.compile(r"[a-z0-9-]{1,24}")
 _OTHER = ("Incompatible", "DoesNotSupportRequested")
 
 
-class Robot(ByName):
+class Robot(Open):
     """The robot called `name`, on this user's bus or on the one that lives in the folder `bus`.
 
     `robot.topic("sensor/line")` reads a topic. Use it as a context manager, or `close` it; it stays
@@ -50,6 +50,7 @@ class Robot(ByName):
         role: Literal["observer", "operator"] = "observer",
         lager: str = "lager",
     ) -> None:
+        super().__init__()
         _check_version()
         if not _NAME.fullmatch(name) or name.startswith("iceoryx2"):
             raise NoBus(f"`{name}` is no robot's name: 1 to 24 of a-z, 0-9 and -")
@@ -60,7 +61,6 @@ class Robot(ByName):
         self._lager = lager
         self._place = _place.find(bus)
         self._port_name = f"observer/{os.getpid()}"
-        self._readers: List[Reader[Any]] = []
         builder = iox2.NodeBuilder.new().config(self._config())
         builder = builder.name(iox2.NodeName.new(f"lager/{name}/{self._port_name}"))
         builder = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled)
@@ -82,26 +82,10 @@ class Robot(ByName):
 
     def close(self) -> None:
         """Leaves the bus; every sample is given back."""
-        for reader in self._readers:
-            reader.close()
-        self._readers.clear()
+        super().close()
         self._node = None
 
-    def __enter__(self) -> Robot:
-        return self
-
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
-        self.close()
-
-    def _open(self, name: str) -> Reader[Any]:
-        entry = TOPICS.get(name)
-        if entry is None:
-            raise Unread(f"there is no topic `{name}`; the topics are {' '.join(TOPICS)}")
+    def _read(self, entry: TopicEntry) -> Reader[Any]:
         if self._node is None:
             raise Unread("this robot is closed")
         service = self._service(self._node, entry)
@@ -109,10 +93,8 @@ class Robot(ByName):
         # Services have places of their own beyond these, which looking must never take.
         if service.dynamic_config.number_of_subscribers > _OBSERVERS:
             port.delete()
-            raise Unread(f"`{name}` has {_OBSERVERS} readers already; end one of them")
-        reader: Reader[Any] = Reader(port, entry, self._check_there)
-        self._readers.append(reader)
-        return reader
+            raise Unread(f"`{entry.name}` has {_OBSERVERS} readers already; end one of them")
+        return Reader(port, entry, self._check_there)
 
     def _service(self, node: Any, entry: TopicEntry) -> Any:
         qos = entry.qos
