@@ -39,6 +39,9 @@ const NEEDY: [&[&str]; 26] = [
     &["topic", "list"],
 ];
 
+/// So many of them run at once.
+const SOME: usize = 7;
+
 /// A tool is to end within 3 s. A machine that is busy with other things is given more.
 const LONG: Duration = Duration::from_secs(20);
 
@@ -141,8 +144,8 @@ fn end(words: &[&str], mut tool: Child, began: Instant) -> Output {
 fn no_tool_hangs_on_a_bus_that_does_not_answer() {
     let domain = Domain::new();
     let frozen = Frozen::new(&domain);
-    // A few at a time: the machine has few cores, and what hangs in the transport takes one.
-    for some in NEEDY.chunks(3) {
+    // Some at a time: the machine has few cores, and what hangs in the transport takes one.
+    for some in NEEDY.chunks(SOME) {
         let tools: Vec<_> = some
             .iter()
             .map(|words| (*words, spawn(&domain, words), Instant::now()))
@@ -165,15 +168,17 @@ fn no_tool_hangs_on_a_bus_that_does_not_answer() {
 fn one_ctrl_c_ends_every_tool_also_while_the_bus_does_not_answer() {
     let domain = Domain::new();
     let frozen = Frozen::new(&domain);
-    for words in NEEDY {
-        let mut tool = spawn(&domain, words);
-        // It listens to signals once it has its watch; before that any signal ends it.
-        std::thread::sleep(Duration::from_millis(200));
-        let began = Instant::now();
-        if tool.try_wait().expect("a child").is_none() {
-            kill_process(pid(tool.id()), Signal::INT).expect("a child of ours");
+    for some in NEEDY.chunks(SOME) {
+        let tools: Vec<_> = some.iter().map(|words| spawn(&domain, words)).collect();
+        // They listen to signals once they have their watch; before that any signal ends them.
+        std::thread::sleep(Duration::from_millis(400));
+        for (words, mut tool) in some.iter().zip(tools) {
+            let began = Instant::now();
+            if tool.try_wait().expect("a child").is_none() {
+                kill_process(pid(tool.id()), Signal::INT).expect("a child of ours");
+            }
+            end(words, tool, began);
         }
-        end(words, tool, began);
     }
     drop(frozen);
 }

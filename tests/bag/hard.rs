@@ -12,7 +12,7 @@ use lager_topics::{LineFrame, SensorLine};
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::{Noisy, done, end, guest, read, recorder, said};
+use crate::{Noisy, done, end, guest, info, must_be_right, must_be_swept, read, recorder, said};
 
 /// What `kill -9` may take at the most.
 const LOST_BY_A_KILL: Duration = Duration::from_millis(300);
@@ -39,7 +39,7 @@ fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
         let file = format!("{kill}.mcap");
         let mut recorder = recorder(&domain, &["--topic", "noise/now", &file]);
         noisy.meet(&recorder);
-        // No two kills meet a flush, which comes every 200 ms, at the same place.
+        // No two kills meet a flush, which comes every 150 ms, at the same place.
         let end = Instant::now() + Duration::from_millis(450 + kill * 617 % 400);
         let mut next = Instant::now();
         while next < end {
@@ -72,10 +72,7 @@ fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
         assert!(longest <= LOST_BY_A_KILL, "a kill took {longest:?}");
     }
     drop(bus);
-    wait_for("the killed ones to be swept", || {
-        let _ = domain.run(&["doctor", "--fix"]);
-        domain.leftovers().is_empty().then_some(())
-    });
+    must_be_swept(&domain);
 }
 
 /// Starts `lager bag record` with `args` onto a disk of its own with so many KiB, of which a copy is
@@ -101,6 +98,15 @@ pub(crate) fn record_on_a_small_disk(domain: &Domain, kib: u32, args: &[&str]) -
         .expect("`unshare` is there")
 }
 
+/// A recorder on such a disk has ended, says why, and has left a file that is right.
+pub(crate) fn must_have_filled_its_disk(domain: &Domain, recorder: Child) {
+    let output = recorder.wait_with_output().expect("a child");
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("the disk is full"), "{told}");
+    must_be_right(domain, "full.mcap");
+}
+
 #[test]
 fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
     let domain = Domain::new();
@@ -111,7 +117,7 @@ fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
         "--mission",
         "1",
         "--speed",
-        "2",
+        "4",
         "--exit-when-done",
         "--json",
         "--no-station",
@@ -121,14 +127,9 @@ fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
     });
     // The robot has not come to the end yet: the recorder was with it.
     assert!(up.is_running(), "{}", up.log());
-    let output = recorder.wait_with_output().expect("a child");
-    let told = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("the disk is full"), "{told}");
+    must_have_filled_its_disk(&domain, recorder);
     assert_eq!(up.wait(), Some(0), "{}", up.log());
     assert_eq!(up.json()["delivered"], serde_json::json!([1]));
-    let checked = done(&domain, &["bag", "check", "full.mcap"]);
-    assert!(checked.contains("every number is right"), "{checked}");
     let seen = read(&domain.folder().join("full.mcap"));
     assert!(seen.messages.len() > 500, "{}", seen.messages.len());
     domain.assert_clean();
@@ -179,14 +180,13 @@ fn what_finds_the_queue_full_is_told_live_and_in_the_file() {
         .sum::<u64>();
     let behind = noisy.sent - 1 - numbers.last().expect("samples");
     assert_eq!(skipped + behind, lost + dropped, "{told}");
-    let info = done(&domain, &["bag", "--json", "info", "slow.mcap"]);
-    let info: Value = serde_json::from_str(&info).expect("JSON");
+    let info = info(&domain, "slow.mcap");
     assert_eq!(
         info["topics"][0]["dropped"].as_u64(),
         Some(dropped),
         "{info}"
     );
-    let checked = done(&domain, &["bag", "check", "slow.mcap"]);
+    let checked = must_be_right(&domain, "slow.mcap");
     assert!(
         checked.contains(&format!("{dropped} dropped by it")),
         "{checked}"
@@ -224,15 +224,13 @@ fn ten_thousand_frames_a_second_are_all_recorded_or_counted() {
     let took = begun.elapsed();
     std::thread::sleep(Duration::from_millis(300));
     end(recorder);
-    let info = done(&domain, &["bag", "--json", "info", "fast.mcap"]);
-    let info: Value = serde_json::from_str(&info).expect("JSON");
+    let info = info(&domain, "fast.mcap");
     let topic = &info["topics"][0];
     let [messages, lost, dropped] =
         ["messages", "lost", "dropped"].map(|what| topic[what].as_u64().expect("a number"));
     println!("{frames} frames in {took:?}: {messages} in the file, {lost} lost, {dropped} dropped");
     assert_eq!(messages + lost + dropped, frames, "{info}");
-    let checked = done(&domain, &["bag", "check", "fast.mcap"]);
-    assert!(checked.contains("every number is right"), "{checked}");
+    must_be_right(&domain, "fast.mcap");
     if seconds.is_some() {
         assert_eq!((lost, dropped), (0, 0), "{info}");
     }
