@@ -5,6 +5,7 @@ mod cable;
 mod compare;
 
 use std::fs;
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,7 +18,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 pub use cable::Cable;
-pub use compare::compare;
+pub use compare::{compare, compare_on_robot};
 
 /// How long a test waits for anything before it calls it stuck. It bounds a hang; it measures
 /// nothing.
@@ -256,6 +257,16 @@ impl Default for Domain {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// An address of this machine that is free at this moment.
+///
+/// # Panics
+/// When there is none.
+#[must_use]
+pub fn free() -> String {
+    let socket = TcpListener::bind("127.0.0.1:0").expect("a port");
+    socket.local_addr().expect("an address").to_string()
 }
 
 /// A running `lager`, killed when dropped.

@@ -1,6 +1,8 @@
 //! `lager topic` and `lager top` on topics of one's own and beside a robot: what is measured, what may
 //! be published, and that a topic that loses samples is seen at once.
 
+mod listened;
+
 use std::io::Write;
 use std::process::{Output, Stdio};
 use std::time::Duration;
