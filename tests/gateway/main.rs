@@ -1,19 +1,15 @@
 //! `lager gateway`: what a robot that is up shows to programs outside.
 
+mod live;
+
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use lager_tests::{Domain, pid, wait_for};
+use lager_tests::{Domain, free, pid, wait_for};
 use rustix::process::{Signal, kill_process};
-
-/// An address that is free at this moment.
-fn free() -> String {
-    let socket = TcpListener::bind("127.0.0.1:0").expect("a port");
-    socket.local_addr().expect("an address").to_string()
-}
 
 /// What is answered to a request; `None` while nobody listens.
 fn asked(address: &str, host: &str) -> Option<String> {

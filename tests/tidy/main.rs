@@ -41,7 +41,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["lager-ports", "lager-topics", "lager-wire"],
     ),
     ("lager-monitor", &["lager-ports", "lager-topics"]),
-    ("lager-gateway", &["lager-ports", "lager-topics"]),
+    (
+        "lager-gateway",
+        &["lager-journal", "lager-ports", "lager-topics"],
+    ),
     (
         "lager-recorder",
         &["lager-journal", "lager-ports", "lager-topics"],

@@ -15,6 +15,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use lager_ports::StopWord;
+use tokio::runtime::Runtime;
 
 use crate::Shared;
 use crate::exposition::{self, MEDIA_TYPE};
@@ -22,24 +23,33 @@ use crate::exposition::{self, MEDIA_TYPE};
 /// How often the end is looked for.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Answers until `over` is set.
-pub(crate) fn serve(listener: TcpListener, shared: Shared, over: &AtomicBool) -> io::Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()?;
-    runtime.block_on(async {
+/// Serves everybody until `over` is set: who asks for figures, if there is a `listener`, and whoever
+/// else is served in `runtime`.
+pub(crate) fn serve(
+    runtime: &Runtime,
+    listener: Option<TcpListener>,
+    shared: Shared,
+    over: &AtomicBool,
+) -> io::Result<()> {
+    let served = async {
+        let Some(listener) = listener else {
+            return std::future::pending().await;
+        };
         let listener = tokio::net::TcpListener::from_std(listener)?;
         let router = Router::new()
             .route("/metrics", get(metrics))
             .fallback(nothing)
             .with_state(shared);
+        axum::serve(listener, router).await
+    };
+    runtime.block_on(async {
         let ended = async {
             while !over.load(Ordering::Relaxed) {
                 tokio::time::sleep(LOOK).await;
             }
         };
         tokio::select! {
-            served = axum::serve(listener, router) => served,
+            served = served => served,
             () = ended => Ok(()),
         }
     })

@@ -1,8 +1,9 @@
-//! The bus to the outside: figures for Prometheus.
+//! The bus to the outside: figures for Prometheus, and live views for Foxglove.
 //!
 //! ```text
 //!            2 ms                              on request
 //!   bus ───────────> listener ──> Figures <──────────────── /metrics: Prometheus
+//!                       └───────> Live ───── as they come ─────────> Foxglove
 //! ```
 //!
 //! - `listener`: polls every topic, also those that are opened later. It is an observer: nobody
@@ -10,6 +11,8 @@
 //! - `figures`: what is known of the robot, from stamps and from what bridge and logic publish.
 //! - `exposition`: that as Prometheus text.
 //! - `http`: the server, in a thread of its own.
+//! - `live`: every sample in JSON, and what people look at, for viewers; only with the feature
+//!   `foxglove`.
 //! - `processes`: what each process of the robot takes of the machine.
 //!
 //! It never writes to the bus, and nobody waits for it. Whoever asks gets what was known at the last
@@ -21,6 +24,8 @@ mod exposition;
 mod figures;
 mod http;
 mod listener;
+#[cfg(feature = "foxglove")]
+mod live;
 mod processes;
 
 use std::io;
@@ -29,26 +34,45 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lager_ports::{Bus, IntrospectError, ReceiveError, Shutdown, StopPage, Watchdog};
+use tokio::runtime::Runtime;
 
 use figures::Figures;
+use listener::Viewer;
 
 /// Where Prometheus finds the figures unless somebody says otherwise.
 pub const USUAL_METRICS: &str = "127.0.0.1:7430";
 
+/// Where Foxglove looks for a robot unless somebody says otherwise.
+pub const USUAL_FOXGLOVE: &str = "127.0.0.1:8765";
+
+/// Whether this program was built with the server for Foxglove.
+pub const HAS_FOXGLOVE: bool = cfg!(feature = "foxglove");
+
 /// The dashboard for Grafana, to be imported there: every query in it is of a figure that there is.
 pub const DASHBOARD: &str = include_str!("../grafana.json");
+
+/// The layout for Foxglove, to be imported there: every topic and field in it is one that there is.
+pub const LAYOUT: &str = include_str!("../foxglove.json");
 
 /// Why there is no gateway.
 #[derive(Debug, thiserror::Error)]
 pub enum GatewayError {
-    /// The address cannot be had.
-    #[error("the metrics cannot be had at {address}: {error}; choose another one with --metrics")]
+    /// An address cannot be had.
+    #[error("{address} cannot be had: {error}; choose another address with {flag}")]
     Listen {
+        /// What chooses it.
+        flag: &'static str,
         /// Which.
         address: SocketAddr,
         /// Why.
         error: io::Error,
     },
+    /// The program cannot speak to Foxglove.
+    #[error(
+        "this program was built without what speaks to Foxglove; build one that has it with \
+         `cargo build --release --features foxglove`"
+    )]
+    NoFoxglove,
     /// The system does not let it run.
     #[error("the gateway cannot run: {0}")]
     Run(#[from] io::Error),
@@ -63,36 +87,92 @@ pub enum GatewayError {
     Cleared,
 }
 
-/// A gateway that has its address and does not answer yet.
-#[derive(Debug)]
+impl GatewayError {
+    fn listen(flag: &'static str, address: SocketAddr, error: io::Error) -> Self {
+        Self::Listen {
+            flag,
+            address,
+            error,
+        }
+    }
+}
+
+/// Where programs outside find the robot. Everybody who reaches an address may look; nobody can do
+/// anything else there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Addresses {
+    /// The figures for Prometheus.
+    pub metrics: Option<SocketAddr>,
+    /// The live views for Foxglove.
+    pub foxglove: Option<SocketAddr>,
+}
+
+impl Addresses {
+    /// Refuses addresses that a gateway could not have at this moment.
+    ///
+    /// # Errors
+    /// One is taken, or this program cannot speak to Foxglove.
+    pub fn may_be_had(&self) -> Result<(), GatewayError> {
+        if self.foxglove.is_some() && !HAS_FOXGLOVE {
+            return Err(GatewayError::NoFoxglove);
+        }
+        let wanted = [("--metrics", self.metrics), ("--foxglove", self.foxglove)];
+        // Held together, as one address cannot be both.
+        let mut held = Vec::new();
+        for (flag, address) in wanted {
+            if let Some(address) = address {
+                held.push(bind(flag, address)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn bind(flag: &'static str, address: SocketAddr) -> Result<TcpListener, GatewayError> {
+    TcpListener::bind(address).map_err(|error| GatewayError::listen(flag, address, error))
+}
+
+/// A gateway that has its addresses and does not answer yet.
 pub struct Gateway {
-    metrics: TcpListener,
+    runtime: Runtime,
+    at: Addresses,
+    metrics: Option<TcpListener>,
+    viewer: Option<Box<dyn Viewer>>,
 }
 
 impl Gateway {
-    /// Listens at `metrics`. Everybody who reaches that address may read the figures; nobody can
-    /// do anything else there.
+    /// Listens at the addresses that are `wanted`, for whoever wants to look at `robot`.
     ///
     /// # Errors
-    /// The address cannot be had.
-    pub fn open(metrics: SocketAddr) -> Result<Self, GatewayError> {
-        let listener = TcpListener::bind(metrics).and_then(|listener| {
+    /// An address cannot be had, or this program cannot speak to Foxglove.
+    pub fn open(wanted: Addresses, robot: &str) -> Result<Self, GatewayError> {
+        let mut runtime = tokio::runtime::Builder::new_current_thread();
+        let runtime = runtime.enable_all().build()?;
+        let mut at = Addresses::default();
+        let mut metrics = None;
+        if let Some(address) = wanted.metrics {
+            let listener = bind("--metrics", address)?;
             listener.set_nonblocking(true)?;
-            Ok(listener)
-        });
-        let metrics = listener.map_err(|error| GatewayError::Listen {
-            address: metrics,
-            error,
-        })?;
-        Ok(Self { metrics })
+            at.metrics = Some(listener.local_addr()?);
+            metrics = Some(listener);
+        }
+        let mut viewer = None;
+        if let Some(address) = wanted.foxglove {
+            let (live, address) = open_live(address, robot, &runtime)?;
+            at.foxglove = Some(address);
+            viewer = Some(live);
+        }
+        Ok(Self {
+            runtime,
+            at,
+            metrics,
+            viewer,
+        })
     }
 
     /// Where it answers.
-    ///
-    /// # Errors
-    /// The system does not say.
-    pub fn address(&self) -> io::Result<SocketAddr> {
-        self.metrics.local_addr()
+    pub fn addresses(&self) -> Addresses {
+        self.at
     }
 
     /// Reads the robot of `bus` and answers until `shutdown` is requested.
@@ -113,19 +193,39 @@ impl Gateway {
         std::thread::scope(|scope| {
             let served = {
                 let shared = shared.clone();
-                let (over, metrics) = (&over, self.metrics);
+                let (over, runtime, metrics) = (&over, &self.runtime, self.metrics);
                 std::thread::Builder::new()
                     .name("http".to_owned())
-                    .spawn_scoped(scope, move || http::serve(metrics, shared, over))?
+                    .spawn_scoped(scope, move || http::serve(runtime, metrics, shared, over))?
             };
-            let listened =
-                listener::listen(bus, watchdog, shutdown, &shared, || served.is_finished());
+            let is_over = || served.is_finished();
+            let listened = listener::listen(bus, watchdog, shutdown, &shared, self.viewer, is_over);
             over.store(true, Ordering::Relaxed);
             let served = served.join().expect("the server does not panic");
             listened?;
             Ok(served?)
         })
     }
+}
+
+#[cfg(feature = "foxglove")]
+fn open_live(
+    address: SocketAddr,
+    robot: &str,
+    runtime: &Runtime,
+) -> Result<(Box<dyn Viewer>, SocketAddr), GatewayError> {
+    let live = live::Live::open(address, robot, runtime)?;
+    let address = live.address();
+    Ok((Box::new(live), address))
+}
+
+#[cfg(not(feature = "foxglove"))]
+fn open_live(
+    _address: SocketAddr,
+    _robot: &str,
+    _runtime: &Runtime,
+) -> Result<(Box<dyn Viewer>, SocketAddr), GatewayError> {
+    Err(GatewayError::NoFoxglove)
 }
 
 /// What listener and server share.
@@ -139,5 +239,86 @@ pub(crate) struct Shared {
 impl Shared {
     pub(crate) fn figures(&self) -> MutexGuard<'_, Figures> {
         self.figures.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_journal::View;
+    use lager_topics::{Description, Topic, TopicVisitor, visit};
+    use serde_json::Value;
+
+    use super::LAYOUT;
+
+    struct Describe;
+
+    impl TopicVisitor for Describe {
+        type Output = Description;
+
+        fn visit<T: Topic>(self) -> Description {
+            Description::of::<T::Payload>()
+        }
+    }
+
+    /// What stands at any depth under this name.
+    fn under<'a>(name: &str, value: &'a Value, found: &mut Vec<&'a Value>) {
+        if let Value::Object(members) = value {
+            found.extend(members.get(name));
+        }
+        let members = value.as_object().into_iter().flat_map(|of| of.values());
+        for inner in members.chain(value.as_array().into_iter().flatten()) {
+            under(name, inner, found);
+        }
+    }
+
+    #[test]
+    fn every_topic_and_field_of_the_layout_is_there_and_every_panel_has_its_place() {
+        let layout: Value = serde_json::from_str(LAYOUT).expect("JSON");
+        let panels = &layout["configById"];
+        let of = |names: &[&str]| {
+            let mut found = Vec::new();
+            names
+                .iter()
+                .for_each(|name| under(name, panels, &mut found));
+            found
+        };
+        let is_view = |name: &str| View::ALL.iter().any(|view| view.topic() == name);
+        let mut views = 0;
+        for topics in of(&["topics"]) {
+            for name in topics.as_object().expect("by name").keys() {
+                assert!(is_view(name), "{name}");
+                views += 1;
+            }
+        }
+        for name in of(&["topicToRender"]) {
+            assert!(is_view(name.as_str().expect("a name")), "{name}");
+            views += 1;
+        }
+        assert_eq!(
+            views,
+            View::ALL.len() - 1,
+            "all but the frames, which have no panel"
+        );
+        let paths = of(&["topicPath", "value"]);
+        assert!(paths.len() > 8);
+        for path in paths {
+            let path = path.as_str().expect("a path");
+            let (topic, field) = path.split_once(".payload").expect("a payload");
+            let description = visit(topic, Describe).unwrap_or_else(|_| panic!("{path}"));
+            if let Some(field) = field.strip_prefix('.') {
+                description
+                    .must_have(field)
+                    .unwrap_or_else(|no| panic!("{no}"));
+            }
+        }
+        let mut placed = Vec::new();
+        for side in ["first", "second"] {
+            under(side, &layout["layout"], &mut placed);
+        }
+        let mut placed: Vec<&str> = placed.into_iter().filter_map(Value::as_str).collect();
+        placed.sort_unstable();
+        let mut known: Vec<&String> = panels.as_object().expect("by name").keys().collect();
+        known.sort_unstable();
+        assert_eq!(placed, known);
     }
 }

@@ -4,11 +4,12 @@ use std::any::Any;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
     Bus, Clock, Found, Layout, Look, PortError, ReceiveError, Shutdown, Source, Subscriber,
     Watchdog,
 };
-use lager_topics::{Stamp, TOPICS, Topic, TopicVisitor, visit};
+use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
 use serde::Serialize;
 
 use crate::figures::Figures;
@@ -22,18 +23,32 @@ const LOOK: Duration = Duration::from_secs(1);
 /// So many samples of one topic are taken before the next topic has its turn.
 const TURN: usize = 1_024;
 
+/// Whoever wants every sample as it comes, written as a recording has it.
+pub(crate) trait Viewer {
+    /// A topic is listened to from now on; of a state the last sample lasts.
+    fn open(&mut self, topic: &str, schema: &EnvelopeSchema, is_state: bool);
+
+    /// Whether the next sample of a topic need be written at all.
+    fn wants(&self, topic: &str) -> bool;
+
+    /// Takes a message.
+    fn take(&mut self, topic: &str, stamp: &Stamp, message: &[u8]);
+}
+
 /// Reads every topic until the end is wished for, or `is_over`.
 pub(crate) fn listen(
     bus: &Bus,
     watchdog: &Watchdog,
     shutdown: &Shutdown,
     shared: &Shared,
+    viewer: Option<Box<dyn Viewer>>,
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
     let mut listener = Listener {
         bus,
         watchdog,
         clock: bus.clock(),
+        viewer,
         feeds: Vec::new(),
         opened: BTreeSet::new(),
         refused: BTreeSet::new(),
@@ -58,6 +73,7 @@ struct Listener<'a> {
     bus: &'a Bus,
     watchdog: &'a Watchdog,
     clock: Clock,
+    viewer: Option<Box<dyn Viewer>>,
     feeds: Vec<Box<dyn Feed>>,
     opened: BTreeSet<String>,
     /// Topics that could not be opened, which was said.
@@ -66,12 +82,36 @@ struct Listener<'a> {
 
 /// A topic that is listened to.
 trait Feed {
+    /// How its messages are written, and whether it is a state.
+    fn schema(&self) -> (EnvelopeSchema, bool);
+
     /// Takes what has come.
-    fn drain(
-        &mut self,
-        figures: &mut Figures,
-        real: &dyn Fn(Duration) -> Duration,
-    ) -> Result<(), ReceiveError>;
+    fn drain(&mut self, to: &mut Takers<'_>) -> Result<(), ReceiveError>;
+}
+
+/// Who is told of each sample.
+struct Takers<'a> {
+    figures: &'a mut Figures,
+    real: &'a dyn Fn(Duration) -> Duration,
+    viewer: Option<&'a mut (dyn Viewer + 'static)>,
+}
+
+impl Takers<'_> {
+    /// Of any topic.
+    fn count<P: Serialize>(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: &P) {
+        self.figures.count(topic, stamp, lost);
+        let Some(viewer) = self.viewer.as_mut().filter(|viewer| viewer.wants(topic)) else {
+            return;
+        };
+        let envelope = Envelope {
+            stamp: *stamp,
+            lost,
+            dropped: 0,
+            payload,
+        };
+        let message = serde_json::to_vec(&envelope).expect("a payload is JSON");
+        viewer.take(topic, stamp, &message);
+    }
 }
 
 impl Listener<'_> {
@@ -106,6 +146,10 @@ impl Listener<'_> {
         match opened {
             Ok(Some(feed)) => {
                 self.opened.insert(name.to_owned());
+                if let Some(viewer) = &mut self.viewer {
+                    let (schema, is_state) = feed.schema();
+                    viewer.open(name, &schema, is_state);
+                }
                 self.feeds.push(feed);
             }
             // It went while it was looked at, and may come back.
@@ -121,11 +165,13 @@ impl Listener<'_> {
     fn drain(&mut self, shared: &Shared) -> Result<(), GatewayError> {
         self.watchdog.enter("reading the topics");
         let mut figures = shared.figures();
-        let real = |robot| self.clock.real(robot);
-        let drained = self
-            .feeds
-            .iter_mut()
-            .try_for_each(|feed| feed.drain(&mut figures, &real));
+        let mut to = Takers {
+            figures: &mut figures,
+            real: &|robot| self.clock.real(robot),
+            viewer: self.viewer.as_deref_mut(),
+        };
+        let mut feeds = self.feeds.iter_mut();
+        let drained = feeds.try_for_each(|feed| feed.drain(&mut to));
         self.watchdog.leave();
         Ok(drained?)
     }
@@ -144,47 +190,52 @@ impl TopicVisitor for Open<'_> {
 }
 
 impl<T: Topic> Feed for Subscriber<T> {
-    fn drain(
-        &mut self,
-        figures: &mut Figures,
-        real: &dyn Fn(Duration) -> Duration,
-    ) -> Result<(), ReceiveError> {
+    fn schema(&self) -> (EnvelopeSchema, bool) {
+        let schema = EnvelopeSchema::of(&Description::of::<T::Payload>());
+        (schema, T::QOS.history > 0)
+    }
+
+    fn drain(&mut self, to: &mut Takers<'_>) -> Result<(), ReceiveError> {
         for _ in 0..TURN {
             let Some(sample) = self.receive()? else {
                 break;
             };
-            figures.count(T::NAME, sample.stamp(), self.lost());
             let payload: &T::Payload = &sample;
-            figures.learn(sample.stamp(), payload as &dyn Any, real);
+            to.count(T::NAME, sample.stamp(), self.lost(), payload);
+            let real = to.real;
+            to.figures.learn(sample.stamp(), payload as &dyn Any, real);
         }
         Ok(())
     }
 }
 
 impl Feed for Found {
-    fn drain(
-        &mut self,
-        figures: &mut Figures,
-        _real: &dyn Fn(Duration) -> Duration,
-    ) -> Result<(), ReceiveError> {
+    fn schema(&self) -> (EnvelopeSchema, bool) {
+        (EnvelopeSchema::of(self.description()), false)
+    }
+
+    fn drain(&mut self, to: &mut Takers<'_>) -> Result<(), ReceiveError> {
         let name = self.name().to_owned();
         for _ in 0..TURN {
-            let Some((stamp, lost)) = self.next(Counted)? else {
+            let counting = Counting { name: &name, to };
+            if self.next(counting)?.is_none() {
                 break;
-            };
-            figures.count(&name, &stamp, lost);
+            }
         }
         Ok(())
     }
 }
 
-/// Takes of a sample what its stamp says.
-struct Counted;
+/// Tells of a sample whatever its payload is.
+struct Counting<'a, 'b> {
+    name: &'a str,
+    to: &'a mut Takers<'b>,
+}
 
-impl Look for Counted {
-    type Output = (Stamp, u64);
+impl Look for Counting<'_, '_> {
+    type Output = ();
 
-    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, _payload: &P) -> Self::Output {
-        (*stamp, lost)
+    fn look<P: Serialize>(self, stamp: &Stamp, lost: u64, payload: &P) {
+        self.to.count(self.name, stamp, lost, payload);
     }
 }

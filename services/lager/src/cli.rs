@@ -1,6 +1,7 @@
 //! The command line: every subcommand, flag and example. No behaviour lives here.
 
 mod bag;
+mod gateway;
 pub mod help;
 mod realtime;
 mod top;
@@ -12,10 +13,11 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use lager_benches::{Mode, Regime};
-use lager_gateway::USUAL_METRICS;
+use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS};
 use lager_wire::OperatorCommand;
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
+pub use gateway::GatewayArgs;
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
 pub use top::TopArgs;
 pub use topic::{TopicArgs, TopicCommand};
@@ -287,15 +289,7 @@ that has been connected for longest; what it says of the warehouse is saved. Rob
 GaG are not asked who they are: let only those reach --listen who may drive. A panel that
 others than this machine can reach asks for a token, which is printed once.")]
     Station(StationArgs),
-    /// Show the robot to programs outside: figures for Prometheus
-    #[command(after_help = "Examples:
-  lager gateway                                  figures at http://127.0.0.1:7430/metrics
-  lager gateway --metrics 192.168.1.4:7430       for a Prometheus on another machine
-  lager up --metrics                             the same, started with the robot
-
-It only reads. Whoever reaches the address may read, too, and is not asked who he is. Ask by number,
-not by a name: a name could be one that somebody else has pointed here. services/gateway/grafana.json
-is a dashboard for Grafana.")]
+    /// Show the robot to programs outside: figures for Prometheus, live views for Foxglove
     Gateway(GatewayArgs),
     /// Be the GaG of a station in this terminal: describe the warehouse, choose goods, drive
     #[command(after_help = "Examples:
@@ -424,6 +418,9 @@ pub struct UpArgs {
     /// Show the robot's figures to Prometheus, there or at 127.0.0.1:7430
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, help_heading = "Outside")]
     pub metrics: Option<std::net::SocketAddr>,
+    /// Show the robot live to Foxglove, there or at 127.0.0.1:8765; `lager gateway --help` says more
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, help_heading = "Outside")]
+    pub foxglove: Option<std::net::SocketAddr>,
     /// Let real boards carry out --mission by themselves, with nobody in their way; a simulated or
     /// emulated robot does so anyway
     #[arg(long, help_heading = "Mission")]
@@ -449,17 +446,6 @@ pub struct CommArgs {
     /// Where the external computer listens [default: as configured, or 127.0.0.1:7420]
     #[arg(long, value_name = "HOST:PORT", value_parser = values::address, help_heading = "Station")]
     pub station: Option<String>,
-    /// What every service is told
-    #[command(flatten)]
-    pub service: ServiceArgs,
-}
-
-/// `lager gateway`.
-#[derive(Debug, Args)]
-pub struct GatewayArgs {
-    /// Where Prometheus reads figures [default: as configured, or 127.0.0.1:7430]
-    #[arg(long, value_name = "HOST:PORT", help_heading = "Outside")]
-    pub metrics: Option<std::net::SocketAddr>,
     /// What every service is told
     #[command(flatten)]
     pub service: ServiceArgs,

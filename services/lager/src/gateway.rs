@@ -1,13 +1,12 @@
 //! `lager gateway`: what the robot shows to programs outside, until it is told to end.
 
-use std::net::{SocketAddr, TcpListener};
-
 use anyhow::{Context, Result};
-use lager_gateway::{Gateway, USUAL_METRICS};
+use lager_gateway::{Addresses, Gateway, GatewayError, USUAL_METRICS};
 use lager_ports::{Bus, Shutdown};
 
 use crate::cli::GatewayArgs;
 use crate::config::Config;
+use crate::exit;
 use crate::patience::Patience;
 use crate::runtime::RuntimeFolder;
 
@@ -15,51 +14,90 @@ use crate::runtime::RuntimeFolder;
 /// over that robot's clock, in which the boards' silence counts.
 ///
 /// # Errors
-/// The robot's folder cannot be read.
-pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, SocketAddr)> {
+/// The robot's folder cannot be read, or this program cannot speak to Foxglove.
+pub fn prepare(config: &Config, args: &GatewayArgs) -> Result<(Config, Addresses)> {
     let mut joined = config.clone();
     if let Some(running) = RuntimeFolder::running(config)? {
         joined.speed = running.speed;
         joined.chip.clock = running.chip.clock;
     }
-    let usual = || USUAL_METRICS.parse().context("the usual address");
-    let metrics = match args.metrics.or(joined.gateway.metrics) {
-        Some(metrics) => metrics,
-        None => usual()?,
+    let configured = joined.gateway.addresses();
+    let mut wanted = Addresses {
+        metrics: args.metrics.or(configured.metrics),
+        foxglove: args.foxglove.or(configured.foxglove),
     };
-    Ok((joined, metrics))
+    if wanted == Addresses::default() {
+        wanted.metrics = Some(USUAL_METRICS.parse().context("the usual address")?);
+    }
+    wanted.may_be_had().map_err(refused)?;
+    Ok((joined, wanted))
 }
 
 /// Runs it. A call into the bus that hangs ends the process, and it is started again.
 ///
 /// # Errors
-/// The address cannot be had, or the bus cannot be read.
-pub fn run(bus: &Bus, config: &Config, metrics: SocketAddr, shutdown: &Shutdown) -> Result<()> {
-    let gateway = Gateway::open(metrics)?;
-    if config.gateway.metrics != Some(metrics) {
+/// An address cannot be had, or the bus cannot be read.
+pub fn run(bus: &Bus, config: &Config, wanted: Addresses, shutdown: &Shutdown) -> Result<()> {
+    let gateway = Gateway::open(wanted, bus.robot().as_str())?;
+    if config.gateway.addresses() != wanted {
         // Nobody else has said where it is.
-        crate::say(&told(gateway.address()?))?;
+        for line in told(gateway.addresses()) {
+            crate::say(&line)?;
+        }
     }
     // The wish to end is heeded here and not by the watch: there is nothing to wait for.
     let patience = Patience::new(config, &Shutdown::new())?;
     Ok(gateway.run(bus, &patience.watchdog, shutdown)?)
 }
 
-/// Refuses an address that a gateway of `up` could not have, before anything runs, and says where
-/// the figures will be.
+/// Refuses what a gateway of `up` could not do, before anything runs, and says where what will be.
 ///
 /// # Errors
-/// The address cannot be had.
-pub fn promise(config: &Config) -> Result<Option<String>> {
-    let Some(metrics) = config.gateway.metrics else {
-        return Ok(None);
-    };
-    // It is opened again in a moment, by the gateway.
-    TcpListener::bind(metrics)
-        .with_context(|| format!("--metrics: {metrics} cannot be had; choose another address"))?;
-    Ok(Some(told(metrics)))
+/// An address cannot be had, or this program cannot speak to Foxglove.
+pub fn promise(config: &Config) -> Result<Vec<String>> {
+    let wanted = config.gateway.addresses();
+    // Each is opened again in a moment, by the gateway.
+    wanted.may_be_had().map_err(refused)?;
+    Ok(told(wanted))
 }
 
-fn told(metrics: SocketAddr) -> String {
-    format!("figures for Prometheus are at http://{metrics}/metrics")
+/// What this program cannot do makes no sense to ask for.
+fn refused(error: GatewayError) -> anyhow::Error {
+    match error {
+        GatewayError::NoFoxglove => exit::Usage(error.to_string()).into(),
+        other => other.into(),
+    }
+}
+
+fn told(at: Addresses) -> Vec<String> {
+    let metrics = at
+        .metrics
+        .map(|at| format!("figures for Prometheus are at http://{at}/metrics"));
+    let foxglove = at
+        .foxglove
+        .map(|at| format!("Foxglove opens a connection to ws://{at}"));
+    metrics.into_iter().chain(foxglove).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_without_foxglove_says_how_to_build_one_that_has_it() {
+        let mut config = Config::default();
+        config.gateway.foxglove = Some("127.0.0.1:0".parse().expect("an address"));
+        let promised = promise(&config);
+        if lager_gateway::HAS_FOXGLOVE {
+            assert_eq!(
+                promised.expect("an address").as_slice(),
+                ["Foxglove opens a connection to ws://127.0.0.1:0"]
+            );
+        } else {
+            let refused = promised.expect_err("it cannot");
+            assert!(refused.is::<exit::Usage>());
+            let how = "`cargo build --release --features foxglove`";
+            assert!(refused.to_string().contains(how), "{refused}");
+        }
+    }
 }

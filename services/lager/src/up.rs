@@ -233,6 +233,7 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
         config.station.panel = Some(panel);
     }
     config.gateway.metrics = args.metrics.or(config.gateway.metrics);
+    config.gateway.foxglove = args.foxglove.or(config.gateway.foxglove);
     args.realtime.apply(&mut config.realtime);
     Ok(())
 }

@@ -123,11 +123,18 @@ pub fn begin(speaker: Speaker, log: &LogSection) -> Result<()> {
         None => tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .event_format(Lines(speaker))
-            .with_filter(LevelFilter::WARN)
+            .with_filter(faults())
             .boxed(),
     };
     Registry::default().with(terminal).with(in_file).init();
     Ok(())
+}
+
+/// What is shown unasked. That a viewer's connection breaks is no fault of the robot's.
+fn faults() -> Targets {
+    Targets::new()
+        .with_default(LevelFilter::WARN)
+        .with_target("foxglove", LevelFilter::OFF)
 }
 
 /// A layer of its own kind, whatever it writes.

@@ -192,6 +192,11 @@ impl Scene {
         shown
     }
 
+    /// Whether messages of a topic show anything.
+    pub fn looks_at(topic: &str) -> bool {
+        View::ALL.iter().any(|view| view.made_of().contains(&topic))
+    }
+
     /// What a reader who begins now has missed and would have to see.
     pub fn lasting(&self) -> &[Shown] {
         &self.lasting

@@ -199,6 +199,9 @@ debounce_ms = {debounce}
 # Where Prometheus reads the robot's figures, such as 127.0.0.1:7430; whoever reaches that address may
 # read them. Unset, nowhere.
 {gateway_metrics}
+# Where Foxglove looks on live, such as 127.0.0.1:8765; whoever reaches that address, and any page that
+# a browser of that machine shows, may look. It needs a program with the feature foxglove.
+{gateway_foxglove}
 ",
             name = quoted(&self.name),
             speed = self.speed,
@@ -271,6 +274,10 @@ debounce_ms = {debounce}
             gateway_metrics = unset(
                 "metrics",
                 self.gateway.metrics.map(|metrics| metrics.to_string()).as_deref()
+            ),
+            gateway_foxglove = unset(
+                "foxglove",
+                self.gateway.foxglove.map(|foxglove| foxglove.to_string()).as_deref()
             ),
             station_panel = unset(
                 "panel",
@@ -375,6 +382,7 @@ mod tests {
             },
             gateway: GatewaySection {
                 metrics: Some("127.0.0.1:7431".parse().expect("an address")),
+                foxglove: Some("127.0.0.1:8766".parse().expect("an address")),
             },
             ..Config::default()
         };

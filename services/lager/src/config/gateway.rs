@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 
+use lager_gateway::Addresses;
 use serde::{Deserialize, Serialize};
 
 /// `[gateway]`: what programs outside are shown of the robot.
@@ -11,11 +12,22 @@ pub struct GatewaySection {
     /// Where Prometheus reads figures; unset, nowhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metrics: Option<SocketAddr>,
+    /// Where Foxglove looks on; unset, nowhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub foxglove: Option<SocketAddr>,
 }
 
 impl GatewaySection {
     /// Whether `up` starts a gateway.
     pub fn is_wanted(&self) -> bool {
-        self.metrics.is_some()
+        self.addresses() != Addresses::default()
+    }
+
+    /// The same for the gateway.
+    pub fn addresses(&self) -> Addresses {
+        Addresses {
+            metrics: self.metrics,
+            foxglove: self.foxglove,
+        }
     }
 }

@@ -40,7 +40,7 @@ pub struct External {
     /// What is told of the panel.
     pub panel: Option<String>,
     /// What is told of the gateway.
-    pub gateway: Option<String>,
+    pub gateway: Vec<String>,
 }
 
 /// Chooses, and puts into `config` what comm is to know.
@@ -82,7 +82,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: None,
-            gateway: None,
+            gateway: Vec::new(),
             told: "there is no external computer; the warehouse is told here".into(),
         });
     }
@@ -90,7 +90,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: None,
-            gateway: None,
+            gateway: Vec::new(),
             told: format!("the external computer is the one at {address}"),
         });
     }
@@ -120,7 +120,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         return Ok(External {
             listener: None,
             panel: panel.map(|panel| format!("the panel is at http://{panel}")),
-            gateway: None,
+            gateway: Vec::new(),
             told,
         });
     }
@@ -137,7 +137,7 @@ fn none(config: &mut Config, why: &anyhow::Error) -> External {
     External {
         listener: None,
         panel: None,
-        gateway: None,
+        gateway: Vec::new(),
         told: format!("there is no external computer: {why:#}; the warehouse is told here"),
     }
 }
@@ -150,7 +150,7 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     External {
         listener: Some(listener),
         panel: None,
-        gateway: None,
+        gateway: Vec::new(),
         told,
     }
 }

@@ -146,8 +146,7 @@ impl Robot {
     /// The robot does not start, or the bus does not hold.
     pub fn run(&mut self, exit_when_done: bool) -> Result<()> {
         self.note(&self.external.told);
-        let told = [&self.external.panel, &self.external.gateway];
-        for line in told.into_iter().flatten() {
+        for line in self.external.panel.iter().chain(&self.external.gateway) {
             self.note(line);
         }
         self.begin()?;

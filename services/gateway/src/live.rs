@@ -1,0 +1,171 @@
+//! Live views for Foxglove, by the server of its own crate: each topic is a channel, and beside them
+//! stand the views that a recording has, of the same definition ([`Scene`]).
+//!
+//! ```text
+//!   listener ──JSON──> Live ──> channels ──queue──> client
+//!                       └─> Kept: the last message of what lasts ──> who subscribes later
+//! ```
+//!
+//! **Nobody is waited for.** Each client has a queue of its own. What finds it full pushes the oldest
+//! message out, so a client that is slow or reads nothing loses messages and holds nobody up.
+//!
+//! **A client can only look.** The server offers nothing that a client could write, ask for or call.
+
+use std::collections::{BTreeMap, HashMap};
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use foxglove::websocket::{ChannelView, Client, ServerListener};
+use foxglove::{ChannelId, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};
+use lager_journal::{EnvelopeSchema, Scene, View};
+use lager_ports::Clock;
+use lager_topics::Stamp;
+use tokio::runtime::Runtime;
+
+use crate::GatewayError;
+use crate::listener::Viewer;
+
+/// What clients are shown.
+pub(crate) struct Live {
+    /// The server knows it only weakly.
+    context: Arc<Context>,
+    address: SocketAddr,
+    /// What is added to a stamp's time to get ns since 1970.
+    unix_offset_ns: i64,
+    scene: Scene,
+    topics: BTreeMap<String, Outlet>,
+    views: BTreeMap<View, Outlet>,
+    kept: Arc<Kept>,
+}
+
+/// A channel.
+struct Outlet {
+    channel: Arc<RawChannel>,
+    /// Whether who subscribes later gets the last message.
+    lasts: bool,
+}
+
+impl Live {
+    /// Listens at `address`, with connections served whenever `runtime` runs.
+    pub(crate) fn open(
+        address: SocketAddr,
+        robot: &str,
+        runtime: &Runtime,
+    ) -> Result<Self, GatewayError> {
+        let (context, kept) = (Context::new(), Arc::new(Kept::default()));
+        let host = match address {
+            SocketAddr::V4(address) => address.ip().to_string(),
+            SocketAddr::V6(address) => format!("[{}]", address.ip()),
+        };
+        let server = context
+            .websocket_server()
+            .name(format!("Lagerrobot {robot}"))
+            .bind(host, address.port())
+            .listener(Arc::clone(&kept) as Arc<dyn ServerListener>);
+        let started = runtime.block_on(server.start());
+        let server = started.map_err(|error| match error {
+            FoxgloveError::Bind(error) => GatewayError::listen("--foxglove", address, error),
+            other => GatewayError::Run(std::io::Error::other(other)),
+        })?;
+        let views = View::ALL.map(|view| {
+            let outlet = outlet(&context, view.topic(), &view.schema(), view.is_lasting());
+            (view, outlet)
+        });
+        Ok(Self {
+            address: SocketAddr::new(address.ip(), server.port()),
+            context,
+            unix_offset_ns: Clock::unix_offset_ns(),
+            scene: Scene::default(),
+            topics: BTreeMap::new(),
+            views: views.into(),
+            kept,
+        })
+    }
+
+    /// Where clients connect.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+fn outlet(context: &Arc<Context>, name: &str, schema: &EnvelopeSchema, lasts: bool) -> Outlet {
+    let EnvelopeSchema { name: title, text } = schema.clone();
+    let channel = context
+        .channel_builder(name)
+        .message_encoding("json")
+        .schema(Schema::new(title, "jsonschema", text))
+        .build_raw()
+        .expect("its encoding is told");
+    Outlet { channel, lasts }
+}
+
+impl Viewer for Live {
+    fn open(&mut self, topic: &str, schema: &EnvelopeSchema, is_state: bool) {
+        let outlet = outlet(&self.context, topic, schema, is_state);
+        self.topics.insert(topic.to_owned(), outlet);
+    }
+
+    fn wants(&self, topic: &str) -> bool {
+        let is_watched = |outlet: &Outlet| outlet.lasts || outlet.channel.has_sinks();
+        self.topics.get(topic).is_some_and(is_watched) || Scene::looks_at(topic)
+    }
+
+    fn take(&mut self, topic: &str, stamp: &Stamp, message: &[u8]) {
+        let published = stamp.publish_time_ns;
+        let unix_ns = published.saturating_add_signed(self.unix_offset_ns);
+        if let Some(outlet) = self.topics.get(topic) {
+            self.kept.send(outlet, unix_ns, message);
+        }
+        for shown in self.scene.take(topic, unix_ns, message) {
+            let outlet = &self.views[&shown.view];
+            self.kept.send(outlet, unix_ns, &shown.message);
+        }
+    }
+}
+
+/// The last message of each channel whose messages last.
+#[derive(Default)]
+struct Kept(Mutex<HashMap<ChannelId, Last>>);
+
+struct Last {
+    channel: Arc<RawChannel>,
+    unix_ns: u64,
+    message: Vec<u8>,
+}
+
+impl Kept {
+    fn lock(&self) -> MutexGuard<'_, HashMap<ChannelId, Last>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sends a message to all who have subscribed.
+    fn send(&self, outlet: &Outlet, unix_ns: u64, message: &[u8]) {
+        let channel = &outlet.channel;
+        let time = PartialMetadata::with_log_time(unix_ns);
+        if !outlet.lasts {
+            return channel.log_with_meta(message, time);
+        }
+        // Held until it is sent, so that nobody who subscribes now gets an older one after it.
+        let mut kept = self.lock();
+        channel.log_with_meta(message, time);
+        let last = kept.entry(channel.id()).or_insert_with(|| Last {
+            channel: Arc::clone(channel),
+            unix_ns,
+            message: Vec::new(),
+        });
+        last.unix_ns = unix_ns;
+        last.message.clear();
+        last.message.extend_from_slice(message);
+    }
+}
+
+impl ServerListener for Kept {
+    fn on_subscribe(&self, client: Client, channel: ChannelView<'_>) {
+        let kept = self.lock();
+        if let Some(last) = kept.get(&channel.id()) {
+            let time = PartialMetadata::with_log_time(last.unix_ns);
+            let (channel, to) = (&last.channel, client.sink_id());
+            channel.log_with_meta_to_sink(&last.message, time, to);
+        }
+    }
+}

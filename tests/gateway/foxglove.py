@@ -1,0 +1,54 @@
+"""Looks at a robot live, with a client by others: URL, then topics. Prints what the server says of
+itself, each channel's schema, and the last message of each topic; the schemas have accepted all."""
+
+import asyncio
+import contextlib
+import json
+import sys
+
+import jsonschema
+from robo_ws_bridge import WebSocketBridgeClient
+
+url, wanted = sys.argv[1], set(sys.argv[2:])
+
+
+async def look():
+    client = WebSocketBridgeClient(url, min_retry_delay=0.1)
+    last, refused, whole = {}, [], asyncio.Event()
+
+    def message(channel, unix_ns, data):
+        # What a handler raises, the client only logs.
+        try:
+            value = json.loads(data)
+            jsonschema.validate(value, json.loads(channel["schema"]))
+            assert (channel["encoding"], channel["schemaEncoding"]) == ("json", "jsonschema")
+            assert unix_ns > 1_700_000_000_000_000_000, unix_ns
+            last[channel["topic"]] = value
+        except Exception as error:
+            refused.append(f"{channel['topic']}: {error}")
+        if refused or wanted <= last.keys():
+            whole.set()
+
+    client.on_message(message)
+    await client.connect()
+    while not wanted <= {channel["topic"] for channel in client.channels.values()}:
+        await asyncio.sleep(0.05)
+    while not whole.is_set():
+        # This client may overlook what comes at once, so it subscribes anew to what has not come.
+        for topic in wanted - last.keys():
+            await client.unsubscribe(topic)
+            await client.subscribe(topic)
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(whole.wait(), 5)
+    told = {
+        "server": client.server_info["name"],
+        "capabilities": client.server_info["capabilities"],
+        "schemas": {channel["topic"]: channel["schemaName"] for channel in client.channels.values()},
+        "last": last,
+    }
+    await client.disconnect()
+    assert not refused, refused[0]
+    print(json.dumps(told))
+
+
+asyncio.run(asyncio.wait_for(look(), 120))
