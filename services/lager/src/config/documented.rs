@@ -61,8 +61,8 @@ longest_spin_us = {longest_spin_us}
 # would go before the interrupt threads that bring the boards' bytes on a PREEMPT_RT kernel.
 # Needs LimitRTPRIO= in the systemd unit, `ulimit -r`, or CAP_SYS_NICE: `lager doctor` tries it.
 priority = {priority}
-# Keep all memory of bridge and logic from being paged out (mlockall): 32 MiB each,
-# of which 18 MiB would not be in memory otherwise.
+# Keep all memory of bridge and logic from being paged out (mlockall): some 40 MiB each,
+# of which 25 MiB would not be in memory otherwise.
 # Needs LimitMEMLOCK= in the systemd unit, `ulimit -l`, or CAP_IPC_LOCK: `lager doctor` tries it.
 lock_memory = {lock_memory}
 
