@@ -11,9 +11,11 @@ A Robert prints its address, and begins when it is told a line. A transcript has
     # a remark
     robot connects            robert: the next robot has connected
     robot > karta             it says this line
+    robot > 32 times karta    it says it so often, without waiting for answers
     robot >> karta            the same, with CR before LF
     robot ~ kar               it says these bytes; the line is not over
     robot < karta 2 2 0 0     it hears this next; `*` at the end stands for anything
+    robot < 2 times karta 1*  it hears that so often
     robot hears nothing       for half a second
     robot passes over karta   from now on, where it waits for another line
     robot is closed           by the other side
@@ -142,9 +144,11 @@ def play(peers, step):
     name, what = re.split(" +", step, maxsplit=1)
     peer = peers[name]
     kind, _, text = what.partition(" ")
+    often = re.fullmatch(r"(\d+) times (.*)", text)
+    times, text = (int(often[1]), often[2]) if often else (1, text)
     match kind:
         case ">":
-            peer.says(text + "\n")
+            peer.says((text + "\n") * times)
         case "passes":
             peer.passed_over += (text.removeprefix("over "),)
         case ">>":
@@ -152,7 +156,8 @@ def play(peers, step):
         case "~":
             peer.says(text)
         case "<":
-            peer.hears_next(text)
+            for _ in range(times):
+                peer.hears_next(text)
         case _:
             getattr(peer, what.replace(" ", "_"))()
 

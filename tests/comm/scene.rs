@@ -76,7 +76,11 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new() -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        Self::with(TcpListener::bind("127.0.0.1:0").expect("a port"))
+    }
+
+    /// One whose robot connects to this listener.
+    pub(crate) fn with(listener: TcpListener) -> Self {
         let address = listener.local_addr().expect("an address").to_string();
         Self {
             listener: Some(listener),

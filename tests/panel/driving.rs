@@ -420,7 +420,7 @@ fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhil
     ];
     for stop in stops {
         stop(&mut page);
-        page.wait_for("#stop-said", "both boards stand");
+        page.wait_for("#stop-said", "both wheels stand");
         page.key_up("Escape");
         assert_eq!(page.value("document.querySelector('#where').open"), true);
         scene.resume();

@@ -98,7 +98,7 @@ fn from_the_key_and_to_the_picture() {
     let (mut starts, mut stops, mut told) = (Vec::new(), Vec::new(), Vec::new());
     page.value(
         "window.stands = []; const said = document.querySelector('#stop-said'); \
-         new MutationObserver(() => said.textContent.includes('both boards stand') && \
+         new MutationObserver(() => said.textContent.includes('both wheels stand') && \
            stands.push(performance.timeOrigin + performance.now())).observe(said, { childList: true })",
     );
     for round in 0..ROUNDS {
@@ -113,7 +113,7 @@ fn from_the_key_and_to_the_picture() {
         stops.push(motors(&mut reports, from, false));
         page.key_up("Escape");
         page.key_up(key);
-        page.wait_for("#stop-said", "both boards stand");
+        page.wait_for("#stop-said", "both wheels stand");
         let at = page.value("stands.at(-1)").as_f64().expect("a time");
         told.push(at - origin_ms - from as f64 / 1e6);
         scene.resume();

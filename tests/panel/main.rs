@@ -154,7 +154,7 @@ fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button() {
     scene.wait_to_move();
     page.key_down("Escape");
     page.key_up("Escape");
-    page.wait_for("#stop-said", "both boards stand");
+    page.wait_for("#stop-said", "both wheels stand");
     scene.assert_stands();
     // A click is too short for it.
     page.click("#resume");
@@ -170,7 +170,7 @@ fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button() {
     page.click("#tab-setup");
     page.value("document.querySelector('#warehouse input').focus()");
     page.key_down("Escape");
-    page.wait_for("#stop-said", "both boards stand");
+    page.wait_for("#stop-said", "both wheels stand");
     scene.assert_stands();
     page.key_up("Escape");
     scene.resume();
@@ -202,7 +202,7 @@ fn two_people_do_not_drive_at_once_and_either_may_stop() {
     anna.value("document.activeElement.blur()");
     scene.hold(&mut anna, "ArrowUp");
     bo.click("#stop");
-    bo.wait_for("#stop-said", "both boards stand");
+    bo.wait_for("#stop-said", "both wheels stand");
     scene.assert_stands();
     anna.key_up("ArrowUp");
     scene.resume();
@@ -292,7 +292,7 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
     );
     page.wait_for("#link", " ms");
     page.click("#stop");
-    page.wait_for("#stop-said", "both boards stand");
+    page.wait_for("#stop-said", "both wheels stand");
     let stopped = |name: &str| {
         let mut health = scene
             .domain

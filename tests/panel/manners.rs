@@ -181,7 +181,7 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     looks.click("#control");
     looks.wait_for("#drive-said", "this page may look and stop");
     looks.click("#stop");
-    looks.wait_for("#stop-said", "both boards stand");
+    looks.wait_for("#stop-said", "both wheels stand");
     looks.wait_until("document.querySelector('#resume').disabled");
 
     // The cookie is the browser's, so whoever opens the driver's address drives from then on.
@@ -239,7 +239,7 @@ fn an_accessibility_checker_finds_nothing_serious() {
     check(&mut page, "where it stands");
     page.click("#where-later");
     page.click("#stop");
-    page.wait_for("#stop-said", "both boards stand");
+    page.wait_for("#stop-said", "both wheels stand");
     check(&mut page, "stopped");
     scene.resume();
     let url = format!("{}/screen", scene.url.trim_end_matches('/'));

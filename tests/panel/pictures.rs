@@ -57,7 +57,7 @@ fn of_every_view() {
     view(&mut page, "picking");
     page.key_down("Escape");
     page.key_up("Escape");
-    page.wait_for("#stop-said", "both boards stand");
+    page.wait_for("#stop-said", "both wheels stand");
     view(&mut page, "stopped");
     scene.resume();
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");

@@ -117,7 +117,7 @@ fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back() {
     // It stays where it is, with product 1 under way.
     page.key_down("Escape");
     page.key_up("Escape");
-    page.wait_for("#stop-said", "both boards stand");
+    page.wait_for("#stop-said", "both wheels stand");
     let order = |page: &mut Page, product: &str| {
         fill(page, "#goods", product);
         page.click("#fetch button");

@@ -63,7 +63,8 @@
 //! # Robot to station
 //!
 //! ```text
-//! stopped <number> <int>               both boards show the stop, that many ms after its receipt
+//! stopped <number> <int>               the steering board reports both motors off under the stop,
+//!                                      that many ms after its receipt
 //! done <number>
 //! refused <number> <text>              why it was not done
 //! state {<key>=<value>}                20 times a second; see `State`

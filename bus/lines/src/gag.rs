@@ -30,6 +30,10 @@
 //! - `karta` and `sidelength` are answered once the user has filled them in, `fetchprod`, `armcomm`
 //!   and `styrcomm` once he has chosen (AMB-42, AMB-43): an answer may take as long as it likes,
 //!   and what needs no answer may be sent meanwhile.
+//! - A GaG may give commands faster than the robot takes them: `armcomm`, `styrcomm` and
+//!   `pickup_done` that nobody has asked for wait with Robert, as long as the robot asks for
+//!   commands at all. At most 32 wait, a stop takes their place, and what does not wait is refused
+//!   in a `thought` (C5).
 //! - `pickup_done` is the answer to `armcomm` that ends the picking; the document has the signal
 //!   but no word for it (AMB-44).
 //! - The codes of commands are read in four forms and written in one; see

@@ -12,6 +12,7 @@
 //! - [`extension`]: what a robot and a station of this project say besides, asynchronously.
 //! - [`strings`]: map and goods as one string each (M1-M3).
 //! - [`command`]: the codes of commands as text (AMB-4).
+//! - [`Called`]: a product by its number or its name, as people call it.
 //!
 //! Every module specifies its language with examples, so that a peer can be written from it.
 //!
@@ -33,6 +34,7 @@
 
 #![forbid(unsafe_code)]
 
+mod called;
 pub mod command;
 pub mod conversation;
 pub mod extension;
@@ -45,6 +47,7 @@ mod text;
 mod warehouse;
 mod writer;
 
+pub use called::{Called, CalledError, NamesError, UnknownProduct, check_names};
 pub use misread::{Found, Misread};
 pub use text::{Name, NameError, Text, TextError};
 pub use warehouse::{

@@ -135,11 +135,7 @@ impl Good {
         side: Direction,
     ) -> Result<Self, LabelError> {
         let label = label.into();
-        let blank = [' ', '\t'];
-        let is_bare = !label.starts_with(blank) && !label.ends_with(blank);
-        if label.is_empty() || !is_bare || label.contains([',', ';', '\r', '\n']) {
-            return Err(LabelError { label });
-        }
+        check_label(&label)?;
         Ok(Self {
             label,
             square,
@@ -177,6 +173,17 @@ impl fmt::Display for Good {
         } = self;
         write!(formatter, "{label},{x},{y},{}", side.number())
     }
+}
+
+/// Finds out whether a text can stand for a product.
+pub(crate) fn check_label(label: &str) -> Result<(), LabelError> {
+    let blank = [' ', '\t'];
+    let is_bare = !label.starts_with(blank) && !label.ends_with(blank);
+    if label.is_empty() || !is_bare || label.contains([',', ';', '\r', '\n']) {
+        let label = label.to_owned();
+        return Err(LabelError { label });
+    }
+    Ok(())
 }
 
 /// The products of a warehouse as the goods string lists them (M3).

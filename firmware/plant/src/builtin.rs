@@ -81,7 +81,12 @@ impl Warehouse {
 }
 
 fn product(id: i32, square: [u8; 2], side: Side) -> Product {
-    Product { id, square, side }
+    Product {
+        id,
+        name: None,
+        square,
+        side,
+    }
 }
 
 #[cfg(test)]

@@ -147,6 +147,7 @@ mod tests {
     fn goods_stand_inside_their_square() {
         let product = |side| Product {
             id: 1,
+            name: None,
             square: [1, 2],
             side,
         };

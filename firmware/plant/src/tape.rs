@@ -357,6 +357,7 @@ mod tests {
         ] {
             warehouse.products = vec![Product {
                 id: 1,
+                name: None,
                 square: [0, 0],
                 side,
             }];

@@ -248,7 +248,12 @@ mod tests {
     }
 
     fn product(id: i32, square: [u8; 2], side: Side) -> Product {
-        Product { id, square, side }
+        Product {
+            id,
+            name: None,
+            square,
+            side,
+        }
     }
 
     #[test]

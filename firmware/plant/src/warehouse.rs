@@ -138,11 +138,14 @@ impl Curve {
 }
 
 /// A product and where it is picked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Product {
     /// The product's number.
     pub id: i32,
+    /// What people call it; the robot knows numbers only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The square it stands in.
     pub square: [u8; 2],
     /// The side of the square it is reached from.
@@ -247,6 +250,7 @@ mod tests {
             radius_cm = 25
             [[product]]
             id = 4
+            name = "screws"
             square = [1, 0]
             side = "up"
             [[obstacle]]
@@ -258,6 +262,7 @@ mod tests {
             warehouse.products,
             [Product {
                 id: 4,
+                name: Some("screws".into()),
                 square: [1, 0],
                 side: Side::Up
             }]

@@ -13,8 +13,11 @@
 //! - A press that is read a second late is not taken: whoever pressed has given it up.
 //! - The kernel debounces the lines, and dates each change by `CLOCK_MONOTONIC`.
 //! - A chip that cannot be had is no reason to end. It is tried again for ever, and the log says so.
+//!
+//! The edge of this is [`Lines`]: whoever has no chip can move contacts there, as a test does.
 
 use core::time::Duration;
+use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -51,6 +54,35 @@ pub enum Touch {
     /// Moved the switch to a mode.
     Switched(Mode),
 }
+
+/// The contacts at their lines, debounced.
+pub trait Lines {
+    /// Whether the contact at this line is closed now.
+    ///
+    /// # Errors
+    /// The chip does not say.
+    fn is_closed(&self, line: u32) -> io::Result<bool>;
+
+    /// The next movement of a contact; `None` if there is none in this time.
+    ///
+    /// # Errors
+    /// The chip does not say.
+    fn movement(&self, patience: Duration) -> io::Result<Option<Movement>>;
+}
+
+/// A contact has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Movement {
+    /// The offset of its line.
+    pub line: u32,
+    /// Whether it is closed since.
+    pub is_closed: bool,
+    /// When, in ns of `CLOCK_MONOTONIC`.
+    pub at_ns: u64,
+}
+
+/// How the lines of a configuration are had: [`open`], or what stands for it.
+pub type Opener = dyn Fn(&ButtonsConfig) -> io::Result<Box<dyn Lines>> + Send + Sync;
 
 /// What follows from contacts. It is pure.
 #[derive(Clone, Copy, Debug)]
@@ -93,6 +125,7 @@ impl Contacts {
 /// Hands on what people do, until `end`.
 pub fn watch(
     config: &ButtonsConfig,
+    open: &Opener,
     resume: bool,
     end: &AtomicBool,
     mut touched: impl FnMut(Touch),
@@ -101,7 +134,7 @@ pub fn watch(
     let mut complaints = 0_u32;
     while !end.load(Ordering::Acquire) {
         let watched = open(config)
-            .and_then(|lines| watch_lines(config, &lines, &mut contacts, end, &mut touched));
+            .and_then(|lines| watch_lines(config, &*lines, &mut contacts, end, &mut touched));
         let Err(error) = watched else { return };
         complaints = complaints.wrapping_add(1);
         if complaints.is_power_of_two() {
@@ -120,9 +153,13 @@ pub fn watch(
     }
 }
 
-fn open(config: &ButtonsConfig) -> gpiocdev::Result<Request> {
+/// The lines of a chip of this machine.
+///
+/// # Errors
+/// The chip or a line of it cannot be had.
+pub fn open(config: &ButtonsConfig) -> io::Result<Box<dyn Lines>> {
     let lines: Vec<u32> = config.reset.into_iter().chain(config.switch).collect();
-    Request::builder()
+    let request = Request::builder()
         .on_chip(&config.chip)
         .with_consumer("lager")
         .with_lines(&lines)
@@ -131,33 +168,51 @@ fn open(config: &ButtonsConfig) -> gpiocdev::Result<Request> {
         .with_bias(Bias::PullUp)
         .with_edge_detection(EdgeDetection::BothEdges)
         .with_debounce_period(config.debounce)
-        .request()
+        .request();
+    Ok(Box::new(Chip(request.map_err(io::Error::other)?)))
+}
+
+/// Lines that the kernel debounces.
+struct Chip(Request);
+
+impl Lines for Chip {
+    fn is_closed(&self, line: u32) -> io::Result<bool> {
+        let value = self.0.value(line).map_err(io::Error::other)?;
+        Ok(value == Value::Active)
+    }
+
+    fn movement(&self, patience: Duration) -> io::Result<Option<Movement>> {
+        if !(self.0.wait_edge_event(patience)).map_err(io::Error::other)? {
+            return Ok(None);
+        }
+        let edge = self.0.read_edge_event().map_err(io::Error::other)?;
+        Ok(Some(Movement {
+            line: edge.offset,
+            // A line that is active low rises when its contact closes.
+            is_closed: edge.kind == EdgeKind::Rising,
+            at_ns: edge.timestamp_ns,
+        }))
+    }
 }
 
 fn watch_lines(
     config: &ButtonsConfig,
-    lines: &Request,
+    lines: &dyn Lines,
     contacts: &mut Contacts,
     end: &AtomicBool,
     touched: &mut impl FnMut(Touch),
-) -> gpiocdev::Result<()> {
+) -> io::Result<()> {
     if let Some(line) = config.switch {
-        let is_closed = lines.value(line)? == Value::Active;
-        contacts
-            .switch(is_closed)
-            .into_iter()
-            .for_each(&mut *touched);
+        let touch = contacts.switch(lines.is_closed(line)?);
+        touch.into_iter().for_each(&mut *touched);
     }
     while !end.load(Ordering::Acquire) {
-        if !lines.wait_edge_event(LOOK)? {
+        let Some(moved) = lines.movement(LOOK)? else {
             continue;
-        }
-        let edge = lines.read_edge_event()?;
-        // A line that is active low rises when its contact closes.
-        let is_closed = edge.kind == EdgeKind::Rising;
-        let touch = match Some(edge.offset) == config.switch {
-            true => contacts.switch(is_closed),
-            false => Contacts::reset(is_closed, edge.timestamp_ns, Clock::monotonic_ns()),
+        };
+        let touch = match Some(moved.line) == config.switch {
+            true => contacts.switch(moved.is_closed),
+            false => Contacts::reset(moved.is_closed, moved.at_ns, Clock::monotonic_ns()),
         };
         touch.into_iter().for_each(&mut *touched);
     }
@@ -209,8 +264,9 @@ mod tests {
         };
         assert!(open(&config).is_err());
         let end = AtomicBool::new(false);
+        let nobody = |touch| panic!("{touch:?}");
         std::thread::scope(|scope| {
-            let watching = scope.spawn(|| watch(&config, false, &end, |touch| panic!("{touch:?}")));
+            let watching = scope.spawn(|| watch(&config, &open, false, &end, nobody));
             std::thread::sleep(LOOK * 3);
             assert!(!watching.is_finished());
             end.store(true, Ordering::Release);

@@ -50,4 +50,4 @@ pub mod settings;
 pub use config::BridgeConfig;
 pub use counts::Counts;
 pub use events::{BoardUp, Moment, PortEvent};
-pub use service::run;
+pub use service::{run, run_with};

@@ -1,5 +1,6 @@
 //! The buttons on lines of a simulated chip of the kernel (gpio-sim). Where the kernel has none, or
-//! this is not root, the test says that it is ignored and why.
+//! this is not root, the test says that it is ignored and why. From the lines on, the way through
+//! the whole bridge is tested in `bridge/pressed.rs`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use lager_bridge::buttons::{ButtonsConfig, Touch, watch};
+use lager_bridge::buttons::{ButtonsConfig, Touch, open, watch};
 use lager_topics::Mode;
 
 const SIMULATOR: &str = "/sys/kernel/config/gpio-sim";
@@ -72,7 +73,7 @@ fn people_touch(chip: &Chip) {
     let (to, touches) = mpsc::channel();
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            watch(&config, false, &end, |touch| {
+            watch(&config, &open, false, &end, |touch| {
                 to.send(touch).expect("it is waited for");
             });
         });

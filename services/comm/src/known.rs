@@ -4,6 +4,7 @@ use lager_topics::{
     BlockedWays, DistanceFrame, Durations, Health, LineFrame, Mode, NavigatorStatus, OrderQueue,
     Refusal, Route, SteeringReport, Truth, WarehouseMap,
 };
+use lager_wire::Version;
 
 /// The last sample of each topic that is told of. `None` has not been heard.
 #[derive(Clone, Debug, Default)]
@@ -44,6 +45,14 @@ impl Known {
     /// Whether a stop is in force.
     pub(crate) fn is_stopped(&self) -> bool {
         self.health.is_some_and(|health| health.stopped != 0)
+    }
+
+    /// Whether the steering board tells what it does with its motors: an original one does not, and
+    /// the bridge shows in its place what it was told.
+    pub(crate) fn board_tells_duties(&self) -> bool {
+        let original = Version::Original as u8;
+        self.health
+            .is_some_and(|health| health.steering.version != original)
     }
 
     /// Why nobody may move the robot now, if that is so.

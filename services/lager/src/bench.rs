@@ -69,12 +69,18 @@ fn run_chip(args: &BenchArgs) -> Result<String> {
     })
 }
 
-/// How often a robot is stopped, given a command or cut off: for a first look, and in full.
+/// How often a robot is stopped or given a command: for a first look, and in full.
 const TIMES: [usize; 2] = [20, 200];
+/// How often its link is cut in each of three ways, and made anew.
+const CUTS: [usize; 2] = [10, 60];
 
 /// The processes that people run, on a robot of the measurement's own.
 fn run_robot(args: &BenchArgs) -> Result<String> {
-    let times = args.runs.unwrap_or(TIMES[usize::from(!args.quick)]);
+    let usual = match args.scenario {
+        Scenario::Link => CUTS,
+        _ => TIMES,
+    };
+    let times = args.runs.unwrap_or(usual[usize::from(!args.quick)]);
     let name = match args.scenario {
         Scenario::Stop => "stop",
         Scenario::Command => "command",

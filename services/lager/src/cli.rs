@@ -1,6 +1,7 @@
 //! The command line: every subcommand, flag and example. No behaviour lives here.
 
 mod bag;
+mod changes;
 mod gateway;
 pub mod help;
 mod realtime;
@@ -14,9 +15,11 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use lager_benches::{Mode, Regime};
 use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS};
+use lager_lines::Called;
 use lager_wire::OperatorCommand;
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
+pub use changes::{ObstacleChange, QueueChange};
 pub use gateway::GatewayArgs;
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
 pub use top::TopArgs;
@@ -55,48 +58,6 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
-}
-
-/// What a person does to a way of the simulated floor.
-#[derive(Debug, Subcommand)]
-pub enum ObstacleChange {
-    /// Put a thing on a way, where the robot is not
-    Put {
-        /// A crossing, and up, down, left or right from it
-        #[arg(value_name = "X,Y,SIDE")]
-        way: Place,
-    },
-    /// Take the thing on a way away
-    Take {
-        /// A crossing, and up, down, left or right from it
-        #[arg(value_name = "X,Y,SIDE")]
-        way: Place,
-    },
-}
-
-/// What a person changes about the orders that wait.
-#[derive(Debug, Subcommand)]
-pub enum QueueChange {
-    /// Add an order for a product at the end
-    Add {
-        /// The product's number
-        #[arg(allow_negative_numbers = true, value_parser = values::product)]
-        product: i32,
-    },
-    /// Take an order back; the one under way as long as its goods are not held
-    Cancel {
-        /// The order's number
-        #[arg(value_name = "ORDER")]
-        id: u32,
-    },
-    /// Let a waiting order change places with the one before it
-    Up {
-        /// The order's number
-        #[arg(value_name = "ORDER")]
-        id: u32,
-    },
-    /// Take all waiting orders back
-    Clear,
 }
 
 /// Flags of every subcommand.
@@ -166,10 +127,13 @@ pub enum Command {
         mode: ModeName,
     },
     /// Order a product to be fetched and delivered
+    #[command(after_help = "Examples:
+  lager fetch 3               the product with this number
+  lager fetch screws          the one with this name; `lager map` shows both")]
     Fetch {
-        /// The product's number
+        /// The product's number, or its name in the warehouse's file
         #[arg(allow_negative_numbers = true, value_parser = values::product)]
-        product: i32,
+        product: Called,
     },
     /// Take an order back, as `queue cancel` does
     #[command(after_help = "Examples:
@@ -425,10 +389,10 @@ pub struct UpArgs {
     /// emulated robot does so anyway
     #[arg(long, help_heading = "Mission")]
     pub script: bool,
-    /// The products that wait to be fetched from the start, in this order [default: the first of the
-    /// warehouse; with the station of somebody else, none]
-    #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
-    pub mission: Vec<i32>,
+    /// The products that wait to be fetched from the start, by number or name, in this order [default:
+    /// the first of the warehouse; with the station of somebody else, none]
+    #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
+    pub mission: Vec<Called>,
     /// End when the mission is delivered (0) or has failed (3)
     #[arg(long, help_heading = "Mission")]
     pub exit_when_done: bool,
@@ -469,9 +433,9 @@ pub struct StationArgs {
     /// and nothing is saved]
     #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub warehouse: Option<PathBuf>,
-    /// Products that a robot is to fetch after what waits for it already, such as r1=3,1; may be
-    /// given several times
-    #[arg(long, value_name = "ROBOT=ID,ID", value_parser = values::fetch, help_heading = "Station")]
+    /// Products that a robot is to fetch after what waits for it already, by number or name, such as
+    /// r1=3,screws; may be given several times
+    #[arg(long, value_name = "ROBOT=GOODS,GOODS", value_parser = values::fetch, help_heading = "Station")]
     pub fetch: Vec<Fetch>,
     /// Where the operator panel answers browsers [default: 127.0.0.1:7410, or a free port]
     #[arg(long, value_name = "HOST:PORT", help_heading = "Station")]
@@ -496,9 +460,9 @@ pub struct SimulateArgs {
     /// Built-in warehouse or warehouse file; may be given several times
     #[arg(long, value_name = "FILE", help_heading = "Mission")]
     pub warehouse: Vec<String>,
-    /// The products to fetch, in this order [default: the first of the warehouse]
-    #[arg(long, value_name = "ID", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
-    pub mission: Vec<i32>,
+    /// The products to fetch, by number or name, in this order [default: the first of the warehouse]
+    #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
+    pub mission: Vec<Called>,
     /// What is left of the battery's charge at the start [default: what the seed says]
     #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(0..=100), help_heading = "Body")]
     pub battery: Option<u8>,

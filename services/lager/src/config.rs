@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use lager_lines::check_names;
 use lager_plant::{MOST_OBSTACLES, Warehouse};
 use lager_ports::{BusConfig, Policy, RobotName};
 use lager_wire::{ArmProfile, SERVO_MAX};
@@ -508,6 +509,9 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
     warehouse
         .validate()
         .with_context(|| format!("the warehouse file {name} cannot be built"))?;
+    let names = warehouse.products.iter();
+    check_names(names.filter_map(|product| product.name.as_deref()))
+        .with_context(|| format!("the warehouse file {name}"))?;
     Ok(warehouse)
 }
 

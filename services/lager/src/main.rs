@@ -19,6 +19,7 @@ mod emulator;
 mod exit;
 mod gag;
 mod gateway;
+mod goods;
 mod hands;
 mod keepers;
 mod map;
@@ -280,14 +281,14 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
             ModeName::Manual => Mode::Manual,
             ModeName::Autonomous => Mode::Autonomous,
         })?,
-        Command::Fetch { product } => operator()?.fetch(product)?,
+        Command::Fetch { product } => operator()?.fetch(&product)?,
         Command::Cancel { id } => operator()?.cancel(id)?,
         Command::Map => operator()?.map()?,
         Command::Queue { change } => {
             let operator = operator()?;
             match change {
                 None => operator.orders()?,
-                Some(QueueChange::Add { product }) => operator.order(product)?,
+                Some(QueueChange::Add { product }) => operator.order(&product)?,
                 Some(QueueChange::Cancel { id }) => operator.cancel(id)?,
                 Some(QueueChange::Up { id }) => operator.move_up(id)?,
                 Some(QueueChange::Clear) => operator.clear_queue()?,

@@ -320,6 +320,8 @@ impl Whole {
             }
             Heard::Distance(frame) => {
                 self.frames += 1;
+                #[cfg(test)]
+                self.tape.measured(frame.distance_cm);
                 self.tell_logic(Input::Distance(frame.distance_cm));
             }
             Heard::Data(event) => {
@@ -480,6 +482,8 @@ mod boards;
 mod disturbed;
 #[cfg(test)]
 mod obstacles;
+#[cfg(test)]
+mod placed;
 #[cfg(test)]
 mod taped;
 #[cfg(test)]

@@ -12,10 +12,11 @@ use anyhow::{Context, Result};
 use lager_lines::Name;
 use lager_panel::{Panel, Tokens};
 use lager_ports::Shutdown;
-use lager_station::{Listen, Queues, Server, ServerConfig, Warehouse, save};
+use lager_station::{Listen, Queues, Server, ServerConfig, save};
 
 use crate::cli::StationArgs;
 use crate::config::{Config, StationSection};
+use crate::goods;
 use crate::runtime::RuntimeFolder;
 use crate::supervisor;
 
@@ -68,8 +69,12 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
         None => default_gag(config)?,
     };
     let orders = args.fetch.iter();
-    let orders =
-        orders.flat_map(|fetch| fetch.products.iter().map(|id| (fetch.robot.clone(), *id)));
+    let orders = orders.flat_map(|fetch| {
+        fetch
+            .products
+            .iter()
+            .map(|it| (fetch.robot.clone(), it.clone()))
+    });
     let server = Server::open(ServerConfig {
         name: name()?,
         listen: Listen::At(args.listen),
@@ -130,7 +135,7 @@ pub fn usual_panel() -> Result<SocketAddr> {
 /// The robot's folder does not take it.
 pub fn prepare(config: &Config, products: &[i32]) -> Result<()> {
     let kept = RuntimeFolder::warehouse(config)?;
-    save(&kept, &described(config)?)?;
+    save(&kept, &goods::configured(config)?)?;
     let queue = BTreeMap::from([(config.name.clone(), products.to_vec())]);
     Queues(queue).save(&Queues::beside(&kept))?;
     Ok(())
@@ -158,16 +163,6 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
         warehouse: Some(kept),
         fetch: Vec::new(),
     })
-}
-
-/// The robot's warehouse as a station describes it.
-///
-/// # Errors
-/// No station can describe it.
-pub fn described(config: &Config) -> Result<Warehouse> {
-    let described: Warehouse = toml::from_str(&toml::to_string(&config.warehouse()?)?)?;
-    described.check()?;
-    Ok(described)
 }
 
 fn name() -> Result<Name> {

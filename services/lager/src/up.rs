@@ -11,6 +11,7 @@ mod robot;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
+use lager_lines::{Called, ProductId};
 use lager_plant::Warehouse;
 use lager_topics::Role;
 
@@ -73,7 +74,11 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
 /// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move off by
 /// themselves: there somebody has to ask for it twice.
 fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
-    let mission = mission(&config.warehouse()?, &args.mission)?;
+    let warehouse = config.warehouse()?;
+    if config.station.wanted && config.station.address.is_some() {
+        numbers_only(&args.mission)?;
+    }
+    let mission = mission(&warehouse, &args.mission)?;
     let usage = |why: &str| exit::Usage(why.to_owned());
     if config.body != Body::Serial {
         let is_elsewhere = config.station.wanted && config.station.address.is_some();
@@ -148,13 +153,12 @@ fn equip(config: &mut Config, folder: &RuntimeFolder) -> Result<()> {
 }
 
 /// The products to fetch: those asked for, or the warehouse's first.
-pub fn mission(warehouse: &Warehouse, wanted: &[i32]) -> Result<Vec<i32>> {
-    let known: Vec<i32> = warehouse.map_products().map(|(id, ..)| id).collect();
-    if let Some(unknown) = wanted.iter().find(|id| !known.contains(id)) {
-        bail!(exit::Usage(format!(
-            "--mission: the warehouse has no product {unknown}; it has {known:?}"
-        )));
-    }
+pub fn mission(warehouse: &Warehouse, wanted: &[Called]) -> Result<Vec<i32>> {
+    let known = warehouse.products.iter();
+    let known = known.map(|product| (product.id, product.name.as_deref()));
+    let found = wanted.iter().map(|called| called.among(known.clone()));
+    let found: Result<Vec<_>, _> = found.collect();
+    let found = found.map_err(|unknown| exit::Usage(format!("--mission: {unknown}")))?;
     if wanted.len() > lager_station::Robot::MOST_PRODUCTS {
         bail!(exit::Usage(format!(
             "--mission: at most {} products wait in a queue",
@@ -162,9 +166,20 @@ pub fn mission(warehouse: &Warehouse, wanted: &[i32]) -> Result<Vec<i32>> {
         )));
     }
     if wanted.is_empty() {
-        return Ok(known.into_iter().take(1).collect());
+        return Ok(known.take(1).map(|(id, _)| id).collect());
     }
-    Ok(wanted.to_vec())
+    Ok(found.into_iter().map(ProductId::get).collect())
+}
+
+/// Somebody else's station may call other goods so.
+fn numbers_only(wanted: &[Called]) -> Result<()> {
+    let is_name = |called: &&Called| matches!(called, Called::Name(_));
+    match wanted.iter().find(is_name) {
+        Some(name) => bail!(exit::Usage(format!(
+            "--mission: the external computer is not the robot's own, so it is not known here what {name} is; give the number"
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Puts the command line's wishes over the configuration's.

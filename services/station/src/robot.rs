@@ -12,14 +12,14 @@
 //!
 //! - One question is held. A new question takes its place, and the old one is never answered.
 //! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
-//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. When the robot asks
-//!   for something else, or its connection ends, they are dropped: nobody's old command moves it
-//!   later.
+//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. A robot that speaks the
+//!   extension is told it at once, though it asks nothing while it turns. When the robot asks for
+//!   something else, or its connection ends, they are dropped: nobody's old command moves it later.
 //! - A product leaves the queue when the robot is told it. If the connection ends before the robot
 //!   has said another word, it is put back, since it may not have arrived.
 //! - The queue outlives connections.
-//! - While a GaG speaks for the robot only commands are answered from here, those that were given
-//!   besides the GaG's: a stop above all.
+//! - While a GaG speaks for the robot only commands are answered from here: those that it gave
+//!   before it was asked, and those that were given besides, a stop above all.
 //!
 //! - A robot that speaks the extension is given numbered actions besides, and answers each. What it
 //!   shows of itself is kept with the time when it came ([`Shown`]). Who drives it by actions holds
@@ -188,6 +188,9 @@ impl Robot {
         }
         if command == OperatorCommand::Stop {
             self.commands.clear();
+            if self.hello.is_some() && self.held.get().is_none() {
+                return Ok(Some(StationLine::Answer(Answer::Command(command))));
+            }
         }
         if self.commands.len() == Self::MOST_COMMANDS {
             return Err(CommandRefused::Full);

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_lines::{Name, ProductId};
+use lager_lines::{Called, Name, ProductId, UnknownProduct};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt;
 use thiserror::Error;
@@ -51,8 +51,8 @@ pub struct ServerConfig {
     /// The file of the warehouse, in which changes are saved. It need not be there yet: then a GaG
     /// or another user of the station describes the warehouse. The robots' queues lie beside it.
     pub warehouse: Option<PathBuf>,
-    /// What robots are to fetch after what waits for them already.
-    pub fetch: Vec<(Name, ProductId)>,
+    /// What robots are to fetch after what waits for them already. A name needs the warehouse's file.
+    pub fetch: Vec<(Name, Called)>,
 }
 
 /// Where robots connect.
@@ -95,6 +95,14 @@ pub enum ServerError {
     /// There can be no such warehouse.
     #[error(transparent)]
     Warehouse(#[from] WarehouseError),
+    /// Nothing is called so.
+    #[error("robot {robot} is not told to fetch {}: {why}", .why.called)]
+    Called {
+        /// Which.
+        robot: Name,
+        /// Why not.
+        why: UnknownProduct,
+    },
     /// A robot cannot be told to fetch that.
     #[error("robot {robot} is not told to fetch product {product}: {why}")]
     Fetch {
@@ -140,7 +148,18 @@ impl Server {
             None => Queues::default(),
         };
         put_back(&mut station, &saved);
-        for (robot, product) in config.fetch {
+        for (robot, called) in config.fetch {
+            let product = match (called, station.warehouse()) {
+                (Called::Number(product), _) => product,
+                (called, Some(warehouse)) => {
+                    let found = warehouse.find(&called);
+                    found.map_err(|why| ServerError::Called {
+                        robot: robot.clone(),
+                        why,
+                    })?
+                }
+                (called, None) => return Err(no_warehouse(robot, called)),
+            };
             let put = station.fetch(&robot, product);
             put.map_err(|why| ServerError::Fetch {
                 robot,
@@ -372,6 +391,13 @@ impl Drop for Server {
 struct Ready {
     read: Vec<Peer>,
     write: Vec<Peer>,
+}
+
+/// Nothing has a name before there is a warehouse.
+fn no_warehouse(robot: Name, called: Called) -> ServerError {
+    let known = "none, since it is not known yet".to_owned();
+    let why = UnknownProduct { called, known };
+    ServerError::Called { robot, why }
 }
 
 fn prepare(stream: &TcpStream) -> io::Result<()> {

@@ -45,7 +45,7 @@ pub struct Shown {
 pub enum Reply {
     /// It is done.
     Done,
-    /// Both boards show the stop.
+    /// The steering board shows both motors off under the stop.
     Stopped {
         /// How long that took from its receipt, in ms.
         after_ms: u32,

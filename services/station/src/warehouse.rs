@@ -8,7 +8,7 @@
 //!
 //! [[product]]
 //! id = 7                        # 0 to 2147483647
-//! name = "screws"               # for people; the languages of robot and GaG have numbers only
+//! name = "screws"               # for people, as Called has it; robot and GaG know numbers only
 //! square = [1, 0]
 //! side = "down"                 # from where it is reached: left, up, right, down
 //! ```
@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 
 use lager_lines::gag::{Answer, ListWord};
 use lager_lines::{
-    Coord, Direction, Map, MapError, Product, ProductId, Products, ProductsError, SideLength,
-    to_line,
+    Called, Coord, Direction, Map, MapError, NamesError, Product, ProductId, Products,
+    ProductsError, SideLength, UnknownProduct, check_names, to_line,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -102,6 +102,9 @@ pub enum WarehouseError {
     /// Two products have one number.
     #[error(transparent)]
     Products(#[from] ProductsError),
+    /// People could not call them so.
+    #[error(transparent)]
+    Names(#[from] NamesError),
     /// A robot cannot be told of all of them, since they stand in one line.
     #[error(
         "the warehouse has {count} products, which do not fit in one line of the robot's language; \
@@ -136,6 +139,7 @@ impl Warehouse {
         };
         let products: Result<Vec<_>, WarehouseError> = self.products.iter().map(product).collect();
         let products = Products::new(products?)?;
+        check_names(self.called().filter_map(|(_, name)| name))?;
         let list = Answer::Products(ListWord::Prodlist, products.clone());
         if to_line(&list).is_err() {
             return Err(WarehouseError::TooMany {
@@ -154,13 +158,19 @@ impl Warehouse {
         }
     }
 
-    /// The number of the product that a person calls by its number or by its name.
-    pub fn find(&self, called: &str) -> Option<i32> {
-        let mut products = self.products.iter();
-        let is_called = |product: &&StoredProduct| {
-            product.name.as_deref() == Some(called) || product.id.to_string() == called
-        };
-        products.find(is_called).map(|product| product.id)
+    /// The number of the product that a person calls so.
+    ///
+    /// # Errors
+    ///
+    /// When there is none.
+    pub fn find(&self, called: &Called) -> Result<ProductId, UnknownProduct> {
+        called.among(self.called())
+    }
+
+    /// Number and name of each product.
+    fn called(&self) -> impl Iterator<Item = (i32, Option<&str>)> + Clone {
+        let products = self.products.iter();
+        products.map(|product| (product.id, product.name.as_deref()))
     }
 }
 

@@ -171,6 +171,10 @@ pub struct Arbiter {
     next_send: Duration,
     /// When a command that could not be written is tried again.
     retry_at: Option<Duration>,
+    /// How long a packet takes on the wire.
+    packet_time: Duration,
+    /// When what was written has left for the board.
+    wire_free: Duration,
     board_finished: Option<u8>,
 }
 
@@ -213,8 +217,16 @@ impl Arbiter {
             halted_at: None,
             next_send: Duration::ZERO,
             retry_at: None,
+            packet_time: Duration::ZERO,
+            wire_free: Duration::ZERO,
             board_finished: None,
         }
+    }
+
+    /// A packet takes so long on the wire, in robot time: orders that come faster are not all
+    /// written.
+    pub fn pace(&mut self, packet_time: Duration) {
+        self.packet_time = packet_time;
     }
 
     /// Lets an original steering board be driven, which has no limit on a command's age: if this
@@ -230,6 +242,7 @@ impl Arbiter {
     pub fn stop(&mut self) {
         self.retry_at = None;
         self.next_send = Duration::ZERO;
+        self.wire_free = Duration::ZERO;
         if !self.stopped {
             self.stopped = true;
             self.quiet();

@@ -158,6 +158,10 @@ impl Arbiter {
     /// A version-1 board gets a change at once, and the command in force every [`RESEND`]. An
     /// original board would carry out a repetition, so it gets each command once. Standby it gets
     /// as often as the other, because nothing else makes it stand.
+    ///
+    /// Only a standby that ends a movement is written while a packet is on the wire. Whoever orders faster than the wire
+    /// carries would fill the driver's buffer otherwise, and a standby would have to wait behind it:
+    /// 4 KiB take 80 ms at 500 000 Bd, and 4 s at 9600.
     pub fn poll(&mut self, now: Duration) -> Option<SteerCommand> {
         let version = self.board?;
         if self.retry_at.is_some_and(|at| at > now) {
@@ -165,6 +169,7 @@ impl Arbiter {
         }
         let retry = self.retry_at.take().is_some();
         if let Some(prelude) = self.prelude.take() {
+            self.wire_free = self.wire_free.max(now) + self.packet_time;
             return Some(prelude);
         }
         if !self.may_write() {
@@ -175,6 +180,9 @@ impl Arbiter {
         if self.written == Some(command) && !repeat && !retry {
             return None;
         }
+        if self.waits_for_wire(command) && self.wire_free > now {
+            return None;
+        }
         let moved = self.written.is_some_and(|written| code_moves(written.code));
         if moved && !code_moves(command.code) {
             self.halted_at = Some(now);
@@ -183,6 +191,7 @@ impl Arbiter {
             self.driven.told(code_moves(command.code));
         }
         self.written = Some(command);
+        self.wire_free = self.wire_free.max(now) + self.packet_time;
         self.next_send = now + if self.parked { PARKED_RESEND } else { RESEND };
         let held = self.is_held();
         if let Some(running) = self.running.as_mut()
@@ -206,12 +215,18 @@ impl Arbiter {
         let unwritten = writes && self.written != Some(self.register());
         let at_once = unwritten || (self.prelude.is_some() && self.board.is_some());
         let repeats = self.repeats(self.register());
+        let waits = self.prelude.is_none() && self.waits_for_wire(self.register());
+        let free = if waits {
+            self.wire_free
+        } else {
+            Duration::ZERO
+        };
         let write = if self.retry_at.is_some() {
             self.retry_at
         } else if at_once {
-            Some(Duration::ZERO)
+            Some(free)
         } else {
-            (repeats && writes).then_some(self.next_send)
+            (repeats && writes).then_some(self.next_send.max(free))
         };
         [
             running.and_then(|running| running.lease.end()),
@@ -358,6 +373,12 @@ impl Arbiter {
             },
             _ => standby(self.idle_seq),
         }
+    }
+
+    /// Whether a command is written only once the wire is free. Whatever ends a movement does not wait.
+    fn waits_for_wire(&self, command: SteerCommand) -> bool {
+        let is_standby = |command: SteerCommand| command.code == STANDBY.code();
+        !is_standby(command) || self.written.is_some_and(is_standby)
     }
 
     /// Whether the board is told a command again and again.

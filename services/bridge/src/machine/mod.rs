@@ -40,7 +40,9 @@ use heapless::Deque;
 use lager_ports::Stop;
 use lager_topics::{Health, Mode, Outcome, Refusal, SteeringOrder, StopCause};
 use lager_wire::link::HostTransmitter;
-use lager_wire::{ArmProfile, Callsign, Command, Payload, Setting, SettingKey, SteerData, Version};
+use lager_wire::{
+    ArmProfile, Callsign, Command, PACKET_LENGTH, Payload, Setting, SettingKey, SteerData, Version,
+};
 
 pub use action::{Action, News, ShownReport, Write};
 
@@ -179,6 +181,12 @@ struct Told {
     report: bool,
 }
 
+/// How long a packet takes on the wire at `baud`: ten bits a byte.
+fn packet_time(baud: u32) -> Duration {
+    let bits = 10 * PACKET_LENGTH as u64;
+    Duration::from_nanos(bits * 1_000_000_000 / u64::from(baud.max(1)))
+}
+
 impl BridgeCore {
     /// A bridge that goes on where an earlier one ended, if that bridge's state was kept.
     ///
@@ -188,6 +196,7 @@ impl BridgeCore {
         let mut arbiter = kept.map_or_else(Arbiter::new, Arbiter::resume);
         arbiter.resume_from_stop();
         arbiter.drive_original_boards(options.original_boards);
+        arbiter.pace(packet_time(options.baud));
         let mut settings = Settings::default();
         if options.raw_line {
             settings.keep(SettingKey::RawLine, 1);

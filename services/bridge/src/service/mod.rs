@@ -33,7 +33,7 @@ use lager_topics::{
     OperatorInput, SteeringCommand, SteeringState, StopCause, Topic,
 };
 
-use crate::buttons::{self, Touch};
+use crate::buttons::{self, Opener, Touch};
 use crate::config::BridgeConfig;
 use crate::counts::Counts;
 use crate::events::{Moment, PortEvent};
@@ -63,6 +63,19 @@ const PARKING: Duration = Duration::from_millis(200);
 /// # Errors
 /// The bridge's place on the bus cannot be had; the sentence says what to do.
 pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), PortError> {
+    run_with(bus, config, &buttons::open, shutdown)
+}
+
+/// The same where `open` has the buttons' lines, for machines without a chip.
+///
+/// # Errors
+/// As with [`run`].
+pub fn run_with(
+    bus: &Bus,
+    config: &BridgeConfig,
+    open: &Opener,
+    shutdown: &Shutdown,
+) -> Result<(), PortError> {
     let kept = if config.resume {
         bus.kept::<LinkHealth>(RESUME_WAIT).unwrap_or_else(|error| {
             // State that cannot be read counts as lost, and the robot then starts stopped.
@@ -111,7 +124,7 @@ pub fn run(bus: &Bus, config: &BridgeConfig, shutdown: &Shutdown) -> Result<(), 
         if let Some(config) = &config.buttons {
             let (ringer, end, resume) = (ringer.clone(), &end, kept.is_some());
             let watch = move || {
-                buttons::watch(config, resume, end, |touch| {
+                buttons::watch(config, open, resume, end, |touch| {
                     // A main loop that has not taken so many hangs, and will be replaced.
                     let _ = touched.enqueue(touch);
                     ringer.ring();

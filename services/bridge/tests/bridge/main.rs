@@ -4,5 +4,6 @@
 mod failures;
 mod harness;
 mod original;
+mod pressed;
 mod serial;
 mod steering;

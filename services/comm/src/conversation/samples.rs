@@ -72,8 +72,9 @@ impl Conversation {
     pub fn report(&mut self, now: Moment, report: &SteeringReport) {
         self.known.report = Some(*report);
         self.driving.reported(report);
+        // The board's own words, which have just come.
         let stands = (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0);
-        if self.known.is_stopped() && stands {
+        if self.known.is_stopped() && stands && self.known.board_tells_duties() {
             for (number, since) in core::mem::take(&mut self.stops) {
                 let after_ms = now.ns.saturating_sub(since) / 1_000_000;
                 self.say(RobotLine::Report(Report::Stopped {

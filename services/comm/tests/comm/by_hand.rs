@@ -174,6 +174,12 @@ fn a_stop_overtakes_what_came_before_it() {
         age_ms: 0,
         ..SteeringReport::default()
     };
+    // An original board's report is the bridge's own word.
+    robot.health.steering.version = 0;
+    robot.told();
+    assert_eq!(robot.reports(&standing), [""; 0]);
+    robot.health.steering.version = 1;
+    robot.told();
     assert_eq!(robot.reports(&standing), ["stopped 5 20"]);
     assert_eq!(robot.reports(&standing), [""; 0]);
 }

@@ -7,8 +7,9 @@
 //!   frozen    the station's process is stopped (SIGSTOP); its machine still takes bytes
 //! ```
 //!
-//! This process plays the station in the first two, and is the GaG of a real one in the third. A
-//! time begins just before the cut, and ends with the first sample of the simulated world
+//! This process plays the station in the first two, and is the GaG of a real one in the third. Each
+//! cut has a comm of its own, which connects at once: one that was cut off before waits for longer and
+//! longer. All else is the same robot. A time begins just before the cut, and ends with the first sample of the simulated world
 //! (`truth/pose`, every 20 ms) in which both motors are at duty 0. It is up to 20 ms too long.
 
 use std::fmt;
@@ -122,19 +123,33 @@ impl Wheels {
     }
 }
 
+/// A robot without a comm, whose operator's stop is released.
+fn robot() -> Result<Robot> {
+    let robot = Robot::start_with(&["--no-station"])?;
+    robot.release()?;
+    Ok(robot)
+}
+
+/// Starts the robot's comm, which connects to this address. It knows the warehouse already.
+fn start_comm(robot: &mut Robot, address: &str) -> Result<()> {
+    let comm = ["comm", "--station", address, "--resume"];
+    robot.processes.start(&comm).map(drop)
+}
+
 /// The times after a reset and after a silence, in ns.
 fn measure_played(cuts: usize) -> Result<(Vec<u64>, Vec<u64>)> {
     let listener = TcpListener::bind("127.0.0.1:0")?;
+    listener.set_nonblocking(true)?;
     let address = listener.local_addr()?.to_string();
-    let robot = Robot::start_with(&["--station", &address])?;
-    robot.release()?;
+    let mut robot = robot()?;
     let mut wheels = Wheels(robot.bus.subscriber()?);
     let (mut resets, mut silences) = (Vec::new(), Vec::new());
     for number in 0..2 * cuts {
+        start_comm(&mut robot, &address)?;
         // A robot that has heard nothing for too long, since this process was held up, ends the
         // connection by itself.
         let link = loop {
-            let (stream, _) = listener.accept().context("the robot does not connect")?;
+            let stream = accepted(&robot, &listener)?;
             stream.set_nodelay(true)?;
             stream.set_read_timeout(Some(LOOK))?;
             let mut link = Link::new(stream);
@@ -149,20 +164,34 @@ fn measure_played(cuts: usize) -> Result<(Vec<u64>, Vec<u64>)> {
         } else {
             silences.push(wheels.rest_after(cut_ns)?);
         }
+        robot.processes.end_last();
+        // It may have connected again meanwhile.
+        while listener.accept().is_ok() {}
     }
     Ok((resets, silences))
+}
+
+/// The robot's next connection.
+fn accepted(robot: &Robot, listener: &TcpListener) -> Result<TcpStream> {
+    let mut stream = None;
+    robot.wait("the robot to connect", || {
+        stream = listener.accept().ok();
+        Ok(stream.is_some())
+    })?;
+    let (stream, _) = stream.expect("it was waited for");
+    stream.set_nonblocking(false)?;
+    Ok(stream)
 }
 
 /// The times after a real station was frozen, in ns.
 fn measure_frozen(cuts: usize) -> Result<Vec<u64>> {
     // A free port; nobody else takes it in the moment until the station does.
     let address = TcpListener::bind("127.0.0.1:0")?.local_addr()?.to_string();
-    let mut robot = Robot::start_with(&["--station", &address])?;
+    let mut robot = robot()?;
     let socket = robot.processes.folder().join("gag");
     let gag = socket.to_str().context("the folder's name is no UTF-8")?;
     let station = ["station", "--listen", &address, "--gag", gag, "--no-panel"];
     let station = robot.processes.start(&station)?;
-    robot.release()?;
     // It takes one GaG at a time, so the first connection is the one to keep.
     let mut stream = None;
     robot.wait("the station", || {
@@ -175,12 +204,14 @@ fn measure_frozen(cuts: usize) -> Result<Vec<u64>> {
     let mut wheels = Wheels(robot.bus.subscriber()?);
     let mut times = Vec::new();
     for number in 0..cuts {
+        start_comm(&mut robot, &address)?;
         ensure!(gag.drive(number, &mut wheels)?, "the station has closed");
         let cut_ns = Clock::monotonic_ns();
         kill_process(station, Signal::STOP)?;
         let rested = wheels.rest_after(cut_ns);
         kill_process(station, Signal::CONT)?;
         times.push(rested?);
+        robot.processes.end_last();
     }
     Ok(times)
 }

@@ -43,6 +43,17 @@ impl Processes {
         Ok(pid)
     }
 
+    /// Ends the one that was started last.
+    pub(super) fn end_last(&mut self) {
+        if let Some(mut child) = self.children.pop() {
+            let _ = kill_process(Pid::from_child(&child), Signal::TERM);
+            if !ends_within(&mut child, None, Duration::from_secs(10), None) {
+                let _ = child.kill();
+                let _ = child.wait();
+            }
+        }
+    }
+
     /// Where the bus lives.
     pub(super) fn folder(&self) -> &Path {
         self.domain.folder()
@@ -65,12 +76,8 @@ impl Processes {
 
 impl Drop for Processes {
     fn drop(&mut self) {
-        while let Some(mut child) = self.children.pop() {
-            let _ = kill_process(Pid::from_child(&child), Signal::TERM);
-            if !ends_within(&mut child, None, Duration::from_secs(10), None) {
-                let _ = child.kill();
-                let _ = child.wait();
-            }
+        while !self.children.is_empty() {
+            self.end_last();
         }
     }
 }

@@ -9,7 +9,7 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use lager_lines::{Name, ProductId};
+use lager_lines::{Called, Name};
 use lager_ports::RobotName;
 use lager_topics::{TOPICS, UnknownTopic};
 use lager_wire::{OperatorCommand, parse_code};
@@ -45,7 +45,7 @@ pub struct Fetch {
     /// Which robot.
     pub robot: Name,
     /// Which products, in this order.
-    pub products: Vec<ProductId>,
+    pub products: Vec<Called>,
 }
 
 /// A robot and the products that it is to fetch.
@@ -53,11 +53,10 @@ pub fn fetch(text: &str) -> Result<Fetch, String> {
     let usage = || format!("`{text}` is no order; write a robot and its products, as in r1=3,1");
     let (robot, products) = text.split_once('=').ok_or_else(usage)?;
     let robot = Name::new(robot).map_err(|error| error.to_string())?;
-    let id = |text: &str| text.parse().ok().and_then(ProductId::new);
-    let products: Option<_> = products.split(',').map(id).collect();
+    let products: Result<_, String> = products.split(',').map(product).collect();
     Ok(Fetch {
         robot,
-        products: products.ok_or_else(usage)?,
+        products: products?,
     })
 }
 
@@ -168,9 +167,9 @@ pub fn seed(text: &str) -> Result<u64, String> {
     whole(text, 0..=u64::MAX, "seeds start at 0")
 }
 
-/// The number of a product.
-pub fn product(text: &str) -> Result<i32, String> {
-    whole(text, 0..=i32::MAX, "products are numbered from 0")
+/// A product by its number or its name.
+pub fn product(text: &str) -> Result<Called, String> {
+    text.parse().map_err(said)
 }
 
 /// How many things stand on the floor.
@@ -334,7 +333,12 @@ mod tests {
             (&["simulate", "--seeds", "x"], "--seeds 1..20"),
             (&["simulate", "--limit", "-5"], "one second"),
             (&["fetch", "-1"], "numbered from 0"),
+            (&["fetch", "99999999999"], "to 2147483647"),
+            (&["fetch", "a;b"], "semicolon"),
             (&["up", "--mission", "-1"], "numbered from 0"),
+            (&["up", "--mission", "1,,2"], "cannot stand for"),
+            (&["station", "--fetch", "r1=1,-2"], "numbered from 0"),
+            (&["station", "--fetch", "r1"], "as in r1=3,1"),
             (&["up", "--speed", "-1"], "0.01 to 20"),
             (&["up", "--speed", "nan"], "0.01 to 20"),
             (&["up", "--baud", "115200"], "500000 and 9600"),

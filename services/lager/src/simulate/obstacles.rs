@@ -47,7 +47,7 @@ fn missions_among_things_that_come_and_go_are_delivered() {
 #[test]
 fn goods_without_a_way_are_unreachable_and_the_failure_says_what_would_end_it() {
     let warehouse = Warehouse::builtin("small").expect("built in");
-    let product = warehouse.products[0];
+    let product = &warehouse.products[0];
     // On the goods' own edge.
     let edge = lager_plant::Edge::of(product.square, product.side);
     let closed = with_obstacles("small", &[[edge.from, edge.to]]);
@@ -61,7 +61,12 @@ fn goods_without_a_way_are_unreachable_and_the_failure_says_what_would_end_it() 
 
 #[test]
 fn a_mission_in_a_large_hall_full_of_things_goes_the_shortest_ways_that_the_robot_knows_of() {
-    let product = |id, square, side| Product { id, square, side };
+    let product = |id, square, side| Product {
+        id,
+        name: None,
+        square,
+        side,
+    };
     let mut hall = Warehouse {
         size: [20, 20],
         delivery: [0, 0],

@@ -19,6 +19,8 @@ pub(super) struct Tape {
     to_boards: Vec<Bytes>,
     /// What is heard in place of the boards.
     plays: Option<VecDeque<Bytes>>,
+    /// What the ranger told last, in cm.
+    distance_cm: Option<u8>,
 }
 
 impl Tape {
@@ -41,6 +43,14 @@ impl Tape {
         if !bytes.is_empty() {
             self.from_boards.push((now, place, bytes.clone()));
         }
+    }
+
+    pub(super) fn measured(&mut self, cm: u8) {
+        self.distance_cm = Some(cm).filter(|cm| *cm != u8::MAX);
+    }
+
+    pub(super) fn distance_cm(&self) -> Option<u8> {
+        self.distance_cm
     }
 
     pub(super) fn wrote(&mut self, now: Duration, place: usize, packet: &[u8]) {

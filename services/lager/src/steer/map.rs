@@ -5,7 +5,10 @@ use std::fmt::Write;
 use anyhow::Result;
 use lager_topics::{BlockSource, BlockedWays, Heading, NavBlocks, NavMap, Side, Tag, WarehouseMap};
 
+use lager_station::Warehouse;
+
 use super::{Operator, first};
+use crate::goods;
 
 impl Operator {
     /// `lager map`: the floor, its goods, and the ways on which something stands.
@@ -23,12 +26,19 @@ impl Operator {
             &self.bus,
             &self.patience,
         )?;
-        Ok(described(&map, &ways))
+        // Where no name is known there are numbers.
+        let names = goods::described(&self.running).ok();
+        Ok(described(&map, &ways, names.as_ref()))
     }
 }
 
 /// The warehouse in lines: the floor, each of its goods, each blocked way.
-fn described(map: &WarehouseMap, ways: &BlockedWays) -> String {
+fn described(map: &WarehouseMap, ways: &BlockedWays, names: Option<&Warehouse>) -> String {
+    let name = |id| {
+        let products = names.map_or(&[][..], |names| &names.products);
+        let product = products.iter().find(|product| product.id == id);
+        product.and_then(|product| product.name.as_deref())
+    };
     let WarehouseMap {
         width,
         height,
@@ -44,7 +54,11 @@ fn described(map: &WarehouseMap, ways: &BlockedWays) -> String {
     for product in map.products() {
         let side = side(product.side);
         let (id, x, y) = (product.id, product.x, product.y);
-        let _ = write!(text, "\nproduct {id}: at the {side} of square ({x}, {y})");
+        let name = name(id).map_or(String::new(), |name| format!(" ({name})"));
+        let _ = write!(
+            text,
+            "\nproduct {id}{name}: at the {side} of square ({x}, {y})"
+        );
     }
     for way in ways.ways() {
         let leads = leads(way.heading);
@@ -105,8 +119,13 @@ mod tests {
         let floor = "2 x 1 squares of 50 cm; delivery at (0, 0)\n\
                      product 7: at the upper side of square (1, 0)\n";
         let mut ways = BlockedWays::default();
-        let told = described(&map, &ways);
+        let told = described(&map, &ways, None);
         assert_eq!(told, format!("{floor}no way is blocked"));
+        let names = "size = [2, 1]\nside_length_cm = 50\n[[product]]\nid = 7\nname = \"screws\"\n\
+                     square = [1, 0]\nside = \"up\"";
+        let names: Warehouse = toml::from_str(names).expect("a warehouse");
+        let told = described(&map, &ways, Some(&names));
+        assert!(told.contains("\nproduct 7 (screws): at"), "{told}");
         ways.count = 1;
         ways.ways[0] = BlockedWay {
             x: 2,
@@ -114,7 +133,7 @@ mod tests {
             source: BlockSource::Person.into(),
             ..BlockedWay::default()
         };
-        let told = described(&map, &ways);
+        let told = described(&map, &ways, None);
         assert_eq!(
             told,
             format!("{floor}blocked: from (2, 0) to the left; a person says so")

@@ -5,12 +5,14 @@ use std::fmt::Write;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
+use lager_lines::Called;
 use lager_ports::Subscriber;
 use lager_topics::{
     EventKind, Input, InputKind, MissionEvent, MissionQueue, Mode, Order, OrderQueue,
 };
 
 use super::{Operator, first};
+use crate::goods;
 use crate::hands::Hands;
 
 /// How long after a word the robot is looked at again, in real time.
@@ -18,7 +20,7 @@ const GLANCE: Duration = Duration::from_millis(50);
 
 impl Operator {
     /// `lager fetch`: ordered until logic shows that it took the order.
-    pub fn fetch(&mut self, product: i32) -> Result<String> {
+    pub fn fetch(&mut self, product: &Called) -> Result<String> {
         // The order would wait, and the robot would drive off when somebody else changes the mode.
         if self.health()?.mode.get() != Some(Mode::Autonomous) {
             bail!(
@@ -80,7 +82,8 @@ impl Operator {
     }
 
     /// `lager queue add`: ordered until logic shows that it took the order, or refuses it.
-    pub fn order(&self, product: i32) -> Result<String> {
+    pub fn order(&self, product: &Called) -> Result<String> {
+        let product = goods::number(&self.running, product)?;
         let mut queue = self.bus.subscriber::<MissionQueue>()?;
         let mut events = self.bus.subscriber::<MissionEvent>()?;
         let order = Order {

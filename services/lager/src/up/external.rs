@@ -27,6 +27,7 @@ use std::os::unix::fs::FileTypeExt as _;
 use anyhow::{Context, Result, bail};
 
 use crate::config::{Config, StationSection};
+use crate::goods;
 use crate::runtime::RuntimeFolder;
 use crate::station;
 
@@ -94,7 +95,7 @@ fn station_for(config: &mut Config) -> Result<External> {
             told: format!("the external computer is the one at {address}"),
         });
     }
-    if let Err(error) = station::described(config) {
+    if let Err(error) = goods::configured(config) {
         if config.station.listen.is_some() || config.station.gag.is_some() {
             return Err(error);
         }

@@ -160,6 +160,7 @@ fn a_mark_is_told_on_its_side_and_a_crossing_on_both() {
     warehouse.size = [3, 3];
     warehouse.products = vec![Product {
         id: 1,
+        name: None,
         square: [1, 1],
         side: Side::Down,
     }];

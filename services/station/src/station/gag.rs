@@ -1,11 +1,15 @@
 //! The GaG that speaks for one of the robots.
+//!
+//! A GaG may send commands faster than its robot takes them, and then it has not been asked for them.
+//! Those wait in the robot's queue of commands ([`Robot::command`]), in their order, and so does the
+//! `pickup_done` behind them (C5). The robot takes them before the GaG is asked for another one.
 
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
 use lager_lines::{Map, Name, Products, SideLength, Text};
 use lager_wire::OperatorCommand;
 
 use super::{Peer, Station};
-use crate::robot::{ActRefused, Robot};
+use crate::robot::{ActRefused, CommandRefused, Robot};
 use crate::warehouse::{StoredProduct, Warehouse, WarehouseError};
 
 /// What it says.
@@ -22,10 +26,14 @@ impl Station {
             return self.correct_gag(&ActRefused::Driven { by }.to_string());
         }
         let Some(gag) = &mut self.gag else { return };
-        if let Err(error) = gag.held.answer(&answer) {
-            return self.correct_gag(&error.to_string());
-        }
         let name = gag.robot.clone();
+        if let Err(error) = gag.held.answer(&answer) {
+            return match self.queue(name, &answer) {
+                Some(Ok(())) => {}
+                Some(Err(error)) => self.correct_gag(&error.to_string()),
+                None => self.correct_gag(&error.to_string()),
+            };
+        }
         if let Err(error) = self.learn(&answer) {
             return self.correct_gag(&error.to_string());
         }
@@ -37,6 +45,18 @@ impl Station {
             self.say(&name, line);
             self.ask_gag(&name);
         }
+    }
+
+    /// Lets a command wait that nobody has asked for; `None` where this is none, or no robot is there.
+    fn queue(&mut self, name: Option<Name>, answer: &Answer) -> Option<Result<(), CommandRefused>> {
+        let name = name?;
+        let robot = self.robots.get_mut(&name)?;
+        let taken = match answer {
+            Answer::Command(command) => robot.command(*command),
+            Answer::PickupDone => robot.picked_up(),
+            _ => return None,
+        };
+        Some(taken.map(|line| self.say(&name, line)))
     }
 
     /// Who drives the GaG's robot by actions, where this would move it.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use lager_lines::Name;
 use lager_station::{Wish, load};
 
-use crate::sockets::{Running, WATCHDOG};
+use crate::sockets::{CROWD, Peer, Running, WATCHDOG};
 use crate::transcript::product;
 
 #[test]
@@ -152,6 +152,29 @@ fn a_robot_that_ends_one_half_of_its_connection_is_away_and_its_order_is_told_ag
     let mut again = station.robot();
     assert_eq!(again.asks("lager 1 r1"), "lager 1 lager");
     assert_eq!(again.asks("fetchprod"), "fetchprod 7");
+}
+
+#[test]
+fn a_thousand_half_open_gags_leave_the_first_one_its_place_and_then_free_it() {
+    let _crowd = CROWD.lock();
+    let station = Running::new();
+    let mut robot = station.robot();
+    let mut gag = station.gag();
+    let crowd: Vec<_> = (0..1000).map(|_| station.stranger()).collect();
+    crowd.iter().step_by(2).for_each(Peer::half_closes);
+    robot.says(b"fetchprod\n");
+    assert_eq!(gag.hears().as_deref(), Some("fetchprod"));
+    for mut one in crowd {
+        assert_eq!(one.hears(), None, "none of them is let in");
+    }
+    gag.says(b"fetchprod 7\n");
+    assert_eq!(robot.hears().as_deref(), Some("fetchprod 7"));
+    // One that will never say anything has no place, though its socket is open.
+    gag.half_closes();
+    assert_eq!(gag.hears(), None);
+    let mut next = station.gag();
+    robot.says(b"fetchprod\n");
+    assert_eq!(next.hears().as_deref(), Some("fetchprod"));
 }
 
 #[test]

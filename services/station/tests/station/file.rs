@@ -3,9 +3,10 @@
 use std::fs;
 use std::path::PathBuf;
 
+use lager_lines::Called;
 use lager_station::{LoadError, SaveError, load, save};
 
-use crate::transcript::{WAREHOUSE, warehouse};
+use crate::transcript::{WAREHOUSE, product, warehouse};
 
 /// A folder of its own that is removed in the end.
 struct Folder(PathBuf);
@@ -44,9 +45,14 @@ fn what_was_saved_is_read() {
     let folder = Folder::new("saved");
     fs::write(folder.file(), WAREHOUSE).expect("a file");
     let mut warehouse = load(&folder.file()).expect("a warehouse");
-    assert_eq!(warehouse.find("screws"), Some(7));
-    assert_eq!(warehouse.find("12"), Some(12));
-    assert_eq!(warehouse.find("nails"), None);
+    let find = |text: &str| warehouse.find(&text.parse::<Called>().expect("a name or a number"));
+    assert_eq!(find("screws"), Ok(product(7)));
+    assert_eq!(find("12"), Ok(product(12)));
+    for unknown in ["nails", "13"] {
+        let why = find(unknown).expect_err(unknown).to_string();
+        let wanted = format!("the warehouse has no product {unknown}; it has 7 (screws), 12");
+        assert_eq!(why, wanted);
+    }
 
     warehouse.products.pop();
     warehouse.delivery = [4, 3];
@@ -146,6 +152,22 @@ fn a_warehouse_that_cannot_be_is_refused_in_a_sentence() {
             "[1, 0]",
             "[4, 0]",
             "product 7 stands in the square [4, 0], but the last one is [3, 2]",
+        ),
+        (
+            "id = 12",
+            "id = 12\nname = \"screws\"",
+            "two products are named \"screws\"; every name needs to be another one",
+        ),
+        (
+            "\"screws\"",
+            "\"12\"",
+            "a product is named \"12\", which would be taken for its number; use a letter",
+        ),
+        (
+            "\"screws\"",
+            "\"screws, M4\"",
+            "a product is named \"screws, M4\": \"screws, M4\" cannot stand for a product; it must have \
+             a character and neither comma, semicolon, line break nor a blank at its ends",
         ),
     ] {
         assert_eq!(change(from, to), sentence);

@@ -1,7 +1,7 @@
 //! A GaG that speaks for a robot, as a reader sees both conversations side by side.
 
 use lager_lines::Name;
-use lager_station::{Output, Peer, Station, Wish, WishRefused};
+use lager_station::{Output, Peer, Robot, Station, Wish, WishRefused};
 use lager_wire::OperatorCommand;
 
 use crate::transcript::{product, warehouse};
@@ -170,6 +170,100 @@ fn a_stop_of_the_station_goes_to_a_robot_that_a_gag_drives() {
             (R1, "styrcomm", &["gag: styrcomm"]),
         ],
     );
+}
+
+#[test]
+fn commands_that_nobody_has_asked_a_gag_for_wait_in_their_order() {
+    let mut station = station();
+    station.connected(Peer::Gag);
+    station.connected(R1);
+    play(
+        &mut station,
+        &[
+            (R1, "styrcomm", &["gag: styrcomm"]),
+            (Peer::Gag, "styrcomm 8", &["r1: styrcomm 00001000"]),
+            // The robot turns, which takes a while.
+            (Peer::Gag, "armcomm F1", &[]),
+            (Peer::Gag, "styrcomm 9", &[]),
+            (R1, "styrcomm", &["r1: armcomm 11110001"]),
+            (R1, "styrcomm", &["r1: styrcomm 00001001"]),
+            // Then it is the GaG's turn to be asked.
+            (R1, "styrcomm", &["gag: styrcomm"]),
+            (Peer::Gag, "styrcomm 2", &["r1: styrcomm 00000010"]),
+            // At goods the arm's steps, and that it is done.
+            (R1, "armcomm", &["gag: armcomm"]),
+            (Peer::Gag, "armcomm F3", &["r1: armcomm 11110011"]),
+            (Peer::Gag, "armcomm F9", &[]),
+            (Peer::Gag, "pickup_done", &[]),
+            (R1, "armcomm", &["r1: armcomm 11111001"]),
+            (R1, "armcomm", &["r1: pickup_done"]),
+        ],
+    );
+}
+
+#[test]
+fn a_stop_takes_the_place_of_a_gags_commands_that_wait() {
+    let mut station = station();
+    station.connected(Peer::Gag);
+    station.connected(R1);
+    let waits: &[(Peer, &str, &[&str])] = &[
+        (R1, "styrcomm", &["gag: styrcomm"]),
+        (Peer::Gag, "styrcomm 8", &["r1: styrcomm 00001000"]),
+        (Peer::Gag, "styrcomm 9", &[]),
+        (Peer::Gag, "styrcomm 2", &[]),
+    ];
+    play(&mut station, waits);
+    play(
+        &mut station,
+        &[
+            (Peer::Gag, "styrcomm 1", &[]),
+            (R1, "styrcomm", &["r1: styrcomm 00000001"]),
+            (R1, "styrcomm", &["gag: styrcomm"]),
+            (R1, "lager 1 north", &["r1: lager 1 lager"]),
+            (Peer::Gag, "styrcomm 8", &["r1: styrcomm 00001000"]),
+            (Peer::Gag, "styrcomm 9", &[]),
+            // A robot that speaks the extension stands though it has asked nothing.
+            (Peer::Gag, "styrcomm 1", &["r1: styrcomm 00000001"]),
+            (R1, "styrcomm", &["gag: styrcomm"]),
+        ],
+    );
+}
+
+#[test]
+fn a_gags_commands_that_wait_are_bounded_and_none_is_older_than_the_mode() {
+    let mut station = station();
+    station.connected(Peer::Gag);
+    station.connected(R1);
+    play(
+        &mut station,
+        &[
+            (R1, "styrcomm", &["gag: styrcomm"]),
+            (Peer::Gag, "styrcomm 8", &["r1: styrcomm 00001000"]),
+        ],
+    );
+    for _ in 0..Robot::MOST_COMMANDS {
+        play(&mut station, &[(Peer::Gag, "styrcomm 2", &[])]);
+    }
+    station.heard(Peer::Gag, Ok("styrcomm 2"));
+    let told = said(&mut station);
+    assert!(told[0].starts_with("gag: thought 32 commands"), "{told:?}");
+    assert_eq!(told.len(), 1);
+    // The switch is turned: what waits moves nobody later, and nothing more is taken.
+    play(&mut station, &[(R1, "fetchprod", &["gag: fetchprod"])]);
+    for unasked in ["styrcomm 2", "pickup_done", "armcomm F1"] {
+        station.heard(Peer::Gag, Ok(unasked));
+        let told = said(&mut station);
+        assert!(told[0].starts_with("gag: thought the robot"), "{told:?}");
+        assert_eq!(told[1..], ["gag: fetchprod"]);
+    }
+    play(&mut station, &[(R1, "styrcomm", &["gag: styrcomm"])]);
+    // Nobody is there to take any.
+    station.disconnected(R1);
+    said(&mut station);
+    play(&mut station, &[(Peer::Gag, "styrcomm 2", &[])]);
+    station.heard(Peer::Gag, Ok("styrcomm 2"));
+    let told = said(&mut station);
+    assert!(told[0].contains("nothing is asked"), "{told:?}");
 }
 
 #[test]

@@ -6,12 +6,12 @@ use std::net::{SocketAddr, TcpStream};
 use std::os::unix::fs::PermissionsExt as _;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use lager_lines::Name;
+use lager_lines::{Called, Name};
 use lager_station::{Handle, Listen, Queues, Server, ServerConfig, ServerError, Wish, load};
 
 use crate::transcript::{WAREHOUSE, product};
@@ -56,20 +56,26 @@ impl Running {
         Peer(BufReader::new(stream))
     }
 
+    /// Somebody at the socket for a GaG, whether or not he is let in.
+    pub(crate) fn stranger(&self) -> Peer<UnixStream> {
+        let stream = UnixStream::connect(self.folder.join("gag")).expect("it listens");
+        stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
+        Peer(BufReader::new(stream))
+    }
+
     pub(crate) fn folder(&self) -> &std::path::Path {
         &self.folder
     }
 
     /// A GaG that has been let in, or that is refused because there is one.
     pub(crate) fn gag(&self) -> Peer<UnixStream> {
-        let stream = UnixStream::connect(self.folder.join("gag")).expect("it listens");
+        let gag = self.stranger();
         let start = std::time::Instant::now();
         while !self.handle.look(lager_station::Station::has_gag) {
             assert!(start.elapsed() < WATCHDOG, "it is not let in");
             std::thread::yield_now();
         }
-        stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
-        Peer(BufReader::new(stream))
+        gag
     }
 }
 
@@ -107,6 +113,14 @@ impl<S: Read> Peer<S> {
             Err(error) if error.kind() == ErrorKind::ConnectionReset => None,
             Err(error) => panic!("nothing came: {error}"),
         }
+    }
+}
+
+impl Peer<UnixStream> {
+    /// It says nothing more, and is still there.
+    pub(crate) fn half_closes(&self) {
+        // The station may have closed it by now.
+        let _ = self.0.get_ref().shutdown(std::net::Shutdown::Write);
     }
 }
 
@@ -219,17 +233,38 @@ fn queues_outlive_a_station_that_was_killed() {
     fs::copy(&from, &to).expect("the warehouse");
     fs::copy(Queues::beside(&from), Queues::beside(&to)).expect("the queues");
     let mut next = config(&folder);
-    next.fetch = vec![(Name::new("r2").expect("a name"), product(12))];
+    next.fetch = vec![(Name::new("r2").expect("a name"), product(12).into())];
     let next = Server::open(next).expect("another station");
     let queues = next.handle().look(lager_station::Station::queues);
     assert_eq!(queues.0["r1"], saved.0["r1"]);
     assert_eq!(queues.0["r2"], [12]);
 
+    let r2 = || Name::new("r2").expect("a name");
+    let mut named = config(&folder);
+    named.fetch = vec![(r2(), Called::Name("screws".into()))];
+    drop(next);
+    let named = Server::open(named).expect("a third one");
+    let queues = named.handle().look(lager_station::Station::queues);
+    assert_eq!(queues.0["r2"], [7], "by its name");
+    drop(named);
+    for (warehouse, known) in [
+        (&to, "7 (screws), 12"),
+        (&folder.join("none"), "not known yet"),
+    ] {
+        let mut unknown = config(&folder);
+        unknown.warehouse = Some(warehouse.clone());
+        unknown.fetch = vec![(r2(), Called::Name("nails".into()))];
+        let why = Server::open(unknown).expect_err("nails").to_string();
+        assert!(
+            why.contains("no product nails") && why.contains(known),
+            "{why}"
+        );
+    }
+
     // Without what it cannot have fetched.
     let unknown: Queues = toml::from_str("r1 = [7, 99]\n\"A b\" = [7]").expect("queues");
     unknown.save(&Queues::beside(&to)).expect("it is saved");
-    drop(next);
-    let last = Server::open(config(&folder)).expect("a third one");
+    let last = Server::open(config(&folder)).expect("another one");
     let queues = last.handle().look(lager_station::Station::queues);
     assert_eq!(queues, toml::from_str("r1 = [7]").expect("queues"));
 }
@@ -248,8 +283,12 @@ fn who_sends_what_is_no_line_is_closed_and_nobody_else_notices() {
     }
 }
 
+/// A thousand sockets are as many as a process may have on some machines.
+pub(crate) static CROWD: Mutex<()> = Mutex::new(());
+
 #[test]
 fn a_thousand_connections_leave_room_for_nobody_but_the_first() {
+    let _crowd = CROWD.lock();
     let station = Running::new();
     let mut good = station.robot();
     assert_eq!(good.asks("sidelength"), "sidelength 40");

@@ -287,3 +287,48 @@ fn the_next_due_time_misses_nothing() {
     written.retain(|(at, _)| *at < start + ms(400));
     assert_eq!(eager.written, written);
 }
+
+#[test]
+fn orders_that_come_faster_than_the_wire_carries_do_not_pile_up_before_a_standby() {
+    let mut bench = Bench::manual();
+    bench.arbiter.pace(ms(12));
+    bench.written.clear();
+    // Another order each millisecond, as from somebody who answers every question at once.
+    for id in 1..=600 {
+        let command = [FORWARD, FOLLOW][id as usize % 2];
+        bench.give(drive(Origin::Operator, id, command));
+        bench.run(1);
+    }
+    let times: Vec<_> = bench.written.iter().map(|(at, _)| *at).collect();
+    assert!(times.len() > 40, "{}", times.len());
+    assert!(times.windows(2).all(|pair| pair[1] - pair[0] >= ms(12)));
+    // The last one is carried out, and a stop does not wait for it.
+    bench.written.clear();
+    let start = bench.now;
+    bench.arbiter.stop();
+    bench.run(1);
+    let (at, command) = bench.written[0];
+    assert_eq!(
+        (at.checked_sub(start), command.command()),
+        (Some(ms(0)), Some(STANDBY))
+    );
+}
+
+#[test]
+fn who_moves_and_stands_in_turn_fills_the_wire_with_no_more_than_it_carries() {
+    let mut bench = Bench::manual();
+    bench.arbiter.pace(ms(12));
+    bench.written.clear();
+    let start = bench.now;
+    for id in 1..=600 {
+        let command = [FORWARD, STANDBY][id as usize % 2];
+        bench.give(drive(Origin::Operator, id, command));
+        bench.run(1);
+    }
+    let carried = (bench.now - start).as_millis() / 12;
+    let written = bench.written.len() as u128;
+    assert!(
+        written > carried / 2 && written <= carried + 2,
+        "{written} of {carried}"
+    );
+}

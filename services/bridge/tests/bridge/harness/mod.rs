@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use lager_bridge::BridgeConfig;
+use lager_bridge::{BridgeConfig, buttons};
 use lager_ports::{
     Bus, BusConfig, Cause, Client, Clock, PortError, Publisher, Shutdown, Stop, StopPage, StopTold,
     StopWord, Subscriber,
@@ -98,12 +98,21 @@ pub(crate) struct Bridge {
 
 impl Bridge {
     pub(crate) fn start(isolation: &Isolation, config: BridgeConfig) -> Self {
+        Self::start_with(isolation, config, Box::new(buttons::open))
+    }
+
+    /// Where `open` has the lines of its buttons.
+    pub(crate) fn start_with(
+        isolation: &Isolation,
+        config: BridgeConfig,
+        open: Box<buttons::Opener>,
+    ) -> Self {
         let bus = isolation.open(Role::Bridge);
         let shutdown = Shutdown::new();
         let wish = shutdown.clone();
         let thread = std::thread::Builder::new()
             .name("bridge".to_owned())
-            .spawn(move || lager_bridge::run(&bus, &config, &wish))
+            .spawn(move || lager_bridge::run_with(&bus, &config, &*open, &wish))
             .unwrap();
         Self {
             shutdown,
@@ -160,7 +169,7 @@ pub(crate) struct Seen<T: Topic> {
 }
 
 impl<T: Topic> Seen<T> {
-    fn new(bus: &Bus) -> Self {
+    pub(crate) fn new(bus: &Bus) -> Self {
         Self {
             subscriber: bus.subscriber().unwrap(),
             last: None,

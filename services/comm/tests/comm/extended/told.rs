@@ -1,0 +1,185 @@
+//! What such a station is told of the robot, and no other peer is.
+
+use lager_comm::Senses;
+use lager_topics::{
+    BlockedWay, BlockedWays, DistanceFrame, Event, EventKind, Failure, FailureKind, Heading,
+    LineFrame, Mode, NavigatorStatus, Phase, Remedy, Role, StopCause, Thought, ThoughtKind, Truth,
+};
+
+use super::{extended, pass, queue};
+use crate::robot::Robot;
+
+#[test]
+fn a_station_is_told_the_state_twenty_times_a_second() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.status(&NavigatorStatus {
+        x: 1,
+        y: 2,
+        travelled_mm: 150,
+        phase: Phase::WaitingForOrder.into(),
+        heading: Heading::Right.into(),
+        ..NavigatorStatus::default()
+    });
+    robot.health.sensor.up = 1;
+    robot.told();
+    robot.conversation.senses(Senses {
+        line: Some(LineFrame {
+            bits: 0b000_0111_0000,
+            ..LineFrame::default()
+        }),
+        distance: Some(DistanceFrame {
+            distance_cm: 52,
+            ..DistanceFrame::default()
+        }),
+        truth: Some(Box::new(Truth {
+            x_mm: 549.6,
+            ..Truth::default()
+        })),
+        ..Senses::default()
+    });
+    robot.shown.clear();
+    pass(&mut robot, 1_000);
+    let states: Vec<_> = robot
+        .shown
+        .iter()
+        .filter(|line| line.starts_with("state "))
+        .collect();
+    assert_eq!(states.len(), 20, "{:?}", robot.shown);
+    for field in [
+        " x_mm=550 y_mm=800 heading_deg=90 unsure_mm=38 node=1,2 looks=right ",
+        " phase=waiting_for_order hold=none mode=autonomous pick=manual stopped=0 ",
+        " line_bits=00001110000 ",
+        " distance_cm=52 ",
+        " sensor_up=1 steering_up=0 ",
+    ] {
+        assert!(states[0].contains(field), "{field}: {}", states[0]);
+    }
+    // The steering board is not there, so nothing is said of it.
+    assert!(!states[0].contains("duty"), "{}", states[0]);
+    let truths = robot.shown.iter().filter(|line| line.starts_with("truth"));
+    let truths: Vec<_> = truths.collect();
+    assert_eq!(truths, ["truth 550 0 90 -"], "it is told once");
+}
+
+#[test]
+fn lists_are_told_when_they_have_changed_and_anew_to_each_station() {
+    let mut robot = extended(Mode::Autonomous);
+    pass(&mut robot, 100);
+    robot.shown.clear();
+    robot.queue(&queue(&[4, 5]));
+    let mut blocks = BlockedWays {
+        count: 1,
+        ..BlockedWays::default()
+    };
+    blocks.ways[0] = BlockedWay {
+        x: 2,
+        y: 0,
+        heading: Heading::Up.into(),
+        since_ns: 81_999_000_000,
+        ..BlockedWay::default()
+    };
+    robot.conversation.senses(Senses {
+        blocks: Some(Box::new(blocks)),
+        ..Senses::default()
+    });
+    let lists = |robot: &mut Robot| {
+        pass(robot, 200);
+        let mut shown = core::mem::take(&mut robot.shown);
+        shown.retain(|line| !line.starts_with("state "));
+        shown
+    };
+    let wanted = ["blocked 1 2 0 up 81", "queue 2 4 7 5 7"];
+    assert_eq!(lists(&mut robot), wanted);
+    assert_eq!(lists(&mut robot), [""; 0]);
+    robot.disconnect();
+    robot.connect();
+    assert_eq!(lists(&mut robot), wanted);
+}
+
+#[test]
+fn a_plain_peer_hears_nothing_of_it() {
+    let mut robot = Robot::connected(Mode::Manual);
+    robot.queue(&queue(&[4]));
+    let said = robot.event(&Event {
+        kind: EventKind::InPosition.into(),
+        ..Event::default()
+    });
+    assert_eq!(said, [""; 0]);
+    let said = robot.hears(&["do 1 drive 2 100"]);
+    assert!(said[0].starts_with("thought say `lager 1 "), "{said:?}");
+    robot.pass(2_000);
+    assert_eq!(robot.shown, [""; 0]);
+}
+
+#[test]
+fn events_are_told_with_their_reason() {
+    let mut robot = extended(Mode::Autonomous);
+    let said = robot.event(&Event {
+        kind: EventKind::Failed.into(),
+        x: 3,
+        y: 1,
+        order_id: 4,
+        product: 7,
+        failure: Failure::new(FailureKind::DrivenByHand, (3, 1), 0, 30),
+        ..Event::default()
+    });
+    assert_eq!(
+        said,
+        ["event failed 3 1 4 7 I have been driven by hand, 30 mm"]
+    );
+}
+
+#[test]
+fn a_thought_is_told_in_values_before_it_is_told_in_words() {
+    let mut robot = extended(Mode::Autonomous);
+    let mut thought = Thought::from(ThoughtKind::OrderRefused);
+    thought.product = 9;
+    thought.failure = Failure::new(FailureKind::UnknownProduct, (3, 1), 0, 9);
+    robot.conversation.thought(&thought);
+    assert_eq!(
+        robot.done(),
+        [
+            "thinks kind=order_refused node=0,0 looks=left joint=base sides=0 product=9 expected=0 \
+             seen=0 failure=unknown_product failure_node=3,1 failure_expected=0 failure_seen=9 \
+             remedy=map",
+            "thought I cannot fetch product 9: product 9 is not on my map.",
+        ]
+    );
+    // The document has words only.
+    let mut robot = Robot::connected(Mode::Autonomous);
+    robot.conversation.thought(&thought);
+    let said = robot.done();
+    assert!(said[0].starts_with("thought I cannot"), "{said:?}");
+}
+
+#[test]
+fn a_stop_and_a_failure_are_told_with_what_is_known_of_them() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.health.stopped = 1;
+    robot.health.stop_cause = StopCause::BoardResets.into();
+    robot.health.stop_origin = Role::Bridge.into();
+    robot.health.stopped_at_ns = robot.now.ns - 30_000_000;
+    robot.health.gain_p = 20;
+    robot.health.gain_d = 3;
+    robot.told();
+    robot.status(&NavigatorStatus {
+        phase: Phase::Stuck.into(),
+        failure: Failure::new(FailureKind::LineLost, (0, 0), 90, 120),
+        remedy: Remedy::Reset.into(),
+        ..NavigatorStatus::default()
+    });
+    robot.shown.clear();
+    pass(&mut robot, 100);
+    let state = robot.shown.iter().find(|line| line.starts_with("state "));
+    let state = state.expect("one in 50 ms");
+    let (_, age) = state.split_once(" stop_age_ms=").expect("its age");
+    let age: u64 = age.split(' ').next().unwrap().parse().unwrap();
+    assert!((30..=130).contains(&age), "{state}");
+    for field in [
+        " stopped=1 stop_cause=board_resets stop_by=bridge stop_age_ms=",
+        " failure=line_lost failure_expected=90 failure_seen=120 remedy=reset ",
+        " gain_p=20 gain_d=3",
+    ] {
+        assert!(state.contains(field), "{field}: {state}");
+    }
+}

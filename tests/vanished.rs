@@ -1,0 +1,303 @@
+//! A machine that vanishes: it says nothing more, and nobody says for it that it has gone, as when a
+//! cable is pulled or a battery is empty.
+//!
+//! ```text
+//!   a network of the test's own              another one
+//!   lager up, or a station  ── 192.0.2.0/30 ──  sockets of the test
+//!                                            its end is taken down
+//! ```
+//!
+//! Both networks are in a user namespace in which the test runs itself again, so nothing of the
+//! machine's own is touched. Where that is not allowed each test says that it is ignored and why.
+
+#[path = "comm/scene.rs"]
+#[allow(dead_code, reason = "what other tests with a played station need")]
+mod scene;
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::os::fd::AsFd;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use lager_lines::Name;
+use lager_ports::Clock;
+use lager_station::{Doing, Listen, Server, ServerConfig};
+use lager_tests::wait_for;
+use lager_topics::TruthPose;
+use rustix::thread::{LinkNameSpaceType, move_into_link_name_space};
+
+use crate::scene::{Peer, Scene};
+
+/// Tells the test that it is in networks of its own.
+const INSIDE: &str = "LAGER_VANISHED";
+/// What runs a program as root of a user namespace with a network of its own.
+const APART: [&str; 3] = ["--map-root-user", "--net", "--"];
+const OURS: &str = "192.0.2.1";
+const THEIRS: &str = "192.0.2.2";
+/// Within what a robot that is driven by hand stands when its link is lost, and how much later the
+/// simulated world may show that.
+const STANDS_WITHIN: Duration = Duration::from_millis(200);
+const SHOWN_AFTER: Duration = Duration::from_millis(20);
+
+/// A thread that sleeps 2 ms and gets no core for so long is held up.
+const HELD_UP: Duration = Duration::from_millis(20);
+
+/// A test and its name.
+type Test = (&'static str, fn(&Network));
+
+const TESTS: [Test; 3] = [
+    (
+        "a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes",
+        a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes,
+    ),
+    (
+        "a_robot_stands_when_the_machine_of_a_plain_station_vanishes",
+        a_robot_stands_when_the_machine_of_a_plain_station_vanishes,
+    ),
+    (
+        "robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places",
+        robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places,
+    ),
+];
+
+/// A network that is connected to this one, and can be cut off.
+struct Network {
+    /// A process that keeps it.
+    keeper: Child,
+}
+
+impl Network {
+    fn new() -> Self {
+        ip(&["link", "set", "lo", "up"]);
+        let keeper = Command::new("unshare")
+            .args(["--net", "sleep", "infinity"])
+            .stdin(Stdio::null())
+            .spawn()
+            .expect("`unshare` is there");
+        let network = Self { keeper };
+        let own = fs::read_link("/proc/self/ns/net").expect("Linux has it");
+        wait_for("the other network", || {
+            let theirs = fs::read_link(network.path()).ok()?;
+            (theirs != own).then_some(())
+        });
+        let keeper = network.keeper.id().to_string();
+        let peer = ["type", "veth", "peer", "name", "lager1", "netns", &keeper];
+        ip(&[&["link", "add", "lager0"], &peer[..]].concat());
+        ip(&["address", "add", &format!("{OURS}/30"), "dev", "lager0"]);
+        ip(&["link", "set", "lager0", "up"]);
+        let address = format!("{THEIRS}/30");
+        network.ip(&["address", "add", &address, "dev", "lager1"]);
+        network.ip(&["link", "set", "lo", "up"]);
+        network.comes_back();
+        network
+    }
+
+    fn path(&self) -> String {
+        format!("/proc/{}/ns/net", self.keeper.id())
+    }
+
+    /// What is made by a thread of that network.
+    fn inside<T: Send>(&self, make: impl FnOnce() -> T + Send) -> T {
+        let network = File::open(self.path()).expect("it is kept");
+        let enter = move || {
+            let kind = Some(LinkNameSpaceType::Network);
+            move_into_link_name_space(network.as_fd(), kind).expect("this is its root");
+            make()
+        };
+        std::thread::scope(|scope| scope.spawn(enter).join().expect("no panic"))
+    }
+
+    /// From now on nothing arrives there and nothing comes from there.
+    fn vanishes(&self) {
+        self.ip(&["link", "set", "lager1", "down"]);
+    }
+
+    fn comes_back(&self) {
+        self.ip(&["link", "set", "lager1", "up"]);
+    }
+
+    fn ip(&self, arguments: &[&str]) {
+        let keeper = self.keeper.id().to_string();
+        let enter = ["nsenter", "--target", &keeper, "--net", "ip"];
+        runs(&[&enter[..], arguments].concat());
+    }
+}
+
+impl Drop for Network {
+    fn drop(&mut self) {
+        let _ = self.keeper.kill();
+        let _ = self.keeper.wait();
+        // It goes with either of its ends, and one is in a network that may live on for a moment.
+        let _ = Command::new("ip")
+            .args(["link", "del", "lager0"])
+            .stderr(Stdio::null())
+            .status();
+    }
+}
+
+fn ip(arguments: &[&str]) {
+    runs(&[&["ip"], arguments].concat());
+}
+
+fn runs(words: &[&str]) {
+    let status = Command::new(words[0]).args(&words[1..]).status();
+    assert!(status.is_ok_and(|status| status.success()), "{words:?}");
+}
+
+/// A robot that drives by a station's word, in the other network.
+fn driven(network: &Network, is_extended: bool) -> (Scene, Peer<TcpStream>) {
+    let listener = network.inside(|| TcpListener::bind((THEIRS, 0)).expect("a port"));
+    let mut scene = Scene::with(listener);
+    let robot = scene.drive(is_extended);
+    (scene, robot)
+}
+
+fn a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes(network: &Network) {
+    let (mut scene, mut robot) = driven(network, true);
+    let bus = scene.domain.observe("r1", 1.0);
+    let mut truth = bus.subscriber::<TruthPose>().expect("a topic");
+    let mut good = 0;
+    while good < 3 {
+        let cut_ns = Clock::monotonic_ns();
+        network.vanishes();
+        let (mut last, mut held_up) = (Instant::now(), Duration::ZERO);
+        let after = wait_for("the robot to stand", || {
+            // This thread sleeps 2 ms at a time.
+            held_up = held_up.max(last.elapsed());
+            last = Instant::now();
+            let truth = truth.receive().expect("readable")?;
+            let seen_ns = truth.stamp().publish_time_ns;
+            let stands = (truth.left_duty, truth.right_duty) == (0, 0);
+            (stands && seen_ns > cut_ns).then(|| Duration::from_nanos(seen_ns - cut_ns))
+        });
+        let [ms, held_up_ms] = [after, held_up].map(|time| time.as_millis());
+        println!("the robot stood {ms} ms after the cut; this machine was held up {held_up_ms} ms");
+        let is_in_time = after <= STANDS_WITHIN + SHOWN_AFTER;
+        // A time of a machine that was held up says nothing, and is taken once more.
+        assert!(is_in_time || held_up > HELD_UP, "{after:?}");
+        good += u32::from(is_in_time);
+        // Nothing is carried out when the link is there again: it waits for a new word.
+        network.comes_back();
+        drop(robot);
+        robot = scene.robot();
+        robot.waits_for(&["styrcomm"]);
+        assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
+        drop(robot);
+        robot = scene.drive(true);
+        while truth.receive().expect("readable").is_some() {}
+    }
+}
+
+/// The document's language has no sign of life, so here the kernel has to find out.
+fn a_robot_stands_when_the_machine_of_a_plain_station_vanishes(network: &Network) {
+    let (mut scene, robot) = driven(network, false);
+    let start = Instant::now();
+    network.vanishes();
+    scene.wait_until_it_stands();
+    println!("the robot stood after {} ms", start.elapsed().as_millis());
+    network.comes_back();
+    drop(robot);
+    scene.robot().waits_for(&["styrcomm"]);
+}
+
+/// A robot as its station sees it, which says one line and then waits.
+fn robot(at: SocketAddr, name: &str) -> BufReader<TcpStream> {
+    let stream = TcpStream::connect(at).expect("it listens");
+    stream
+        .set_read_timeout(Some(scene::WATCHDOG))
+        .expect("a socket");
+    let mut robot = BufReader::new(stream);
+    let _ = writeln!(robot.get_mut(), "lager 1 {name}");
+    robot
+}
+
+fn is_answered(robot: &mut BufReader<TcpStream>) -> bool {
+    let mut line = String::new();
+    robot.read_line(&mut line).is_ok_and(|count| count > 0)
+}
+
+fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places(network: &Network) {
+    let server = Server::open(ServerConfig {
+        name: Name::new("tester").expect("a name"),
+        listen: Listen::At(format!("{OURS}:0").parse().expect("an address")),
+        gag: None,
+        warehouse: None,
+        fetch: Vec::new(),
+    });
+    let server = server.expect("a station");
+    let (handle, at) = (server.handle(), server.address().expect("an address"));
+    let ends = Arc::new(AtomicBool::new(false));
+    let until = Arc::clone(&ends);
+    let serves = std::thread::spawn(move || server.run(&until).expect("it serves"));
+
+    // As many as there are places.
+    let crowd = network.inside(|| {
+        let robots = (0..Server::MOST_ROBOTS).map(|number| robot(at, &format!("far-{number}")));
+        let mut robots: Vec<_> = robots.collect();
+        assert!(robots.iter_mut().all(is_answered));
+        robots
+    });
+    assert!(!is_answered(&mut robot(at, "near")), "there is no place");
+    let away = || {
+        let robots = handle.robots();
+        let away = robots.iter().filter(|view| view.doing == Doing::Away);
+        away.count()
+    };
+    assert_eq!(away(), 0);
+    let start = Instant::now();
+    network.vanishes();
+    wait_for("all of them to be shown as away", || {
+        (away() == crowd.len()).then_some(())
+    });
+    println!("all were away after {} ms", start.elapsed().as_millis());
+    assert!(is_answered(&mut robot(at, "near")), "there is room again");
+    ends.store(true, Ordering::SeqCst);
+    serves.join().expect("it has ended");
+    network.comes_back();
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let filters: Vec<_> = arguments
+        .iter()
+        .filter(|word| !word.starts_with('-'))
+        .collect();
+    let wanted = TESTS.iter().filter(|(name, _)| {
+        filters.is_empty() || filters.iter().any(|filter| name.contains(filter.as_str()))
+    });
+    if std::env::var_os(INSIDE).is_some() {
+        let network = Network::new();
+        for (name, test) in wanted {
+            test(&network);
+            println!("test {name} ... ok");
+        }
+        return;
+    }
+    let link = [
+        "ip", "link", "add", "lager0", "type", "veth", "peer", "name", "lager1",
+    ];
+    let tried = Command::new("unshare").args(APART).args(link).output();
+    let why = match &tried {
+        Ok(tried) if tried.status.success() => None,
+        Ok(tried) => Some(String::from_utf8_lossy(&tried.stderr).trim().to_owned()),
+        Err(error) => Some(format!("unshare: {error}")),
+    };
+    if let Some(why) = why {
+        for (name, _) in wanted {
+            println!("test {name} ... ignored, no network of its own can be had: {why}");
+        }
+        return;
+    }
+    let again = Command::new("unshare")
+        .args(APART)
+        .arg(std::env::current_exe().expect("this program"))
+        .args(&arguments)
+        .env(INSIDE, "1")
+        .status()
+        .expect("`unshare` is there");
+    assert!(again.success(), "{again}");
+}
