@@ -7,6 +7,7 @@ mod figures;
 mod manners;
 mod pictures;
 mod played;
+mod reasons;
 mod scene;
 mod setting_up;
 mod watched;

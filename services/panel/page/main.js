@@ -8,6 +8,7 @@ import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { WarehouseMap } from "./map.js";
 import { Missions } from "./missions.js";
+import { reason } from "./reasons.js";
 import { Setup } from "./setup.js";
 import { Strips } from "./strips.js";
 import { change, current, put, say, translate } from "./words.js";
@@ -52,7 +53,7 @@ async function meetEdge([x, y, way] = []) {
   // Where one stands a second put changes nothing, so it is tried to be taken first.
   const take = await link.act(shown, `obstacle take ${edge}`);
   const put = take.done ? take : await link.act(shown, `obstacle put ${edge}`);
-  if (!put.done) return tell("refused", put.refused === "lost" ? say("lost") : put.refused);
+  if (!put.done) return tell("refused", reason(put.refused));
   const done = take.done ? "take" : "put";
   tell(done === "put" ? "obstacle_put" : "obstacle_taken");
   const undo = at("map-undo");
@@ -60,7 +61,7 @@ async function meetEdge([x, y, way] = []) {
   undo.onclick = async () => {
     undo.hidden = true;
     const back = await link.act(shown, `obstacle ${done === "put" ? "take" : "put"} ${edge}`);
-    tell(...(back.done ? [done === "put" ? "obstacle_taken" : "obstacle_put"] : ["refused", back.refused]));
+    tell(...(back.done ? [done === "put" ? "obstacle_taken" : "obstacle_put"] : ["refused", reason(back.refused)]));
   };
 }
 
@@ -72,7 +73,7 @@ async function act(action) {
   const shown = robot();
   if (!shown) return;
   const answer = await link.act(shown, action);
-  driving.tell(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+  driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
 }
 
 at("manual").onclick = () => act("mode manual");
@@ -90,7 +91,7 @@ at("control").onclick = async () => {
   driving.letGo();
   driving.tell(...(shown.driver && !mine ? ["asked_for", shown.driver] : [null]));
   const answer = await link.ask(mine ? "free" : "take", shown.name);
-  driving.tell(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+  driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
   if (mine && answer.done && where.isOpen(shown)) where.ask();
 };
 at("language").onclick = () => {

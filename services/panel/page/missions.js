@@ -1,5 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
+import { reason } from "./reasons.js";
 import { crossing, sentence } from "./sentences.js";
 import { put, say, span } from "./words.js";
 
@@ -36,8 +37,7 @@ export class Missions {
     const robot = this.robot();
     if (!robot) return put(this.parts.said, say("no_robot"));
     const answer = await this.link.act(robot, action);
-    const why = answer.refused === "lost" ? say("lost") : answer.refused;
-    put(this.parts.said, answer.refused ? say("refused", why) : "");
+    put(this.parts.said, answer.refused ? reason(answer.refused) : "");
     return !answer.refused;
   }
 

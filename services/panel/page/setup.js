@@ -1,5 +1,6 @@
 // Setting up: the warehouse with checks as one types, the line control's gains, the calibration.
 
+import { reason } from "./reasons.js";
 import { SENSORS, sensors } from "./strips.js";
 import { put, say } from "./words.js";
 
@@ -71,10 +72,10 @@ export class Setup {
   async loadFile(file) {
     try {
       const { size, side_length_cm, delivery = [0, 0], product = [], ...rest } = JSON.parse(await file.text());
-      if (!Array.isArray(size) || size.length !== 2 || !Array.isArray(product)) throw new Error(say("no_warehouse"));
       await this.save({ ...rest, size, side_length_cm, delivery, product });
-    } catch (error) {
-      put(this.parts.said, `${file.name}: ${error.message}`);
+    } catch {
+      // It is no JSON, or something else than this.
+      put(this.parts.said, `${file.name}: ${say("no_warehouse")}`);
     }
   }
 
@@ -111,7 +112,7 @@ export class Setup {
     const robot = this.robot();
     const { refused } = robot ? await this.link.act(robot, "calibrate") : { refused: say("no_robot") };
     at(2);
-    put(calibrationSaid, refused ? say("refused", refused === "lost" ? say("lost") : refused) : say("calibrated"));
+    put(calibrationSaid, refused ? reason(refused) : say("calibrated"));
     calibrate.disabled = false;
   }
 
@@ -155,8 +156,7 @@ export class Setup {
     const robot = this.robot();
     if (!robot) return put(this.parts.boardSaid, say("no_robot"));
     const answer = await this.link.act(robot, action);
-    const why = answer.refused === "lost" ? say("lost") : answer.refused;
-    put(this.parts.boardSaid, answer.refused ? say("refused", why) : say(done));
+    put(this.parts.boardSaid, answer.refused ? reason(answer.refused) : say(done));
     return !answer.refused;
   }
 
@@ -165,7 +165,7 @@ export class Setup {
     if (why) return put(this.parts.said, why);
     const before = this.link.warehouse;
     const answer = await this.link.ask("warehouse", null, JSON.stringify(warehouse));
-    if (answer.refused) return put(this.parts.said, answer.refused === "lost" ? say("lost") : answer.refused);
+    if (answer.refused) return put(this.parts.said, reason(answer.refused));
     if (undoable && before) this.past.push(before);
     this.dirty = false;
     put(this.parts.said, say("saved"));

@@ -18,6 +18,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/map.js", SCRIPT, include_str!("../page/map.js")),
     ("/mcap.js", SCRIPT, include_str!("../page/mcap.js")),
     ("/missions.js", SCRIPT, include_str!("../page/missions.js")),
+    ("/reasons.js", SCRIPT, include_str!("../page/reasons.js")),
     ("/screen", HTML, include_str!("../page/screen.html")),
     ("/screen.js", SCRIPT, include_str!("../page/screen.js")),
     (
