@@ -4,6 +4,7 @@ import { Arm } from "./arm.js";
 import { Asked, Where } from "./ask.js";
 import { Bar } from "./bar.js";
 import { Driving } from "./drive.js";
+import { Line } from "./line.js";
 import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { WarehouseMap } from "./map.js";
@@ -37,8 +38,11 @@ const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: 
 const setup = new Setup(link, {
   form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
   saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
-  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), calibrate: at("calibrate"), calibration: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"), boardSaid: at("board-said"),
-}, robot);
+});
+const line = new Line({
+  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
+  calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
+}, link, robot);
 const strips = new Strips(at("strips"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), csv: at("save-csv"), mcap: at("save-mcap") }, robot);
 
@@ -192,7 +196,7 @@ function drawRest(shown, time) {
   missions.draw(shown, time);
   arm.draw(shown);
   strips.draw(shown);
-  setup.draw(shown);
+  line.draw(shown);
   asked.draw(shown);
   log.draw(shown);
   const mine = shown?.driver && shown.driver === link.me;

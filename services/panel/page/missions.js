@@ -90,7 +90,7 @@ export class Missions {
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
     picks.disabled = pick === undefined || !this.link.mayDrive;
-    const lines = (robot?.history ?? []).map(delivered);
+    const lines = (robot?.history ?? []).map((one) => delivered(one, this.names));
     fill(this.parts.history, lines, (line) => item(line));
   }
 
@@ -120,8 +120,9 @@ export class Missions {
 }
 
 /** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
-function delivered({ product, at, took, detours }) {
-  const words = [new Date(at).toLocaleTimeString(), product, took];
+function delivered({ product, at, took, detours }, names) {
+  const name = names.get(product) ?? product;
+  const words = [new Date(at).toLocaleTimeString(), took ? say("took", name, took) : name];
   const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
   if (ways.length) words.push(say("detours", ways.join("; ")));
   return words.join("  ");

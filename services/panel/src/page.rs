@@ -12,6 +12,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/ask.js", SCRIPT, include_str!("../page/ask.js")),
     ("/bar.js", SCRIPT, include_str!("../page/bar.js")),
     ("/drive.js", SCRIPT, include_str!("../page/drive.js")),
+    ("/line.js", SCRIPT, include_str!("../page/line.js")),
     ("/link.js", SCRIPT, include_str!("../page/link.js")),
     ("/log.js", SCRIPT, include_str!("../page/log.js")),
     ("/main.js", SCRIPT, include_str!("../page/main.js")),
