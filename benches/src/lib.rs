@@ -29,6 +29,7 @@ mod schedule;
 mod shared;
 pub mod slow;
 mod stats;
+pub mod times;
 
 pub use domain::Domain;
 pub use error::BenchError;
