@@ -6,7 +6,7 @@ use std::fmt::Display;
 use lager_lines::{Coord, Map, MapError, Name, Products, ProductsError};
 use lager_station::{ActRefused, CommandRefused, WarehouseError, WishRefused};
 use lager_topics::{
-    Calibration, Coded, Failure, FailureKind, Finish, Health, NotWaiting, Outcome, Refusal,
+    Calibration, Coded, Failure, FailureKind, Finish, Health, OrderQueue, Outcome, Refusal,
     WorldRefusal,
 };
 use serde_json::{Value, json};
@@ -26,7 +26,15 @@ const SOURCES: [&str; 7] = [
 ];
 /// First words of lines between panel and page, which are no sentences.
 const LINES: [&str; 9] = [
-    "you", "answer", "refused", "stopped", "thought", "past", "from", "warehouse", "about",
+    "you",
+    "answer",
+    "refused",
+    "stopped",
+    "thought",
+    "past",
+    "from",
+    "warehouse",
+    "about",
 ];
 
 /// The sentences among the literals of a source, with a number in place of each value.
@@ -78,6 +86,15 @@ fn typed() -> Vec<String> {
         let failure = health.calibration_failure();
         failure.expect("it has not ended well")
     }));
+    let under_way = OrderQueue {
+        under_way: 1,
+        order_id: 7,
+        ..OrderQueue::default()
+    };
+    all.extend([under_way, OrderQueue::default()].map(|queue| {
+        let why = queue.before(7).expect_err("it does not wait");
+        why.to_string()
+    }));
     let by = "panel-3".to_owned();
     let robot = Name::new("r1").expect("a name");
     let coord = |x, y| Coord { x, y };
@@ -90,9 +107,7 @@ fn typed() -> Vec<String> {
         side: lager_lines::Direction::Up,
     };
     let twice: ProductsError = Products::new(vec![product, product]).expect_err("it is twice");
-    let refused: [&dyn Display; 17] = [
-        &NotWaiting::UnderWay(7),
-        &NotWaiting::Unknown(7),
+    let refused: [&dyn Display; 15] = [
         &ActRefused::Plain,
         &ActRefused::Full,
         &ActRefused::Driven { by },
@@ -144,7 +159,11 @@ fn every_reason_that_is_told_is_told_in_swedish() {
     assert!(reasons.len() > before + 30, "{:#?}", &reasons[before..]);
     let stage = Stage::new(None, false);
     let mut page = stage.page(&stage.url);
-    assert_eq!(told(&mut page, &reasons), json!(reasons), "in English it is as it was said");
+    assert_eq!(
+        told(&mut page, &reasons),
+        json!(reasons),
+        "in English it is as it was said"
+    );
     page.click("#language");
     let swedish = told(&mut page, &reasons);
     // Words that only English has.
