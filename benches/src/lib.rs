@@ -28,6 +28,7 @@ mod scenario;
 pub mod slow;
 mod stats;
 pub mod steps;
+pub mod times;
 
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};

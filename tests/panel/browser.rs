@@ -43,6 +43,8 @@ impl Browser {
                 "--disable-component-update",
                 "--remote-debugging-port=0",
                 "--window-size=1280,720",
+                // Its pages speak English, whatever this machine does.
+                "--accept-lang=en-US",
             ])
             .arg(format!("--user-data-dir={}", profile.display()))
             .arg("about:blank")
@@ -185,6 +187,11 @@ pub(crate) struct Page {
 }
 
 impl Page {
+    /// Closes it, as a person closes a tab.
+    pub(crate) fn close(mut self) {
+        self.call("Page.close", &json!({}));
+    }
+
     /// Has the browser do something.
     pub(crate) fn call(&mut self, method: &str, params: &Value) -> Value {
         self.number += 1;
@@ -370,8 +377,18 @@ impl Page {
             .collect()
     }
 
+    /// Fills in the last field that fits, as a person does who then leaves it.
+    pub(crate) fn fill(&mut self, selector: &str, value: &str) {
+        self.value(&format!(
+            "(() => {{ const field = [...document.querySelectorAll({})].at(-1); field.value = {}; \
+             for (const name of ['input', 'change']) field.dispatchEvent(new Event(name, {{ bubbles: true }})); }})()",
+            json!(selector),
+            json!(value)
+        ));
+    }
+
     /// For things that need a moment and show nothing.
     pub(crate) fn pause(&mut self) {
-        std::thread::sleep(Duration::from_millis(300));
+        std::thread::sleep(Duration::from_millis(150));
     }
 }

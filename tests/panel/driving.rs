@@ -140,7 +140,6 @@ fn let_all_go(page: &mut Page) {
 /// Holds until the robot moves by it: a person whose order was refused takes hold anew.
 fn take_hold(scene: &mut Scene, page: &mut Page, hold: &By) {
     wait_for("the robot to be driven", || {
-        let_all_go(page);
         page.moves();
         hold.go(page);
         for _ in 0..100 {
@@ -149,25 +148,27 @@ fn take_hold(scene: &mut Scene, page: &mut Page, hold: &By) {
             }
             std::thread::sleep(std::time::Duration::from_millis(10));
         }
+        let_all_go(page);
         None
     });
 }
 
-#[test]
-fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
-    scene.arm(&mut page);
+pub(crate) fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
     page.listen_in();
     let mut reports = scene.bus.subscriber::<SteeringState>().expect("a topic");
+    let_all_go(page);
     for (name, hold, release) in WAYS {
         let mut times = Vec::new();
         while times.len() < TRIES && times.iter().all(|ms| *ms > RELEASE_MS) {
-            take_hold(&mut scene, &mut page, hold);
+            take_hold(scene, page, hold);
             while reports.receive().expect("readable").is_some() {}
             assert!(!page.moves().is_empty(), "{name}");
             let from = Clock::monotonic_ns();
-            release.go(&mut page);
+            release.go(page);
             let ms = stands(&mut reports, from);
             page.pause();
             // What was given before the release may stand before it.
@@ -180,21 +181,21 @@ fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence() {
             }
             page.pause();
             assert_eq!(page.moves(), [""; 0], "{name}: silence");
+            let_all_go(page);
         }
         let quickest = times.iter().copied().fold(f64::INFINITY, f64::min);
         assert!(quickest <= RELEASE_MS, "{name}: {times:.0?} ms");
-        let_all_go(&mut page);
         scene.assert_stands();
     }
 
     // The box that arms, and the socket itself: nobody can say zero then.
-    scene.hold(&mut page, "ArrowLeft");
+    scene.hold(page, "ArrowLeft");
     page.value("document.querySelector('#armed').click()");
     scene.wait_to_stand();
     page.key_up("ArrowLeft");
     page.value("document.querySelector('#armed').click()");
     page.moves();
-    scene.hold(&mut page, "ArrowLeft");
+    scene.hold(page, "ArrowLeft");
     let from = Clock::monotonic_ns();
     while reports.receive().expect("readable").is_some() {}
     page.value("window.sent = []; line.close()");
@@ -203,8 +204,6 @@ fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence() {
     assert_eq!(page.moves(), [""; 0]);
     page.key_up("ArrowLeft");
     scene.assert_stands();
-    drop((page, reports));
-    scene.end();
 }
 
 /// Presses keys one right after the other, so that nothing can come between them.
@@ -218,16 +217,16 @@ fn press(page: &mut Page, keys: &[&str]) {
     ));
 }
 
-#[test]
-fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
-    scene.arm(&mut page);
+pub(crate) fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
     page.listen_in();
     page.moves();
 
     // An arrow while the arm makes a step is refused, in words.
-    press(&mut page, &["s", "ArrowUp"]);
+    press(page, &["s", "ArrowUp"]);
     page.wait_for("#drive-said", "one at a time");
     assert_eq!(page.moves(), ["arm F6"]);
     // A person whose order was held up on the way, or before a step had ended, presses anew.
@@ -246,7 +245,7 @@ fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand() {
     };
 
     // The command to stand comes through while a turn runs.
-    until_it_moves(&mut scene, &mut page, "PageUp");
+    until_it_moves(scene, page, "PageUp");
     page.value("document.querySelector('#pad-stand').click()");
     assert_eq!(page.moves(), ["drive 1 1000"]);
     scene.wait_to_stand();
@@ -260,9 +259,9 @@ fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand() {
         })
     };
     wait_for("a whole turn", || {
-        until_it_moves(&mut scene, &mut page, "ArrowDown");
-        let before = heading(&mut scene);
-        press(&mut page, &["PageDown"]);
+        until_it_moves(scene, page, "ArrowDown");
+        let before = heading(scene);
+        press(page, &["PageDown"]);
         page.value(
             "for (const key of ['ArrowDown', 'PageDown']) \
              dispatchEvent(new KeyboardEvent('keyup', { key }))",
@@ -273,7 +272,7 @@ fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand() {
         // held up has its reason there, too.
         let is_held = said == ["drive 1 200", "drive 9 1000"];
         for _ in 0..60 {
-            let turned = (heading(&mut scene) - before).abs().to_degrees() % 360.0;
+            let turned = (heading(scene) - before).abs().to_degrees() % 360.0;
             if turned.min(360.0 - turned) > 25.0 && page.text("#drive-said").is_empty() {
                 return is_held.then_some(());
             }
@@ -282,8 +281,6 @@ fn what_runs_once_is_not_cut_short_but_by_the_command_to_stand() {
         None
     });
     scene.wait_to_stand();
-    drop(page);
-    scene.end();
 }
 
 /// The keys of the document (G7, G8), and what each says.
@@ -309,11 +306,11 @@ const KEYS: &[(&str, &str)] = &[
     ("Q", "arm F3"),
 ];
 
-#[test]
-fn each_key_says_what_the_document_says_once_and_nothing_in_text_fields() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
-    scene.arm(&mut page);
+pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fields(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
     page.listen_in();
     page.moves();
     for (key, line) in KEYS {
@@ -325,7 +322,7 @@ fn each_key_says_what_the_document_says_once_and_nothing_in_text_fields() {
         assert_eq!(page.moves(), [""; 0], "{key}");
         // A step before it may be under way still.
         let said = wait_for(line, || {
-            press(&mut page, &[key]);
+            press(page, &[key]);
             let said = page.moves();
             (!said.is_empty()).then_some(said)
         });
@@ -340,7 +337,7 @@ fn each_key_says_what_the_document_says_once_and_nothing_in_text_fields() {
     page.wait_until("document.querySelector('#drive-said').textContent === ''");
     let mut said = 0;
     wait_for("a hold", || {
-        press(&mut page, &["ArrowUp"]);
+        press(page, &["ArrowUp"]);
         said += page.moves().len();
         (said > 2).then_some(())
     });
@@ -358,16 +355,14 @@ fn each_key_says_what_the_document_says_once_and_nothing_in_text_fields() {
         ));
     }
     assert_eq!(page.moves(), [""; 0]);
-    drop(page);
-    scene.end();
 }
 
-#[test]
-fn what_is_old_is_grey_with_its_time_and_drives_nothing() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
-    scene.arm(&mut page);
-    scene.hold(&mut page, "ArrowLeft");
+pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
+    scene.hold(page, "ArrowLeft");
     let comm = pid(scene.up.service("comm").expect("it runs"));
     kill_process(comm, Signal::STOP).expect("it runs");
     page.wait_for("#link", "nothing new for");
@@ -388,17 +383,15 @@ fn what_is_old_is_grey_with_its_time_and_drives_nothing() {
     page.wait_for("#link", "link ");
     page.wait_until("!document.body.classList.contains('stale')");
     scene.assert_stands();
-    drop(page);
-    scene.end();
 }
 
-#[test]
-fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
-    scene.arm(&mut page);
+pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
     // A nudge is no drive.
-    scene.hold(&mut page, "ArrowLeft");
+    scene.hold(page, "ArrowLeft");
     page.wait_for("#map-text", "not known where");
     page.key_up("ArrowLeft");
     scene.wait_to_stand();
@@ -419,7 +412,7 @@ fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhil
         },
     ];
     for stop in stops {
-        stop(&mut page);
+        stop(page);
         page.wait_for("#stop-said", "both wheels stand");
         page.key_up("Escape");
         assert_eq!(page.value("document.querySelector('#where').open"), true);
@@ -441,6 +434,111 @@ fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhil
         let truth = scene.truth.latest().expect("readable")?;
         ((truth.x_mm - 500.0).abs() < 400.0 && (truth.y_mm - 500.0).abs() < 400.0).then_some(())
     });
-    drop(page);
-    scene.end();
+}
+
+pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, page: &mut Page) {
+    scene.take_over(page);
+
+    // Not armed, a key is no more than a key.
+    page.key_down("ArrowUp");
+    scene.assert_stands();
+    page.key_up("ArrowUp");
+    page.click("#armed");
+    page.value("document.activeElement.blur()");
+
+    scene.hold(page, "ArrowUp");
+    page.key_up("ArrowUp");
+    scene.wait_to_stand();
+    scene.assert_stands();
+
+    // A finger.
+    page.touch("touchStart", "#pad-forward");
+    scene.wait_to_move();
+    page.touch("touchEnd", "#pad-forward");
+    scene.wait_to_stand();
+    page.touch("touchStart", "#pad-forward");
+    scene.wait_to_move();
+    page.touch("touchCancel", "#pad-forward");
+    scene.wait_to_stand();
+    scene.assert_stands();
+
+    // The arm moves a step for each press, not while the robot drives, and letting go leaves it be.
+    let shoulder = "document.querySelectorAll('#arm-drawing text')[3].textContent";
+    page.wait_until(&format!("Number({shoulder}) > 0"));
+    let before = page.value(shoulder);
+    scene.hold(page, "ArrowUp");
+    page.key_down("s");
+    page.wait_for("#drive-said", "The robot drives");
+    page.key_up("s");
+    page.key_up("ArrowUp");
+    scene.wait_to_stand();
+    assert_eq!(page.value(shoulder), before);
+    page.key_down("s");
+    page.key_up("s");
+    wait_for("the shoulder to move", || {
+        (page.value(shoulder) != before).then_some(())
+    });
+
+    // The whole station is gone while a key is held, and the page comes back to its successor.
+    scene.hold(page, "ArrowUp");
+    let station = scene.up.service("station").expect("it runs");
+    kill_process(pid(station), Signal::KILL).expect("it runs");
+    scene.wait_to_stand();
+    page.wait_for("#link", " ms");
+    scene.assert_stands();
+    page.key_up("ArrowUp");
+
+    // A page that is loaded anew has let go, and has left the wheel.
+    page.wait_for("#control", "Nobody drives");
+    scene.take_over(page);
+    scene.hold(page, "ArrowDown");
+    page.call("Page.reload", &serde_json::json!({}));
+    scene.wait_to_stand();
+    page.wait_for("#control", "Nobody drives");
+    scene.assert_stands();
+}
+
+pub(crate) fn two_people_do_not_drive_at_once_and_either_may_stop(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    let (anna, mut bo) = (page, scene.page());
+    scene.take_over(anna);
+    bo.click("#tab-drive");
+    bo.wait_for("#control", "drives");
+    // Bo asks, and Anna keeps it.
+    bo.click("#control");
+    bo.wait_for("#drive-said", "has been asked for the wheel");
+    anna.wait_for("#asked", "asks for the wheel");
+    anna.click("#keep");
+    bo.wait_for("#drive-said", "keeps the wheel");
+    anna.wait_until("document.querySelector('#asked').hidden");
+    bo.click("#armed");
+    bo.value("document.activeElement.blur()");
+    bo.key_down("ArrowUp");
+    bo.wait_for("#drive-said", "take the wheel first");
+    bo.key_up("ArrowUp");
+
+    anna.click("#armed");
+    anna.value("document.activeElement.blur()");
+    scene.hold(anna, "ArrowUp");
+    bo.click("#stop");
+    bo.wait_for("#stop-said", "both wheels stand");
+    scene.assert_stands();
+    anna.key_up("ArrowUp");
+    scene.resume();
+
+    // He asks again, and she hands it over.
+    bo.click("#control");
+    anna.wait_for("#asked", "asks for the wheel");
+    anna.click("#hand-over");
+    bo.wait_for("#control", "You drive");
+    anna.wait_for("#control", "drives");
+
+    // Whoever leaves it leaves it to anybody.
+    bo.click("#control");
+    anna.wait_for("#control", "Nobody drives");
+    anna.click("#control");
+    anna.wait_for("#control", "You drive");
+    bo.close();
 }

@@ -5,31 +5,59 @@
 //! glides there within 100 ms. The times of motors are those of the first report of the steering board that shows it, which it
 //! sends every few ms. A pose is told twenty times a second, so up to 50 ms of its time are waiting.
 
+use std::fmt;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use lager_benches::times::{Times, table};
 use lager_ports::{Clock, Subscriber};
 use lager_topics::SteeringState;
+use serde_json::json;
 
 use crate::Scene;
 
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 100;
 const WATCHED: Duration = Duration::from_secs(10);
 
-/// Prints one figure: how often, and in ms the middle, the nineteen in twentieth and the longest.
-fn row(name: &str, mut times: Vec<f64>) {
-    times.sort_by(f64::total_cmp);
-    let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];
-    println!(
-        "{name:<26} n {:>4}   p50 {:>6.1} ms   p95 {:>6.1} ms   max {:>6.1} ms",
-        times.len(),
-        at(0.5),
-        at(0.95),
-        at(1.0),
-    );
+/// What was measured, in milliseconds.
+struct Figures {
+    pose_to_picture: Times,
+    key_to_duty: Times,
+    stop_to_rest: Times,
+    stop_to_page: Times,
 }
 
-/// When the board first reports, after `from_ns`, that the motors turn or stand; in ms after it.
-fn motors(reports: &mut Subscriber<SteeringState>, from_ns: u64, turn: bool) -> f64 {
+impl Figures {
+    fn json(&self) -> serde_json::Value {
+        json!({
+            "rounds": ROUNDS,
+            "pose_to_picture": self.pose_to_picture,
+            "key_to_duty": self.key_to_duty,
+            "stop_to_rest": self.stop_to_rest,
+            "stop_to_page": self.stop_to_page,
+        })
+    }
+}
+
+impl fmt::Display for Figures {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            formatter,
+            "{ROUNDS} keys and stops in a browser on this machine, whose robot drives and stands in turn,\n\
+             500 000 Bd, real time, and {} s of poses; in ms\n",
+            WATCHED.as_secs()
+        )?;
+        let rows = [
+            ("pose -> picture", &self.pose_to_picture),
+            ("key down -> motors turn", &self.key_to_duty),
+            ("STOP -> motors at 0", &self.stop_to_rest),
+            ("STOP -> page says so", &self.stop_to_page),
+        ];
+        table(formatter, "from -> until", &rows)
+    }
+}
+
+/// When the board first reports, after `from_ns`, that the motors turn or stand; in ns after it.
+fn motors(reports: &mut Subscriber<SteeringState>, from_ns: u64, turn: bool) -> u64 {
     let end = Instant::now() + Duration::from_secs(2);
     while Instant::now() < end {
         let Some(report) = reports.receive().expect("readable") else {
@@ -38,7 +66,7 @@ fn motors(reports: &mut Subscriber<SteeringState>, from_ns: u64, turn: bool) -> 
         };
         let at = report.stamp().publish_time_ns;
         if at > from_ns && turn == (report.left_duty != 0 || report.right_duty != 0) {
-            return (at - from_ns) as f64 / 1e6;
+            return at - from_ns;
         }
     }
     panic!("the motors did not do it in 2 s");
@@ -77,6 +105,8 @@ fn from_the_key_and_to_the_picture() {
         .duration_since(UNIX_EPOCH)
         .expect("a date");
     let origin_ms = wall.as_secs_f64() * 1e3 - Clock::monotonic_ns() as f64 / 1e6;
+    // What the page's clock says, in ns of the robot's.
+    let monotonic = |page_ms: f64| ((page_ms - origin_ms) * 1e6) as u64;
     let seen = page.value("seen");
     let mut times = Vec::new();
     let mut last = None;
@@ -87,10 +117,10 @@ fn from_the_key_and_to_the_picture() {
         let Some((pose, at_ns)) = pose.filter(|(pose, _)| last.as_ref() != Some(pose)) else {
             continue;
         };
-        times.push(seen[1].as_f64().expect("a time") - origin_ms - *at_ns as f64 / 1e6);
+        let drawn_ns = monotonic(seen[1].as_f64().expect("a time"));
+        times.push(drawn_ns.saturating_sub(*at_ns));
         last = Some(pose.clone());
     }
-    row("pose -> picture", times);
 
     scene.take_over(&mut page);
     page.click("#armed");
@@ -115,13 +145,20 @@ fn from_the_key_and_to_the_picture() {
         page.key_up(key);
         page.wait_for("#stop-said", "both wheels stand");
         let at = page.value("stands.at(-1)").as_f64().expect("a time");
-        told.push(at - origin_ms - from as f64 / 1e6);
+        told.push(monotonic(at).saturating_sub(from));
         scene.resume();
         page.wait_until("document.querySelector('#resume').hidden");
     }
-    row("key -> motors turn", starts);
-    row("STOP -> motors at 0", stops);
-    row("STOP -> page says so", told);
+    let figures = Figures {
+        pose_to_picture: Times::of(times),
+        key_to_duty: Times::of(starts),
+        stop_to_rest: Times::of(stops),
+        stop_to_page: Times::of(told),
+    };
+    match std::env::var_os("LAGER_JSON").is_some() {
+        true => println!("{}", figures.json()),
+        false => println!("{figures}"),
+    }
     drop((page, reports));
     scene.end();
 }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::Scene;
 use crate::browser::{Browser, Page};
 
-const TABS: [&str; 4] = ["missions", "drive", "setup", "log"];
+const TABS: [&str; 5] = ["missions", "drive", "setup", "line", "log"];
 
 /// Where STOP is nearer than 16 px to what can be pressed, to the screen's edge or to what it is not
 /// to be hit instead of.
@@ -25,10 +25,10 @@ const NEAR_STOP: &str = "(() => { \
     if (edges.some((edge) => edge < 16)) near.push(`edge ${edges}`); \
     return near; })()";
 
-#[test]
-fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop() {
-    let scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
+pub(crate) fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop(
+    _scene: &mut Scene,
+    page: &mut Page,
+) {
     for (width, height) in [(1280, 720), (3840, 2160), (901, 700), (360, 740)] {
         page.dress("light", width, height, width < 900);
         for tab in TABS {
@@ -44,30 +44,30 @@ fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop() {
             assert_eq!(wide, true, "{width} x {height}, {tab} is too wide");
         }
     }
-    page.dress("light", 1280, 720, false);
-    for tab in ["missions", "drive"] {
-        page.click(&format!("#tab-{tab}"));
-        page.pause();
-        let fits = format!(
-            "document.documentElement.scrollHeight <= innerHeight && (() => {{ \
-             const side = document.querySelector('#{tab}'); \
-             return side.scrollHeight <= side.clientHeight; }})()"
-        );
-        assert_eq!(page.value(&fits), true, "{tab} scrolls");
+    for (width, height) in [(1280, 720), (1366, 768)] {
+        page.dress("light", width, height, false);
+        for tab in TABS {
+            page.click(&format!("#tab-{tab}"));
+            page.pause();
+            let fits = format!(
+                "document.documentElement.scrollHeight <= innerHeight && (() => {{ \
+                 const side = document.querySelector('#{tab}'); \
+                 return side.scrollHeight <= side.clientHeight && side.scrollWidth <= side.clientWidth; }})()"
+            );
+            assert_eq!(page.value(&fits), true, "{width} x {height}, {tab} scrolls");
+        }
     }
-    drop(page);
-    scene.end();
 }
 
-#[test]
-fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
+pub(crate) fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
     let media = |page: &mut Page, wish: &str| {
         let features = json!({ "features": [{ "name": "prefers-reduced-motion", "value": wish }] });
         page.call("Emulation.setEmulatedMedia", &features);
     };
-    media(&mut page, "reduce");
+    media(page, "reduce");
     scene.wait_to_move();
     scene.domain.done(&["stop"]);
     // An alert: a screen reader says it at once.
@@ -75,7 +75,7 @@ fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none() {
     page.wait_for("#resume", "it was ordered");
     let blinks = "getComputedStyle(document.querySelector('#resume')).animationName";
     assert_eq!(page.value(blinks), "none");
-    media(&mut page, "no-preference");
+    media(page, "no-preference");
     assert_eq!(page.value(blinks), "latched");
     scene.resume();
     page.wait_until("document.querySelector('#resume').hidden");
@@ -85,21 +85,16 @@ fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none() {
     let places = "(() => { window.places = new Set(); const robot = document.querySelector('#map .robot'); \
                   new MutationObserver(() => places.add(robot.getAttribute('transform'))) \
                     .observe(robot, { attributes: true }); })()";
-    media(&mut page, "reduce");
+    media(page, "reduce");
     scene.wait_to_move();
     page.value(places);
     page.wait_until("window.places.size > 20");
     let told = "(() => { const numbers = [...places].map((place) => place.match(/-?[\\d.]+/)[0]); \
                 return numbers.every((x) => x.endsWith('.0')); })()";
     assert_eq!(page.value(told), true, "poses are told in whole mm");
-    drop(page);
-    scene.end();
 }
 
-#[test]
-fn the_words_are_swedish_for_who_reads_swedish() {
-    let scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
+pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, page: &mut Page) {
     page.click("#language");
     assert_eq!(page.text("#stop"), "STOPP");
     page.wait_for("#link", "länk ");
@@ -108,16 +103,13 @@ fn the_words_are_swedish_for_who_reads_swedish() {
     page.call("Page.reload", &json!({}));
     page.wait_for("#link", "länk ");
     assert_eq!(page.text("#tab-missions"), "Uppdrag");
-    drop(page);
-    scene.end();
+    // The browser keeps it for pages that are opened later.
+    page.click("#language");
 }
 
-#[test]
-fn the_display_on_the_robot_stops_it() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene
-        .browser
-        .page(&format!("{}/screen", scene.url.trim_end_matches('/')));
+pub(crate) fn the_display_on_the_robot_stops_it(scene: &mut Scene, page: &mut Page) {
+    let url = format!("{}/screen", scene.url.trim_end_matches('/'));
+    page.call("Page.navigate", &json!({ "url": url }));
     scene.wait_to_move();
     page.wait_until("document.querySelector('.screen #figures')?.textContent.length > 0");
     assert_eq!(page.value(NEAR_STOP), json!([]));
@@ -134,8 +126,35 @@ fn the_display_on_the_robot_stops_it() {
     scene.wait_to_stand();
     scene.assert_stands();
     scene.resume();
-    drop(page);
-    scene.end();
+}
+
+pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.wait_to_move();
+    page.key_down("Escape");
+    page.key_up("Escape");
+    page.wait_for("#stop-said", "both wheels stand");
+    scene.assert_stands();
+    // A click is too short for it.
+    page.click("#resume");
+    page.pause();
+    scene.assert_stands();
+    let at = page.middle("#resume");
+    page.mouse("mousePressed", at);
+    page.wait_until("document.querySelector('#resume').hidden");
+    page.mouse("mouseReleased", at);
+    scene.wait_to_move();
+
+    // From a field, too; and by hand.
+    page.click("#tab-setup");
+    page.value("document.querySelector('#warehouse input').focus()");
+    page.key_down("Escape");
+    page.wait_for("#stop-said", "both wheels stand");
+    scene.assert_stands();
+    page.key_up("Escape");
+    scene.resume();
 }
 
 /// The token behind `?token=` after these words, and the port.
@@ -167,9 +186,6 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
 
     let open = |url: &str| {
         let mut page = browser.page(url);
-        page.wait_until("document.readyState === 'complete' && !location.search");
-        page.value("localStorage.setItem('language', 'en')");
-        page.call("Page.reload", &json!({}));
         page.wait_for("#link", "link ");
         page
     };
@@ -177,6 +193,10 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     looks.wait_for("#driver", "you may look and stop");
     looks.click("#clear");
     looks.wait_for("#missions-said", "this page may look and stop");
+    looks.click("#language");
+    looks.click("#clear");
+    looks.wait_for("#missions-said", "den här sidan får titta och stoppa");
+    looks.click("#language");
     looks.click("#tab-drive");
     looks.click("#control");
     looks.wait_for("#drive-said", "this page may look and stop");

@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use lager_tests::pid;
 use rustix::process::{Signal, kill_process};
@@ -29,7 +30,8 @@ fn view(page: &mut Page, name: &str) {
 fn take(page: &mut Page, name: &str) {
     let folder = PathBuf::from(std::env::var_os("LAGER_PICTURES").expect("LAGER_PICTURES"));
     page.value("document.activeElement?.blur()");
-    page.pause();
+    // What is drawn is drawn anew five times a second.
+    std::thread::sleep(Duration::from_millis(400));
     let file = folder.join(format!("{name}.png"));
     std::fs::write(&file, page.picture()).expect("a folder that can be written to");
 }
@@ -48,7 +50,7 @@ fn of_every_view() {
     page.dress("light", 3840, 2160, false);
     take(&mut page, "under-way-4k-light");
     page.dress("light", 1280, 720, false);
-    for tab in ["setup", "log"] {
+    for tab in ["setup", "line", "log"] {
         page.click(&format!("#tab-{tab}"));
         view(&mut page, tab);
     }

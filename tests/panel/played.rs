@@ -62,12 +62,9 @@ impl Stage {
         }
     }
 
-    /// The page at this address, in English.
+    /// The page at this address.
     pub(crate) fn page(&self, url: &str) -> Page {
         let mut page = self.browser.page(url);
-        page.wait_until("document.readyState === 'complete' && !location.search");
-        page.value("localStorage.setItem('language', 'en')");
-        page.call("Page.reload", &serde_json::json!({}));
         page.wait_until("document.querySelector('#tab-missions')?.textContent === 'Missions'");
         page
     }

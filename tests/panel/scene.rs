@@ -6,6 +6,29 @@ use lager_topics::TruthPose;
 
 use crate::browser::{Browser, Page};
 
+/// What is tested on a robot that others have been tested on, with a page of its own.
+pub(crate) type Part = fn(&mut Scene, &mut Page);
+
+/// The functions by their names.
+macro_rules! parts {
+    ($($part:path),* $(,)?) => { &[$((stringify!($part), $part as $crate::scene::Part)),*] };
+}
+
+pub(crate) use parts;
+
+/// Tests one part after the other on one robot, which takes its time to start and to end.
+pub(crate) fn in_turn(parts: &[(&str, Part)]) {
+    let mut scene = Scene::new(1.0, &[]);
+    for (name, part) in parts {
+        // The one that fails is the last one that is told.
+        println!("{name}");
+        let mut page = scene.page();
+        part(&mut scene, &mut page);
+        page.close();
+    }
+    scene.end();
+}
+
 /// A robot that is up with its panel, and what really happens.
 pub(crate) struct Scene {
     pub(crate) truth: Subscriber<TruthPose>,
@@ -41,10 +64,6 @@ impl Scene {
 
     pub(crate) fn page(&self) -> Page {
         let mut page = self.browser.page(&self.url);
-        // It speaks English, whatever this machine does.
-        page.wait_until("document.readyState === 'complete'");
-        page.value("localStorage.setItem('language', 'en')");
-        page.call("Page.reload", &serde_json::json!({}));
         page.wait_for("#link", " ms");
         page
     }

@@ -8,16 +8,6 @@ use crate::Scene;
 use crate::browser::Page;
 use crate::played::Stage;
 
-/// Changes a field as a person does, who then leaves it.
-fn fill(page: &mut Page, selector: &str, value: &str) {
-    page.value(&format!(
-        "(() => {{ const field = document.querySelector({}); field.value = {}; \
-         for (const name of ['input', 'change']) field.dispatchEvent(new Event(name, {{ bubbles: true }})); }})()",
-        json!(selector),
-        json!(value)
-    ));
-}
-
 /// The texts of all elements that fit, with commas.
 fn texts(page: &mut Page, selector: &str) -> String {
     let all = page.value(&format!(
@@ -43,10 +33,10 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     assert_eq!(before["size"], json!([2, 2]));
 
     // Size, corner and side by the form: what is typed is drawn once it is saved.
-    fill(&mut page, "#warehouse [name=width]", "4");
-    fill(&mut page, "#warehouse [name=height]", "5");
-    fill(&mut page, "#warehouse [name=side]", "60");
-    fill(&mut page, "#warehouse [name=delivery]", "4,5");
+    page.fill("#warehouse [name=width]", "4");
+    page.fill("#warehouse [name=height]", "5");
+    page.fill("#warehouse [name=side]", "60");
+    page.fill("#warehouse [name=delivery]", "4,5");
     page.click("#warehouse [type=submit]");
     page.wait_for("#setup-said", "saved");
     page.wait_for("#map-text", "A warehouse of 4 by 5 squares");
@@ -57,11 +47,11 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     );
 
     // The strings of the document (M1, M3).
-    fill(&mut page, "#map-string", "3,2,0,2");
+    page.fill("#map-string", "3,2,0,2");
     page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
-    fill(&mut page, "#goods-string", "7,1,0,3;8,2,1,0");
+    page.fill("#goods-string", "7,1,0,3;8,2,1,0");
     page.wait_for("#map-text", "Goods: 7 (1, 0) down; 8 (2, 1) left.");
-    fill(&mut page, "#map-string", "3,2,1,1");
+    page.fill("#map-string", "3,2,1,1");
     page.wait_until("document.querySelector('#setup-said').textContent.length > 5");
     assert!(page.text("#map-text").contains("3 by 2 squares"));
 
@@ -81,16 +71,16 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     scene.end();
 }
 
-#[test]
-fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
+pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
     page.wait_until("document.querySelector('#sensors .on') !== null");
-    scene.take_over(&mut page);
-    page.click("#tab-setup");
+    scene.take_over(page);
+    page.click("#tab-line");
     for (p, d) in [("3", "4"), ("5", "6")] {
-        fill(&mut page, "#gains [name=p]", p);
-        fill(&mut page, "#gains [name=d]", d);
+        page.fill("#gains [name=p]", p);
+        page.fill("#gains [name=d]", d);
         page.click("#gains [type=submit]");
         page.wait_for("#gains-now", &format!("now {p} and {d}"));
     }
@@ -102,31 +92,29 @@ fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step() {
     page.click("#calibrate");
     page.wait_for("#calibration [aria-current]", "move it slowly");
     page.wait_for("#calibration-said", "Calibrating");
-    page.wait_until("document.querySelectorAll('#calibration-sensors span.on').length > 0");
+    page.wait_until("document.querySelectorAll('#calibration-sensors .on').length > 0");
     page.wait_for("#calibration-said", "of the 11");
     page.wait_until("!document.querySelector('#calibrate').disabled");
-    drop(page);
-    scene.end();
 }
 
-#[test]
-fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
+pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
     scene.wait_to_move();
     // It stays where it is, with product 1 under way.
     page.key_down("Escape");
     page.key_up("Escape");
     page.wait_for("#stop-said", "both wheels stand");
     let order = |page: &mut Page, product: &str| {
-        fill(page, "#goods", product);
+        page.fill("#goods", product);
         page.click("#fetch button");
     };
     // The number of each waiting order is all of its text but the buttons.
     let waiting = "[...document.querySelectorAll('#queue li:has(button)')].map((line) => \
                    line.firstChild.textContent).join()";
     for (product, queue) in [("2", "2"), ("3", "2,3"), ("1", "2,3,1")] {
-        order(&mut page, product);
+        order(page, product);
         page.wait_until(&format!("{waiting} === '{queue}'"));
     }
     let button = |line: usize, which: usize| {
@@ -152,8 +140,6 @@ fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back() {
         true
     );
     scene.resume();
-    drop(page);
-    scene.end();
 }
 
 #[test]
@@ -202,7 +188,7 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
 
     // While it calibrates, each sensor that has seen tape and floor is marked.
     page.click("#language");
-    page.click("#tab-setup");
+    page.click("#tab-line");
     page.click("#calibrate");
     let seen = |page: &mut Page, words: &str| {
         page.wait_until(&format!(
@@ -217,10 +203,10 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
     stage.end();
 }
 
-#[test]
-fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() {
-    let mut scene = Scene::new(1.0, &[]);
-    let mut page = scene.page();
+pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
     let view = |page: &mut Page| -> Vec<f64> {
         let view = page
             .value("document.querySelector('#map').getAttribute('viewBox').split(' ').map(Number)");
@@ -228,14 +214,14 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
         view.map(|number| number.as_f64().expect("a number"))
             .collect()
     };
-    let fitted = view(&mut page);
+    let fitted = view(page);
     page.click("#zoom-in");
-    let near = view(&mut page);
+    let near = view(page);
     assert!(near[2] < fitted[2]);
     page.click("#zoom-out");
-    assert!(view(&mut page)[2] > near[2]);
+    assert!(view(page)[2] > near[2]);
     page.click("#fit");
-    assert_eq!(view(&mut page), fitted);
+    assert_eq!(view(page), fitted);
 
     let press = |page: &mut Page, key: &str| {
         page.value(&format!(
@@ -243,11 +229,11 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
              {{ key: '{key}', bubbles: true, cancelable: true }}))"
         ));
     };
-    press(&mut page, "ArrowRight");
-    let right = view(&mut page);
+    press(page, "ArrowRight");
+    let right = view(page);
     assert!(right[0] > fitted[0] && (right[1] - fitted[1]).abs() < 0.01);
-    press(&mut page, "+");
-    assert!(view(&mut page)[2] < right[2]);
+    press(page, "+");
+    assert!(view(page)[2] < right[2]);
     page.click("#fit");
 
     // Two fingers that part.
@@ -262,21 +248,21 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
             &json!({ "type": kind, "touchPoints": points }),
         );
     };
-    fingers(&mut page, "touchStart", 40.0);
+    fingers(page, "touchStart", 40.0);
     for apart in [60.0, 80.0, 100.0] {
-        fingers(&mut page, "touchMove", apart);
+        fingers(page, "touchMove", apart);
     }
-    fingers(&mut page, "touchEnd", 0.0);
-    let zoomed = view(&mut page);
+    fingers(page, "touchEnd", 0.0);
+    let zoomed = view(page);
     assert!(zoomed[2] < fitted[2] * 0.7, "{zoomed:?} {fitted:?}");
     assert_eq!(page.text("#map-said"), "", "nothing was put by it");
 
     // It follows the robot until somebody moves it.
     scene.wait_to_move();
     page.click("#follow");
-    let before = view(&mut page);
-    wait_for("it to follow", || (view(&mut page) != before).then_some(()));
-    press(&mut page, "ArrowLeft");
+    let before = view(page);
+    wait_for("it to follow", || (view(page) != before).then_some(()));
+    press(page, "ArrowLeft");
     assert_eq!(
         page.value("document.querySelector('#follow').getAttribute('aria-pressed')"),
         "false"
@@ -294,7 +280,7 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
     page.click("#fit");
     // The middle of the fitted view is moved onto the way from (1, 1) upwards, key by key.
     for _ in 0..40 {
-        let [left, top, width, height] = view(&mut page)[..] else {
+        let [left, top, width, height] = view(page)[..] else {
             panic!()
         };
         let (off_x, off_y) = (500.0 - (left + width / 2.0), -750.0 - (top + height / 2.0));
@@ -302,10 +288,10 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
             break;
         }
         if off_x.abs() >= 60.0 && off_x.abs() < width / 20.0 {
-            press(&mut page, "+");
+            press(page, "+");
         } else if off_x.abs() >= 60.0 {
             press(
-                &mut page,
+                page,
                 if off_x > 0.0 {
                     "ArrowRight"
                 } else {
@@ -313,13 +299,56 @@ fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys() 
                 },
             );
         } else {
-            press(&mut page, if off_y > 0.0 { "ArrowDown" } else { "ArrowUp" });
+            press(page, if off_y > 0.0 { "ArrowDown" } else { "ArrowUp" });
         }
     }
-    press(&mut page, "Enter");
+    press(page, "Enter");
     page.wait_for("#map-said", "obstacle put");
-    press(&mut page, "Enter");
+    press(page, "Enter");
     page.wait_for("#map-said", "obstacle taken away");
-    drop(page);
-    scene.end();
+}
+
+pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
+    _scene: &mut Scene,
+    page: &mut Page,
+) {
+    let goods = "[...document.querySelectorAll('#goods option')].map(({ value }) => value).join()";
+    page.wait_until(&format!("{goods} === '1,2,3'"));
+
+    // While the warehouse is set up, a click in a square places goods at its nearest side.
+    page.click("#tab-setup");
+    page.click_at_mm(250.0, 420.0);
+    page.wait_until(&format!("{goods} === '1,2,3,4'"));
+    let placed = "(() => { const line = [...document.querySelectorAll('#products tr')].at(-1); \
+                  return [...line.querySelectorAll('input, select')].map(({ value }) => value).join(); })()";
+    page.wait_until(&format!("{placed} === '4,,0,0,up'"));
+    page.click("#undo");
+    page.wait_until(&format!("{goods} === '1,2,3'"));
+
+    // What cannot be is said beside it, and nothing is changed.
+    page.fill("#goods-string", "7,1,0,4");
+    page.wait_for("#setup-said", "7,1,0,4");
+    assert_eq!(page.value(goods), "1,2,3");
+
+    // Goods are described, too, and what is wrong is said as one types.
+    page.click("#add-product");
+    page.fill("#products [name=id]", "3");
+    page.wait_for("#setup-said", "two goods have the number 3");
+    page.fill("#products [name=id]", "12");
+    page.fill("#products [name=x]", "2");
+    page.wait_for("#setup-said", "goods 12 stand outside");
+    page.fill("#products [name=x]", "1");
+    page.fill("#products [name=name]", "nails");
+    page.click("#warehouse [type=submit]");
+    page.wait_until(&format!("{goods} === '1,2,3,12'"));
+    page.wait_until(
+        "document.querySelector('#map [data-product=\"12\"] title').textContent === '12 nails'",
+    );
+
+    // Otherwise a click on a way puts something there.
+    page.click("#tab-missions");
+    page.click_at_mm(750.0, 1_000.0);
+    page.wait_for("#map-said", "obstacle put");
+    page.click("#map-undo");
+    page.wait_for("#map-said", "obstacle taken away");
 }

@@ -86,7 +86,7 @@ fn the_path_while_ten_pages_watch() {
     scene.end();
 }
 
-struct Tabs(Vec<crate::Page>);
+struct Tabs(Vec<crate::browser::Page>);
 
 impl Drop for Tabs {
     fn drop(&mut self) {

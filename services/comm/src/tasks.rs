@@ -268,12 +268,14 @@ impl Tasks {
                 Task::Ask(_) | Task::World | Task::PutDown => return None,
                 Task::Order(_) => {}
                 _ if is_over => {
-                    let what = match (one.asker, one.task) {
-                        (Asker::Question, Task::Picked) => " to pickup_done",
-                        (_, Task::Cancel) => ": the goods may be in the claw by now",
-                        _ => "",
+                    let why = match (one.asker, one.task) {
+                        (Asker::Question, Task::Picked) => "logic does not react to pickup_done",
+                        (_, Task::Cancel) => {
+                            "logic does not react: the goods may be in the claw by now"
+                        }
+                        _ => "logic does not react",
                     };
-                    return Some(Err(format!("logic does not react{what}")));
+                    return Some(Err(why.into()));
                 }
                 _ => {}
             }

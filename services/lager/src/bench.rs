@@ -6,7 +6,6 @@ mod command;
 mod link;
 mod robot;
 mod stop;
-mod times;
 
 use std::fmt;
 

@@ -1,6 +1,7 @@
 // What the page asks a person: where the robot stands after it was driven by hand, and whether
 // somebody else may have the wheel. STOP and its keys work meanwhile: nothing here is in front of them.
 
+import { reason } from "./reasons.js";
 import { put, say } from "./words.js";
 
 /** Which way a robot on the delivery corner looks into the warehouse. */
@@ -45,7 +46,7 @@ export class Where {
     // A simulated robot is carried there; a real one has been.
     if (at.value === "delivery") action = robot.truth ? `place ${cornerX} ${cornerY} ${inwards(cornerX)}` : "reset";
     const answer = await this.link.act(robot, action);
-    if (answer.refused) return put(said, say("refused", answer.refused === "lost" ? say("lost") : answer.refused));
+    if (answer.refused) return put(said, reason(answer.refused));
     dialog.close();
     this.then?.();
   }

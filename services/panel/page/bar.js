@@ -1,6 +1,7 @@
 // The first row: which robot, how fresh, who drives, what it does; and STOP, which never waits.
 
 import { crossing, failure, sentence } from "./sentences.js";
+import { reason } from "./reasons.js";
 import { Stop } from "./stop.js";
 import { put, say, span } from "./words.js";
 
@@ -28,7 +29,7 @@ export class Bar {
         const robot = this.robot();
         if (!robot) return;
         const answer = await this.link.act(robot, "resume");
-        this.stop.say(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+        this.stop.say(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
       }, HOLD_MS);
     };
     const end = () => {

@@ -7,6 +7,7 @@
 // the eighth turns are given once a press. Nothing cuts one of them short but the command to stand:
 // what is held ends before one, and nothing is held or begun while one is under way.
 
+import { reason } from "./reasons.js";
 import { say } from "./words.js";
 
 const RENEW_MS = 50;
@@ -109,7 +110,7 @@ export class Driving {
     // What was let go meanwhile has its own end.
     if (answer.refused && this.held === held) {
       this.letGo();
-      this.tell("refused", answer.refused === "lost" ? say("lost") : answer.refused);
+      this.tell("refused", reason(answer.refused));
     }
   }
 
@@ -143,7 +144,7 @@ export class Driving {
   }
 
   hear({ refused }) {
-    if (refused) this.tell("refused", refused === "lost" ? say("lost") : refused);
+    if (refused) this.tell("refused", reason(refused));
   }
 
   buttons() {

@@ -3,6 +3,7 @@
 import { say } from "./words.js";
 import { mcap } from "./mcap.js";
 import { fill, item } from "./missions.js";
+import { reason } from "./reasons.js";
 import { crossing, thought } from "./sentences.js";
 
 /** How long ago what is saved may be, in ms. */
@@ -75,7 +76,7 @@ function figures({ at, wall, ...figures }) {
 /** One entry as a sentence with its time. */
 function line({ at, kind, words, values }) {
   const time = new Date(at).toLocaleTimeString();
-  if (kind === "thought") return `${time}  ${(values && thought(values)) ?? words.join(" ")}`;
+  if (kind === "thought") return `${time}  ${(values && thought(values)) ?? reason(words.join(" "))}`;
   const [what, x, y, , product] = words;
   return `${time}  ${say(`event_${what}`, product, crossing(`${x},${y}`))}`;
 }

@@ -4,10 +4,12 @@ import { Arm } from "./arm.js";
 import { Asked, Where } from "./ask.js";
 import { Bar } from "./bar.js";
 import { Driving } from "./drive.js";
+import { Line } from "./line.js";
 import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { WarehouseMap } from "./map.js";
 import { Missions } from "./missions.js";
+import { reason } from "./reasons.js";
 import { Setup } from "./setup.js";
 import { Strips } from "./strips.js";
 import { change, current, put, say, translate } from "./words.js";
@@ -36,8 +38,11 @@ const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: 
 const setup = new Setup(link, {
   form: at("warehouse"), products: at("products"), add: at("add-product"), undo: at("undo"), said: at("setup-said"),
   saveFile: at("save-file"), loadFile: at("load-file"), mapString: at("map-string"), goodsString: at("goods-string"),
-  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), calibrate: at("calibrate"), calibration: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"), boardSaid: at("board-said"),
-}, robot);
+});
+const line = new Line({
+  gains: at("gains"), gainsNow: at("gains-now"), gainsBack: at("gains-back"), said: at("board-said"),
+  calibrate: at("calibrate"), steps: at("calibration"), calibrationSaid: at("calibration-said"), sensors: at("calibration-sensors"),
+}, link, robot);
 const strips = new Strips(at("strips"));
 const log = new Log({ filter: at("filter"), entries: at("entries"), csv: at("save-csv"), mcap: at("save-mcap") }, robot);
 
@@ -52,7 +57,7 @@ async function meetEdge([x, y, way] = []) {
   // Where one stands a second put changes nothing, so it is tried to be taken first.
   const take = await link.act(shown, `obstacle take ${edge}`);
   const put = take.done ? take : await link.act(shown, `obstacle put ${edge}`);
-  if (!put.done) return tell("refused", put.refused === "lost" ? say("lost") : put.refused);
+  if (!put.done) return tell("refused", reason(put.refused));
   const done = take.done ? "take" : "put";
   tell(done === "put" ? "obstacle_put" : "obstacle_taken");
   const undo = at("map-undo");
@@ -60,7 +65,7 @@ async function meetEdge([x, y, way] = []) {
   undo.onclick = async () => {
     undo.hidden = true;
     const back = await link.act(shown, `obstacle ${done === "put" ? "take" : "put"} ${edge}`);
-    tell(...(back.done ? [done === "put" ? "obstacle_taken" : "obstacle_put"] : ["refused", back.refused]));
+    tell(...(back.done ? [done === "put" ? "obstacle_taken" : "obstacle_put"] : ["refused", reason(back.refused)]));
   };
 }
 
@@ -72,7 +77,7 @@ async function act(action) {
   const shown = robot();
   if (!shown) return;
   const answer = await link.act(shown, action);
-  driving.tell(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+  driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
 }
 
 at("manual").onclick = () => act("mode manual");
@@ -90,7 +95,7 @@ at("control").onclick = async () => {
   driving.letGo();
   driving.tell(...(shown.driver && !mine ? ["asked_for", shown.driver] : [null]));
   const answer = await link.ask(mine ? "free" : "take", shown.name);
-  driving.tell(...(answer.refused ? ["refused", answer.refused === "lost" ? say("lost") : answer.refused] : [null]));
+  driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
   if (mine && answer.done && where.isOpen(shown)) where.ask();
 };
 at("language").onclick = () => {
@@ -191,7 +196,7 @@ function drawRest(shown, time) {
   missions.draw(shown, time);
   arm.draw(shown);
   strips.draw(shown);
-  setup.draw(shown);
+  line.draw(shown);
   asked.draw(shown);
   log.draw(shown);
   const mine = shown?.driver && shown.driver === link.me;

@@ -83,6 +83,7 @@ export class WarehouseMap {
         make("circle", { class: "node", cx: x * this.side, cy: -y * this.side, r: 14 }, this.floor);
       }
     }
+    this.numbers(width, height);
     for (const good of warehouse.product ?? []) this.good(good);
     const same = before && String(before.size) === String(warehouse.size) && before.side_length_cm === warehouse.side_length_cm;
     if (!same) this.fit();
@@ -91,6 +92,15 @@ export class WarehouseMap {
   tape(x1, y1, x2, y2) {
     const at = (value) => value * this.side;
     make("line", { class: "tape", x1: at(x1), y1: -at(y1), x2: at(x2), y2: -at(y2) }, this.floor);
+  }
+
+  /** Columns are numbered above, rows at the side away from the way out. */
+  numbers(width, height) {
+    const size = Math.max(60, (Math.max(width, height) * this.side) / 60);
+    const number = (text, x, y) => make("text", { class: "axis", x, y, "font-size": size }, this.floor, text);
+    for (let x = 0; x <= width; x++) number(x, x * this.side, -60 - size / 2 - height * this.side);
+    const aside = this.warehouse.delivery[0] === 0 ? width * this.side + 60 + size : -60 - size;
+    for (let y = 0; y <= height; y++) number(y, aside, size / 3 - y * this.side);
   }
 
   /** The way out of the delivery corner, and the bar at its end, as the warehouse's file has them. */

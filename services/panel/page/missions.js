@@ -1,5 +1,6 @@
 // What is fetched: the queue, what the hands at the goods say, what has been delivered.
 
+import { reason } from "./reasons.js";
 import { crossing, sentence } from "./sentences.js";
 import { put, say, span } from "./words.js";
 
@@ -36,8 +37,7 @@ export class Missions {
     const robot = this.robot();
     if (!robot) return put(this.parts.said, say("no_robot"));
     const answer = await this.link.act(robot, action);
-    const why = answer.refused === "lost" ? say("lost") : answer.refused;
-    put(this.parts.said, answer.refused ? say("refused", why) : "");
+    put(this.parts.said, answer.refused ? reason(answer.refused) : "");
     return !answer.refused;
   }
 
@@ -90,7 +90,7 @@ export class Missions {
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
     picks.disabled = pick === undefined || !this.link.mayDrive;
-    const lines = (robot?.history ?? []).map(delivered);
+    const lines = (robot?.history ?? []).map((one) => delivered(one, this.names));
     fill(this.parts.history, lines, (line) => item(line));
   }
 
@@ -120,8 +120,9 @@ export class Missions {
 }
 
 /** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
-function delivered({ product, at, took, detours }) {
-  const words = [new Date(at).toLocaleTimeString(), product, took];
+function delivered({ product, at, took, detours }, names) {
+  const name = names.get(product) ?? product;
+  const words = [new Date(at).toLocaleTimeString(), took ? say("took", name, took) : name];
   const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
   if (ways.length) words.push(say("detours", ways.join("; ")));
   return words.join("  ");

@@ -307,6 +307,9 @@ const TABLE = {
   },
 };
 
+/** The sentences whose names begin like this, each in English and in Swedish. */
+export const pairs = (prefix) => Object.keys(TABLE.en).filter((name) => name.startsWith(prefix)).map((name) => [TABLE.en[name], TABLE.sv[name]]);
+
 /** The sentence of a name, with the values filled in; null if the name is not known here. */
 export function sentence(name, values = {}) {
   const text = TABLE[current()][name];

@@ -1,21 +1,16 @@
-// Setting up: the warehouse with checks as one types, the line control's gains, the calibration.
+// Setting up: the warehouse by form, file and strings, with checks as one types.
 
-import { SENSORS, sensors } from "./strips.js";
+import { reason } from "./reasons.js";
 import { put, say } from "./words.js";
 
 const SIDES = ["left", "up", "right", "down"];
 
 export class Setup {
-  constructor(link, parts, robot) {
+  constructor(link, parts) {
     this.link = link;
     this.parts = parts;
-    this.robot = robot;
     this.past = [];
     this.dirty = false;
-    /** The gains in force, those before the last change, and whether others are being typed. */
-    this.gainsNow = null;
-    this.gainsBefore = null;
-    this.gainsTyped = false;
     const { form } = parts;
     form.addEventListener("input", ({ target }) => {
       // What is pasted or loaded replaces the form's content as a whole.
@@ -38,18 +33,6 @@ export class Setup {
     parts.loadFile.onchange = () => parts.loadFile.files.length && this.loadFile(parts.loadFile.files[0]);
     parts.mapString.onchange = () => parts.mapString.value && this.pasteMap(parts.mapString.value);
     parts.goodsString.onchange = () => parts.goodsString.value && this.pasteGoods(parts.goodsString.value);
-    parts.gains.addEventListener("submit", (event) => {
-      event.preventDefault();
-      const { p, d } = parts.gains.elements;
-      this.setGains([p.value, d.value]);
-    });
-    parts.gains.addEventListener("input", () => (this.gainsTyped = true));
-    parts.gainsBack.onclick = () => this.setGains(this.gainsBefore);
-    /** What each line sensor has seen since the calibration began; null while there is none. */
-    this.seen = null;
-    this.sensors = Array.from({ length: SENSORS }, () => document.createElement("span"));
-    parts.sensors.append(...this.sensors);
-    parts.calibrate.onclick = () => this.calibrate();
   }
 
   /** Puts goods at the side of a square, with the next number. */
@@ -71,10 +54,10 @@ export class Setup {
   async loadFile(file) {
     try {
       const { size, side_length_cm, delivery = [0, 0], product = [], ...rest } = JSON.parse(await file.text());
-      if (!Array.isArray(size) || size.length !== 2 || !Array.isArray(product)) throw new Error(say("no_warehouse"));
       await this.save({ ...rest, size, side_length_cm, delivery, product });
-    } catch (error) {
-      put(this.parts.said, `${file.name}: ${error.message}`);
+    } catch {
+      // It is no JSON, or something else than this.
+      put(this.parts.said, `${file.name}: ${say("no_warehouse")}`);
     }
   }
 
@@ -99,73 +82,12 @@ export class Setup {
     this.save({ ...this.read(), product });
   }
 
-  /** Step by step: put it over tape, press and move it, read what came of it. */
-  async calibrate() {
-    const { calibrate, calibration, calibrationSaid } = this.parts;
-    const steps = [...calibration.children];
-    const at = (step) => steps.forEach((line, index) => line.toggleAttribute("aria-current", index === step));
-    this.seen = Array.from({ length: SENSORS }, () => new Set());
-    calibrate.disabled = true;
-    at(1);
-    put(calibrationSaid, say("calibrating"));
-    const robot = this.robot();
-    const { refused } = robot ? await this.link.act(robot, "calibrate") : { refused: say("no_robot") };
-    at(2);
-    put(calibrationSaid, refused ? say("refused", refused === "lost" ? say("lost") : refused) : say("calibrated"));
-    calibrate.disabled = false;
-  }
-
-  /** What the sensors see now, and which have seen both tape and floor. */
-  drawSensors(state) {
-    const bits = sensors(state);
-    let both = 0;
-    this.sensors.forEach((bar, index) => {
-      const bit = bits?.[index];
-      if (this.parts.calibrate.disabled && state?.line_bits) this.seen[index].add(bit);
-      const isBoth = this.seen?.[index].size === 2;
-      both += Number(isBoth);
-      bar.classList.toggle("on", bit === "1");
-      bar.classList.toggle("both", isBoth);
-    });
-    const words = bits ? say("sensors_seen", bits, both) : say("sensors_unheard");
-    if (this.parts.sensors.getAttribute("aria-label") !== words) this.parts.sensors.setAttribute("aria-label", words);
-  }
-
-  /** The gains in force stand in the fields, unless somebody types there. */
-  draw(robot) {
-    this.drawSensors(robot?.state);
-    const { gain_p: p, gain_d: d } = robot?.state ?? {};
-    this.gainsNow = p === undefined || d === undefined ? null : [p, d];
-    put(this.parts.gainsNow, this.gainsNow ? say("gains_now", p, d) : say("gains_unset"));
-    put(this.parts.gainsBack, this.gainsBefore ? say("put_back", ...this.gainsBefore) : "");
-    this.parts.gainsBack.hidden = !this.gainsBefore;
-    if (this.gainsTyped || !this.gainsNow) return;
-    const { elements } = this.parts.gains;
-    [elements.p.value, elements.d.value] = this.gainsNow;
-  }
-
-  async setGains([p, d]) {
-    const before = this.gainsNow;
-    if (!(await this.act(`gains ${p} ${d}`, "saved"))) return;
-    this.gainsBefore = before;
-    this.gainsTyped = false;
-  }
-
-  async act(action, done) {
-    const robot = this.robot();
-    if (!robot) return put(this.parts.boardSaid, say("no_robot"));
-    const answer = await this.link.act(robot, action);
-    const why = answer.refused === "lost" ? say("lost") : answer.refused;
-    put(this.parts.boardSaid, answer.refused ? say("refused", why) : say(done));
-    return !answer.refused;
-  }
-
   async save(warehouse, undoable = true) {
     const why = this.wrong(warehouse);
     if (why) return put(this.parts.said, why);
     const before = this.link.warehouse;
     const answer = await this.link.ask("warehouse", null, JSON.stringify(warehouse));
-    if (answer.refused) return put(this.parts.said, answer.refused === "lost" ? say("lost") : answer.refused);
+    if (answer.refused) return put(this.parts.said, reason(answer.refused));
     if (undoable && before) this.past.push(before);
     this.dirty = false;
     put(this.parts.said, say("saved"));

@@ -1,5 +1,6 @@
 // STOP: it asks nothing, waits for nothing, and says what has become of it.
 
+import { reason } from "./reasons.js";
 import { say } from "./words.js";
 
 /** After this time a stop that nobody has confirmed is said to be none, in ms. */
@@ -37,7 +38,7 @@ export class Stop {
     else if (answer.done) this.say("sent");
     else if (answer.unsent) this.say("stop_lost");
     else if (answer.refused === "lost") this.say("stop_unconfirmed");
-    else this.say("stop_refused", answer.refused);
+    else this.say("stop_refused", reason(answer.refused));
   }
 
   say(key, ...values) {

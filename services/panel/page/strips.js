@@ -4,7 +4,7 @@
 // shifted by the pixels that time has passed, and what is new is drawn at its end.
 
 import { SPAN_MS } from "./link.js";
-import { say } from "./words.js";
+import { put, say } from "./words.js";
 
 /** Word, unit, least and most value, keys of the past. */
 const STRIPS = [
@@ -31,14 +31,12 @@ export function sensors({ line_bits: bits, line_error: error } = {}) {
 export class Strips {
   constructor(parent) {
     this.strips = STRIPS.map((strip) => new Strip(parent, ...strip));
-    const sensors = document.createElement("figure");
-    sensors.id = "sensors";
-    this.sensors = Array.from({ length: SENSORS }, () => {
-      const bar = document.createElement("span");
-      sensors.append(bar);
-      return bar;
-    });
-    parent.append(sensors);
+    const [figure, row] = [document.createElement("figure"), document.createElement("div")];
+    figure.id = "sensors";
+    this.caption = document.createElement("figcaption");
+    this.sensors = Array.from({ length: SENSORS }, () => row.appendChild(document.createElement("span")));
+    figure.append(this.caption, row);
+    parent.append(figure);
   }
 
   /** Moves the lines: for every picture of the screen. */
@@ -56,6 +54,7 @@ export class Strips {
     }
     const { colours } = this;
     for (const strip of this.strips) strip.draw(robot, colours);
+    put(this.caption, say("line_sensors"));
     const seen = sensors(robot?.state);
     this.sensors.forEach((bar, index) => bar.classList.toggle("on", seen?.[index] === "1"));
   }

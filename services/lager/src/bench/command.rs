@@ -11,6 +11,7 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use lager_benches::times::{Times, table};
 use lager_lines::gag::{Query, Request};
 use lager_ports::{Clock, Subscriber};
 use lager_topics::{NavMap, Origin, SteeringCommand, SteeringState};
@@ -18,7 +19,6 @@ use lager_wire::OperatorCommand;
 use serde::Serialize;
 
 use super::robot::{PATIENCE, Robot};
-use super::times::{Times, table};
 
 /// What was measured, in milliseconds.
 #[derive(Debug, Serialize)]

@@ -19,6 +19,7 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
+use lager_benches::times::{Times, table};
 use lager_benches::{BenchError, interrupted};
 use lager_lines::conversation::RobotLine;
 use lager_lines::gag::{Query, Request};
@@ -29,7 +30,6 @@ use rustix::process::{Signal, kill_process};
 use serde::Serialize;
 
 use super::robot::{PATIENCE, Robot};
-use super::times::{Times, table};
 
 /// How long it drives before the cut, at least.
 const DRIVES: Duration = Duration::from_millis(150);

@@ -9,6 +9,7 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
+use lager_benches::times::{Times, table};
 use lager_benches::{BenchError, interrupted};
 use lager_ports::Clock;
 use lager_topics::{Origin, SteeringOrder};
@@ -16,7 +17,6 @@ use lager_wire::WheelCommand;
 use serde::Serialize;
 
 use super::robot::Robot;
-use super::times::{Times, table};
 use crate::hands::Hands;
 
 /// How often the order is renewed.

@@ -1,4 +1,5 @@
-//! Times of many repetitions, as people read them.
+//! Times of many repetitions, as people read them: what is measured on a whole robot prints such
+//! rows, `lager bench stop`, `command` and `link` as well as `tests/soak panel`.
 
 use std::fmt;
 
@@ -6,14 +7,20 @@ use serde::Serialize;
 
 /// A distribution, in milliseconds.
 #[derive(Debug, Serialize)]
-pub(super) struct Times {
+pub struct Times {
     p50_ms: f64,
+    p95_ms: f64,
     p99_ms: f64,
     max_ms: f64,
 }
 
 impl Times {
-    pub(super) fn of(mut ns: Vec<u64>) -> Self {
+    /// Of these times, in ns.
+    ///
+    /// # Panics
+    /// When there are none.
+    #[must_use]
+    pub fn of(mut ns: Vec<u64>) -> Self {
         ns.sort_unstable();
         let at = |part: f64| {
             let rank = (part * ns.len() as f64).ceil() as usize;
@@ -21,6 +28,7 @@ impl Times {
         };
         Self {
             p50_ms: at(0.5),
+            p95_ms: at(0.95),
             p99_ms: at(0.99),
             max_ms: at(1.0),
         }
@@ -28,21 +36,25 @@ impl Times {
 }
 
 /// Writes a row for each of `rows`, under a first column's head.
-pub(super) fn table(
+///
+/// # Errors
+/// When they cannot be written.
+pub fn table(
     formatter: &mut fmt::Formatter<'_>,
     head: &str,
     rows: &[(&str, &Times)],
 ) -> fmt::Result {
-    writeln!(formatter, "{head:26}     p50      p99      max")?;
+    writeln!(formatter, "{head:26}     p50      p95      p99      max")?;
     for (name, times) in rows {
         let Times {
             p50_ms,
+            p95_ms,
             p99_ms,
             max_ms,
         } = times;
         writeln!(
             formatter,
-            "{name:26} {p50_ms:7.1}  {p99_ms:7.1}  {max_ms:7.1}"
+            "{name:26} {p50_ms:7.1}  {p95_ms:7.1}  {p99_ms:7.1}  {max_ms:7.1}"
         )?;
     }
     Ok(())
@@ -56,8 +68,8 @@ mod tests {
     fn quantiles_are_of_the_sorted_times() {
         let times = Times::of((1..=200).rev().map(|ms| ms * 1_000_000).collect());
         assert_eq!(
-            (times.p50_ms, times.p99_ms, times.max_ms),
-            (100.0, 198.0, 200.0)
+            (times.p50_ms, times.p95_ms, times.p99_ms, times.max_ms),
+            (100.0, 190.0, 198.0, 200.0)
         );
     }
 }
