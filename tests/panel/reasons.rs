@@ -3,7 +3,7 @@
 
 use std::fmt::Display;
 
-use lager_lines::{Coord, Map, MapError, Name, Products, ProductsError};
+use lager_lines::{Coord, Map, MapError, Name, Products, ProductsError, check_names};
 use lager_station::{ActRefused, CommandRefused, WarehouseError, WishRefused};
 use lager_topics::{
     Calibration, Coded, Failure, FailureKind, Finish, Health, OrderQueue, Outcome, Refusal,
@@ -128,6 +128,12 @@ fn typed() -> Vec<String> {
         &WarehouseError::TooMany { count: 7_000 },
     ];
     all.extend(refused.map(|reason| reason.to_string()));
+    // Names that no product can have.
+    let names: [&[&str]; 3] = [&["7"], &["a,b"], &["nails", "nails"]];
+    all.extend(names.map(|names| {
+        let refused = check_names(names.iter().copied());
+        refused.expect_err("no such names").to_string()
+    }));
     let outside = WarehouseError::Outside {
         id: 7,
         x: 3,

@@ -33,6 +33,9 @@ const TABLE = [
   ["product {id} stands in the square [{square}], but the last one is [{last}]", "vara {id} står i rutan [{square}], men den sista är [{last}]"],
   ["product {id} stands in the square ({square}), which a warehouse of {x} x {y} squares does not have", "vara {id} står i rutan ({square}), som ett lager med {x} x {y} rutor inte har"],
   ["product {id} is listed twice; every product needs a number of its own", "vara {id} finns två gånger; varje vara behöver ett eget nummer"],
+  ["a product is named {name}, which would be taken for its number; use a letter", "en vara heter {name}, som skulle tas för dess nummer; använd en bokstav"],
+  ["a product is named {name}: {label} cannot stand for a product; it must have a character and neither comma, semicolon, line break nor a blank at its ends", "en vara heter {name}: {label} kan inte stå för en vara; namnet ska ha ett tecken och varken komma, semikolon, radbrytning eller blanktecken i ändarna"],
+  ["two products are named {name}; every name needs to be another one", "två varor heter {name}; varje namn måste vara ett annat"],
   ["the warehouse has {count} products, which do not fit in one line of the robot's language; list fewer", "lagret har {count} varor, som inte ryms på en rad i robotens språk; ange färre"],
   ["{count} products are listed; a robot takes {most} at most", "{count} varor är angivna; en robot klarar högst {most}"],
   // The robot, of what it is asked.
