@@ -8,7 +8,8 @@ use lager_topics::{FailureKind, Goal, Mode, Phase, SteeringReport, Thought, Thou
 use super::Navigator;
 use crate::battery::Limits;
 use crate::command::News;
-use crate::manoeuvre::{Outcome, STANDBY};
+use crate::manoeuvre::{Behaviour, STANDBY};
+use crate::outcome::Outcome;
 use crate::output::Output;
 
 impl Navigator {
