@@ -15,6 +15,7 @@
 mod arm;
 mod back_up;
 mod behaviour;
+mod fold;
 mod follow;
 mod helm;
 mod look;
@@ -25,12 +26,13 @@ mod turn;
 
 use core::time::Duration;
 
-use lager_topics::{Finish, Heading, NavigatorStatus, Phase, Pick, Step};
+use lager_topics::{Finish, Goal, Heading, NavigatorStatus, Phase, Pick, Step};
 use lager_wire::{Command, LineState};
 
 pub(crate) use arm::{ArmSequence, Task};
 pub(crate) use back_up::BackUp;
 pub(crate) use behaviour::Behaviour;
+pub(crate) use fold::Fold;
 pub(crate) use follow::{Ahead, Follow, Until};
 pub(crate) use helm::{Helm, STANDBY, Senses};
 pub(crate) use look::Look;
@@ -129,6 +131,8 @@ manoeuvres! {
     BackUp,
     /// It picks goods up, or lets them go.
     ArmSequence,
+    /// It brings the arm back to where it is carried.
+    Fold,
     /// It looks for the short mark of a station that a disturbed turn may have missed.
     Search,
 }
@@ -138,13 +142,21 @@ impl Manoeuvre {
     pub(crate) fn choose(
         mission: &Mission,
         senses: &Senses,
-        _holding: &Holding,
+        holding: &Holding,
         config: &LogicConfig,
     ) -> Self {
         let follow = |until| Follow::new(until, ahead(mission, until, senses)).into();
         let turn = |spot| Turn::to(mission.target, spot, mission.half_turn()).into();
         let side_mm = mission.map.as_ref().map_or(0.0, Map::side_mm);
         let middle = Spot::Edge(side_mm / 2.0);
+        // A robot that picks by itself was told to leave goods over which its arm reaches out.
+        let reaches_out = holding.joint_off.is_some()
+            && mission.goal == Goal::Home
+            && mission.pick == Pick::Auto
+            && senses
+                .arm
+                .joint_off(config.arm.carry, config.carry_tolerance)
+                .is_some();
         match mission.phase {
             _ if mission.parked => Stand.into(),
             Phase::Picking if mission.pick == Pick::Auto && mission.failure.is_none() => {
@@ -162,6 +174,7 @@ impl Manoeuvre {
             Phase::Turning => turn(Spot::Node),
             // Turned in, but disturbed meanwhile.
             Phase::Positioning if mission.place.heading == mission.target => Search::NEW.into(),
+            Phase::Leaving if reaches_out => Fold::NEW.into(),
             Phase::Positioning | Phase::Leaving => turn(middle),
             Phase::TurningRound => turn(Spot::Along(senses.exit_mm)),
             Phase::TurningBack => turn(Spot::Along(side_mm)),
