@@ -26,6 +26,7 @@ mod mission;
 mod navigator;
 pub mod node;
 pub mod odometer;
+mod outcome;
 mod output;
 mod place;
 pub mod queue;

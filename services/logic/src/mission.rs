@@ -19,8 +19,9 @@
 //!   a restart with no state to take up -> Lost; only a reset leads out
 //! ```
 //!
-//! Each phase has its manoeuvre ([`Mission::manoeuvre`]), and the manoeuvre's [`Outcome`] leads to
-//! the next phase ([`Mission::next`]). The mission knows nothing of lines, marks or the odometer.
+//! Each phase has its manoeuvre (`manoeuvre/mod.rs`), and the manoeuvre's [`Outcome`] leads to the
+//! next phase ([`Mission::next`]). The mission knows nothing of manoeuvres, lines, marks or the
+//! odometer.
 
 mod orders;
 mod ways;
@@ -36,13 +37,10 @@ use crate::battery::Battery;
 use crate::blocks::Blocks;
 use crate::config::LogicConfig;
 use crate::heading::{Compass, Spin};
-use crate::judge::Edge;
-use crate::manoeuvre::{
-    Ahead, ArmSequence, Follow, Look, Manoeuvre, Outcome, Search, Spot, Task, Turn, Until,
-};
 use crate::map::{Map, PickStation};
 use crate::marks::Sides;
 use crate::node::Node;
+use crate::outcome::Outcome;
 use crate::output::Output;
 use crate::place::Place;
 use crate::queue::Queue;
@@ -140,79 +138,6 @@ impl Mission {
     /// Whether only a person who puts the robot down leads on.
     pub(crate) fn needs_reset(&self) -> bool {
         self.phase.needs_reset() && !self.waits_for_way()
-    }
-
-    /// The manoeuvre of the phase, not begun yet. `exit_mm` is the length of the way out.
-    pub(crate) fn manoeuvre(&self, exit_mm: f32) -> Manoeuvre {
-        let turn = |spot| Manoeuvre::Turn(Turn::to(self.target, spot, self.half_turn()));
-        let follow = |until| Manoeuvre::Follow(Follow::new(until, self.ahead(until, exit_mm)));
-        let side_mm = self.map.as_ref().map_or(0.0, Map::side_mm);
-        let middle = Spot::Edge(side_mm / 2.0);
-        let config = &self.config;
-        match self.phase {
-            _ if self.parked => Manoeuvre::Stand,
-            Phase::Picking if self.pick == Pick::Auto && self.failure.is_none() => {
-                Manoeuvre::Arm(ArmSequence::new(Task::Pick))
-            }
-            Phase::WaitingForMap
-            | Phase::WaitingForOrder
-            | Phase::Picking
-            | Phase::Stuck
-            | Phase::Lost => Manoeuvre::Stand,
-            Phase::Driving => follow(Until::Node),
-            Phase::Approaching => follow(Until::Station),
-            Phase::Exiting => follow(Until::Bar),
-            Phase::Returning => follow(Until::Corner),
-            Phase::Turning => turn(Spot::Node),
-            // Turned in, but disturbed meanwhile.
-            Phase::Positioning if self.place.heading == self.target => {
-                Manoeuvre::Search(Search::NEW)
-            }
-            Phase::Positioning | Phase::Leaving => turn(middle),
-            Phase::TurningRound => turn(Spot::Along(exit_mm)),
-            Phase::TurningBack => turn(Spot::Along(side_mm)),
-            Phase::Looking => {
-                let side_cm = (side_mm / 10.0).min(f32::from(u8::MAX)) as u8;
-                let reach = side_cm.min(config.ranger_cm);
-                let limit = reach.saturating_sub(config.ranger_margin_cm);
-                Manoeuvre::Look(Look::new(limit, Duration::ZERO))
-            }
-            Phase::Halted => {
-                // A robot that has halted does not go on because a thing trembles.
-                let limit = config.halt_cm + config.halt_cm / 5;
-                Manoeuvre::Look(Look::new(limit, config.halt_patience))
-            }
-            Phase::Dropping => Manoeuvre::Arm(ArmSequence::new(Task::Drop)),
-            Phase::BackingOff => Manoeuvre::BackUp,
-        }
-    }
-
-    /// What the floor promises on the line that the phase drives along.
-    pub(crate) fn ahead(&self, until: Until, exit_mm: f32) -> Ahead {
-        let Place { node, heading, .. } = self.place;
-        let Some(map) = &self.map else {
-            return Ahead::default();
-        };
-        let tape_behind = |next| map.has_tape(next, heading);
-        match until {
-            Until::Bar => Ahead::default(),
-            Until::Corner => Ahead {
-                edge: Some(Edge {
-                    length_mm: exit_mm,
-                    stations: Sides::NONE,
-                    crossing: map.crossing_sides(map.delivery(), heading),
-                }),
-                goes_on: true,
-                goods: Sides::NONE,
-            },
-            Until::Node | Until::Station => Ahead {
-                edge: map.edge(node, heading),
-                goes_on: map.neighbour(node, heading).is_some_and(tape_behind),
-                goods: self
-                    .station()
-                    .map_or(Sides::NONE, |station| station.side_for(heading)),
-            },
-        }
     }
 
     /// Which way a half turn goes: at a node where the first quarter meets tape too, between nodes
@@ -522,7 +447,7 @@ impl Mission {
     }
 
     /// Where the product of the order is picked.
-    fn station(&self) -> Option<&PickStation> {
+    pub(crate) fn station(&self) -> Option<&PickStation> {
         self.map.as_ref()?.station(self.order.product)
     }
 

@@ -19,16 +19,15 @@
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Finish};
+use lager_topics::{FailureKind, Finish, Heading, NavigatorStatus};
 use lager_wire::{ArmCommand, Command};
 
-use super::helm::{Helm, Pause, STANDBY};
-use super::outcome::Outcome;
-use crate::arm::{ArmSeen, BASE, ELBOW, SHOULDER};
+use super::behaviour::Behaviour;
+use super::helm::{Helm, Senses};
+use super::steps::{BASE_JOINT, ELBOW_JOINT, Joint, SHOULDER_JOINT, Steps};
 use crate::config::LogicConfig;
+use crate::outcome::Outcome;
 
-/// A joint is where it should be when no further step would bring it nearer.
-const NEAR: i32 = 2;
 /// Steps for one joint after which something must be wrong with the arm.
 const MOST_STEPS: u16 = 400;
 /// Where to aim at each attempt, from straight ahead: there first, then 20 and 40 mm to either
@@ -49,44 +48,6 @@ enum Move {
     Hold,
 }
 
-/// One joint, and the commands that step it.
-struct Joint {
-    servo: usize,
-    raise: ArmCommand,
-    lower: ArmCommand,
-}
-
-static BASE_JOINT: Joint = Joint {
-    servo: BASE,
-    raise: ArmCommand::Left,
-    lower: ArmCommand::Right,
-};
-static SHOULDER_JOINT: Joint = Joint {
-    servo: SHOULDER,
-    raise: ArmCommand::Up,
-    lower: ArmCommand::Down,
-};
-static ELBOW_JOINT: Joint = Joint {
-    servo: ELBOW,
-    raise: ArmCommand::Out,
-    lower: ArmCommand::In,
-};
-
-impl Joint {
-    /// The command that brings it nearer, `None` when it is there. A servo that has not reported
-    /// yet is not waited for: the first step makes it report.
-    fn step_towards(&self, to: u16, arm: &ArmSeen) -> Option<ArmCommand> {
-        let Some(position) = arm.heard(self.servo) else {
-            return Some(self.raise);
-        };
-        match i32::from(to) - i32::from(position) {
-            missing if missing > NEAR => Some(self.raise),
-            missing if missing < -NEAR => Some(self.lower),
-            _ => None,
-        }
-    }
-}
-
 /// What the arm is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Task {
@@ -101,19 +62,15 @@ pub(crate) enum Task {
 pub(crate) struct ArmSequence {
     task: Task,
     /// Attempts and moves of this one that are done.
-    pub(crate) attempt: u8,
-    pub(crate) moves: u8,
-    /// Steps given for the move at hand.
-    steps: u16,
-    /// The step at work.
-    step: Option<ArmCommand>,
+    attempt: u8,
+    moves: u8,
+    /// How many steps the move at hand has taken.
+    count: u16,
+    steps: Steps,
     /// When the claw was closed.
     gripped_at: Option<Duration>,
     /// The life of the link in which its moves were made.
     life: Option<u32>,
-    /// How often the step at hand has been begun anew.
-    pub(crate) tries: u8,
-    pub(crate) pause: Pause,
 }
 
 impl ArmSequence {
@@ -123,94 +80,11 @@ impl ArmSequence {
             task,
             attempt: 0,
             moves: 0,
-            steps: 0,
-            step: None,
+            count: 0,
+            steps: Steps::NEW,
             gripped_at: None,
             life: None,
-            tries: 0,
-            pause: Pause::Wanted,
         }
-    }
-
-    /// As a predecessor left it, with `ordered` in force.
-    pub(crate) fn restore(&mut self, attempt: u8, moves: u8, tries: u8, ordered: Command) {
-        self.attempt = attempt.min(AIMS.len() as u8 - 1);
-        self.moves = moves.min(MOVES);
-        self.tries = tries;
-        if let Command::Arm(step) = ordered {
-            self.step = Some(step);
-            self.pause = Pause::None;
-        }
-    }
-
-    /// The order for the step at work.
-    pub(crate) fn wanted(&self) -> Command {
-        match self.pause {
-            Pause::None => self.step.map_or(STANDBY, Command::Arm),
-            Pause::Wanted | Pause::Until(_) => STANDBY,
-        }
-    }
-
-    /// Has it stand for a moment before the step at hand is given again.
-    pub(crate) fn interrupt(&mut self) {
-        self.step = None;
-        self.pause = Pause::Wanted;
-    }
-
-    /// The order for the step has ended.
-    pub(crate) fn ended(&mut self, finish: Finish, now: Duration) -> Option<Outcome> {
-        match finish {
-            Finish::None => None,
-            Finish::Done if self.task == Task::Drop => Some(Outcome::Done),
-            Finish::Done => {
-                let step = self.step.take();
-                self.tries = 0;
-                if step == Some(ArmCommand::Squeeze) {
-                    self.gripped_at = Some(now);
-                }
-                self.moves += u8::from(matches!(
-                    step,
-                    Some(ArmCommand::Release | ArmCommand::Squeeze)
-                ));
-                None
-            }
-            _ => {
-                self.interrupt();
-                None
-            }
-        }
-    }
-
-    /// Gives the next step when the one before has ended.
-    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
-        if self.pause != Pause::None {
-            if !self
-                .pause
-                .is_over(helm.now, helm.config.settle, helm.active)
-            {
-                return None;
-            }
-            self.tries += 1;
-            helm.out.status_changed = true;
-            let (most, tries) = (helm.config.tries, self.tries);
-            if tries > most {
-                let (most, tries) = (f32::from(most), f32::from(tries));
-                return Some(Outcome::Failed(FailureKind::BoardRefuses, most, tries));
-            }
-        }
-        if self.step.is_some() || !helm.active {
-            return None;
-        }
-        match self.task {
-            Task::Drop => self.give(ArmCommand::Drop, helm),
-            Task::Pick => return self.pick(helm),
-        }
-        None
-    }
-
-    fn give(&mut self, step: ArmCommand, helm: &mut Helm<'_>) {
-        self.step = Some(step);
-        helm.order.give_anew();
     }
 
     /// Gives the next step of the attempt, or judges it.
@@ -219,7 +93,7 @@ impl ArmSequence {
         let life = core::mem::replace(&mut self.life, arm.life());
         if life.is_some() && life != self.life {
             self.moves = if self.moves > SQUEEZE { SQUEEZE } else { 0 };
-            (self.steps, self.gripped_at) = (0, None);
+            (self.count, self.gripped_at) = (0, None);
         }
         let is_empty = arm
             .claw_is_empty(profile, helm.config.held_margin)
@@ -228,7 +102,7 @@ impl ArmSequence {
         while self.moves < MOVES {
             match next_move(self.moves, AIMS[usize::from(self.attempt)], helm.config) {
                 Move::Once(command) => {
-                    self.give(command, helm);
+                    self.steps.give(command, helm);
                     return None;
                 }
                 Move::Hold if is_empty => break,
@@ -241,19 +115,19 @@ impl ArmSequence {
                 }
                 Move::Bring(joint, to) => {
                     if let Some(step) = joint.step_towards(to, &arm) {
-                        self.steps += 1;
-                        if self.steps > MOST_STEPS {
+                        self.count += 1;
+                        if self.count > MOST_STEPS {
                             let seen = arm.position(joint.servo).map_or(0.0, f32::from);
                             let jammed = FailureKind::ArmJammed;
                             return Some(Outcome::Failed(jammed, f32::from(to), seen));
                         }
-                        self.give(step, helm);
+                        self.steps.give(step, helm);
                         return None;
                     }
                 }
             }
             self.moves += 1;
-            self.steps = 0;
+            self.count = 0;
         }
         if !is_empty {
             return Some(Outcome::Done);
@@ -266,6 +140,54 @@ impl ArmSequence {
         }
         (self.attempt, self.moves) = (self.attempt + 1, 0);
         self.pick(helm)
+    }
+}
+
+impl Behaviour for ArmSequence {
+    fn wanted(&self, _: &Senses, _: Heading, _: &LogicConfig) -> Command {
+        self.steps.wanted()
+    }
+
+    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
+        if finish == Finish::Done && self.task == Task::Drop {
+            return Some(Outcome::Done);
+        }
+        let step = self.steps.ended(finish)?;
+        if step == ArmCommand::Squeeze {
+            self.gripped_at = Some(helm.now);
+        }
+        self.moves += u8::from(matches!(step, ArmCommand::Release | ArmCommand::Squeeze));
+        None
+    }
+
+    /// Gives the next step when the one before has ended.
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+        match self.steps.may_go_on(helm) {
+            Err(failed) => return Some(failed),
+            Ok(false) => {}
+            Ok(true) if self.task == Task::Pick => return self.pick(helm),
+            Ok(true) => self.steps.give(ArmCommand::Drop, helm),
+        }
+        None
+    }
+
+    fn turns_wheels(&self) -> bool {
+        false
+    }
+
+    fn interrupt(&mut self) {
+        self.steps.interrupt();
+    }
+
+    fn restore(&mut self, status: &NavigatorStatus, ordered: Command) {
+        self.attempt = status.arm_attempt.min(AIMS.len() as u8 - 1);
+        self.moves = status.arm_moves.min(MOVES);
+        self.steps.restore(status.tries, ordered);
+    }
+
+    fn fill(&self, status: &mut NavigatorStatus) {
+        status.tries = self.steps.tries;
+        (status.arm_attempt, status.arm_moves) = (self.attempt, self.moves);
     }
 }
 

@@ -22,14 +22,15 @@
 
 use core::time::Duration;
 
-use lager_topics::{FailureKind, Step, Thought, ThoughtKind};
+use lager_topics::{FailureKind, Heading, NavigatorStatus, Step, Thought, ThoughtKind};
 use lager_wire::{Command, LineState, WheelCommand};
 
+use super::behaviour::Behaviour;
 use super::helm::{Helm, Senses, is_no_line, turning_place};
-use super::outcome::Outcome;
 use crate::config::LogicConfig;
 use crate::judge::{Edge, Verdict, judge};
 use crate::marks::{Mark, Sides};
+use crate::outcome::Outcome;
 
 /// A pause between line frames in which no mark passes unseen: the sensors take about 200 ms to
 /// cross one.
@@ -90,19 +91,6 @@ impl Follow {
         }
     }
 
-    /// Begins on a line on which the robot stands somewhere. A node that is too near for its mark
-    /// to be relied on is driven to by dead reckoning, corrected by the mark if it comes.
-    pub(crate) fn begin(&mut self, helm: &mut Helm<'_>) {
-        let sensors_at = helm.senses.odometer.travelled_mm + helm.config.sensor_ahead_mm;
-        let is_near = |edge: Edge| edge.length_mm - sensors_at < helm.config.run_up_mm;
-        if self.until != Until::Bar && self.ahead.edge.is_some_and(is_near) {
-            self.step = Step::NearNode;
-        }
-        helm.senses.marks.clear();
-        helm.senses.free_behind = true;
-        self.watched = Some(helm.now);
-    }
-
     /// The floor is known, or known anew, in the middle of the drive.
     pub(crate) fn look_ahead(&mut self, ahead: Ahead) {
         self.ahead = ahead;
@@ -116,14 +104,6 @@ impl Follow {
             .filter(|_| self.step == Step::Seeking && self.until != Until::Bar)
     }
 
-    /// The command the drive needs now.
-    pub(crate) fn wanted(&self, senses: &Senses, config: &LogicConfig) -> Command {
-        Command::Wheel(match self.is_past_the_line(senses, config) {
-            true => WheelCommand::ManualForward,
-            false => WheelCommand::ActiveForward,
-        })
-    }
-
     /// Whether the sensors are beyond the node ahead, and no tape goes straight on there.
     fn is_past_the_line(&self, senses: &Senses, config: &LogicConfig) -> bool {
         let Some(edge) = &self.ahead.edge else {
@@ -132,50 +112,6 @@ impl Follow {
         matches!(self.step, Step::ToNode | Step::NearNode)
             && !self.ahead.goes_on
             && senses.odometer.travelled_mm + config.sensor_ahead_mm >= edge.length_mm
-    }
-
-    /// Takes a line frame, and the mark that ended with it.
-    pub(crate) fn see(
-        &mut self,
-        state: LineState,
-        mark: Option<Mark>,
-        helm: &mut Helm<'_>,
-    ) -> Option<Outcome> {
-        let goes_on = |seen: &Duration| helm.now.saturating_sub(*seen) <= LONGEST_GAP;
-        self.watched = self.watched.filter(goes_on).map(|_| helm.now);
-        let outcome = match (self.until, self.step, mark) {
-            (Until::Bar, ..) => self.look_for_cross_bar(mark, state, helm),
-            (_, Step::Seeking, Some(mark)) => {
-                self.judge_mark(mark, helm);
-                None
-            }
-            (_, Step::NearNode, Some(mark)) => {
-                self.correct_by_node(mark, helm);
-                None
-            }
-            _ => None,
-        };
-        outcome.or_else(|| self.watch_line(state, helm))
-    }
-
-    /// Takes a distance: what stands before the next node, or on it, blocks the way; what stands
-    /// behind it is looked at from there. The way out is not looked at: there is no other one, and
-    /// delivered goods lie at its end.
-    pub(crate) fn range(&self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
-        let between_nodes = matches!(self.until, Until::Node | Until::Station);
-        let edge = self.ahead.edge.filter(|_| between_nodes)?;
-        let (config, senses) = (helm.config, &helm.senses);
-        let ranger_at = senses.odometer.travelled_mm + config.ranger_ahead_mm;
-        let at_mm = ranger_at + f32::from(centimetres) * 10.0;
-        let is_ahead = at_mm < edge.length_mm + config.beyond_node_mm;
-        if config.ranger_cm == 0 || centimetres >= config.halt_cm || !is_ahead || !helm.active {
-            return None;
-        }
-        helm.out.think(Thought {
-            seen: centimetres.into(),
-            ..ThoughtKind::Halts.into()
-        });
-        Some(Outcome::Blocked)
     }
 
     fn judge_mark(&mut self, mark: Mark, helm: &mut Helm<'_>) {
@@ -295,8 +231,98 @@ impl Follow {
         senses.sure_sight == Some(state) && off_mm <= edge.length_mm * config.tolerance_cut_short
     }
 
+    /// Whether the corner's mark, on the way back, must have passed without being seen.
+    ///
+    /// The length measured on the way out is less reliable than the mark: wheels that differ are
+    /// faster round a bend to one side than to the other, and the way back is up to a quarter
+    /// longer. Only on a short way are the sensors that far behind the corner before the axle has
+    /// come to it; there the robot may still be beside its line after the turn, and pass beside the
+    /// mark. Where the mark may have passed unseen, the measured length counts at once.
+    fn is_behind_unseen_corner(
+        &self,
+        length_mm: f32,
+        senses: &Senses,
+        config: &LogicConfig,
+    ) -> bool {
+        let late_mm = senses.mark_at(config) - length_mm;
+        match self.watched {
+            None => late_mm > config.tape_mm,
+            Some(_) => {
+                let before_axle = senses.odometer.travelled_mm < length_mm - config.coast_mm;
+                before_axle && late_mm > length_mm * config.tolerance
+            }
+        }
+    }
+}
+
+impl Behaviour for Follow {
+    /// Begins on a line on which the robot stands somewhere. A node that is too near for its mark
+    /// to be relied on is driven to by dead reckoning, corrected by the mark if it comes.
+    fn begin(&mut self, helm: &mut Helm<'_>) {
+        let sensors_at = helm.senses.odometer.travelled_mm + helm.config.sensor_ahead_mm;
+        let is_near = |edge: Edge| edge.length_mm - sensors_at < helm.config.run_up_mm;
+        if self.until != Until::Bar && self.ahead.edge.is_some_and(is_near) {
+            self.step = Step::NearNode;
+        }
+        helm.senses.marks.clear();
+        helm.senses.free_behind = true;
+        self.watched = Some(helm.now);
+    }
+
+    /// The command the drive needs now.
+    fn wanted(&self, senses: &Senses, _: Heading, config: &LogicConfig) -> Command {
+        Command::Wheel(match self.is_past_the_line(senses, config) {
+            true => WheelCommand::ManualForward,
+            false => WheelCommand::ActiveForward,
+        })
+    }
+
+    /// Takes a line frame, and the mark that ended with it.
+    fn see(
+        &mut self,
+        state: LineState,
+        mark: Option<Mark>,
+        helm: &mut Helm<'_>,
+    ) -> Option<Outcome> {
+        let goes_on = |seen: &Duration| helm.now.saturating_sub(*seen) <= LONGEST_GAP;
+        self.watched = self.watched.filter(goes_on).map(|_| helm.now);
+        let outcome = match (self.until, self.step, mark) {
+            (Until::Bar, ..) => self.look_for_cross_bar(mark, state, helm),
+            (_, Step::Seeking, Some(mark)) => {
+                self.judge_mark(mark, helm);
+                None
+            }
+            (_, Step::NearNode, Some(mark)) => {
+                self.correct_by_node(mark, helm);
+                None
+            }
+            _ => None,
+        };
+        outcome.or_else(|| self.watch_line(state, helm))
+    }
+
+    /// Takes a distance: what stands before the next node, or on it, blocks the way; what stands
+    /// behind it is looked at from there. The way out is not looked at: there is no other one, and
+    /// delivered goods lie at its end.
+    fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
+        let between_nodes = matches!(self.until, Until::Node | Until::Station);
+        let edge = self.ahead.edge.filter(|_| between_nodes)?;
+        let (config, senses) = (helm.config, &helm.senses);
+        let ranger_at = senses.odometer.travelled_mm + config.ranger_ahead_mm;
+        let at_mm = ranger_at + f32::from(centimetres) * 10.0;
+        let is_ahead = at_mm < edge.length_mm + config.beyond_node_mm;
+        if config.ranger_cm == 0 || centimetres >= config.halt_cm || !is_ahead || !helm.active {
+            return None;
+        }
+        helm.out.think(Thought {
+            seen: centimetres.into(),
+            ..ThoughtKind::Halts.into()
+        });
+        Some(Outcome::Blocked)
+    }
+
     /// Goes on along the line as far as the odometer says.
-    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
         let (config, senses) = (helm.config, &mut *helm.senses);
         let travelled = senses.odometer.travelled_mm;
         if self.until == Until::Bar {
@@ -342,27 +368,12 @@ impl Follow {
         None
     }
 
-    /// Whether the corner's mark, on the way back, must have passed without being seen.
-    ///
-    /// The length measured on the way out is less reliable than the mark: wheels that differ are
-    /// faster round a bend to one side than to the other, and the way back is up to a quarter
-    /// longer. Only on a short way are the sensors that far behind the corner before the axle has
-    /// come to it; there the robot may still be beside its line after the turn, and pass beside the
-    /// mark. Where the mark may have passed unseen, the measured length counts at once.
-    fn is_behind_unseen_corner(
-        &self,
-        length_mm: f32,
-        senses: &Senses,
-        config: &LogicConfig,
-    ) -> bool {
-        let late_mm = senses.mark_at(config) - length_mm;
-        match self.watched {
-            None => late_mm > config.tape_mm,
-            Some(_) => {
-                let before_axle = senses.odometer.travelled_mm < length_mm - config.coast_mm;
-                before_axle && late_mm > length_mm * config.tolerance
-            }
-        }
+    fn restore(&mut self, status: &NavigatorStatus, _: Command) {
+        self.step = status.step.get().unwrap_or(self.step);
+    }
+
+    fn fill(&self, status: &mut NavigatorStatus) {
+        status.step = self.step.into();
     }
 }
 

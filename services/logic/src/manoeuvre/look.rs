@@ -9,8 +9,13 @@
 
 use core::time::Duration;
 
-use super::helm::Helm;
-use super::outcome::Outcome;
+use lager_topics::Heading;
+use lager_wire::Command;
+
+use super::behaviour::Behaviour;
+use super::helm::{Helm, STANDBY, Senses};
+use crate::config::LogicConfig;
+use crate::outcome::Outcome;
 
 /// Age from which a distance says nothing of what is ahead now.
 const STALE: Duration = Duration::from_millis(150);
@@ -34,9 +39,15 @@ impl Look {
             near: None,
         }
     }
+}
+
+impl Behaviour for Look {
+    fn wanted(&self, _: &Senses, _: Heading, _: &LogicConfig) -> Command {
+        STANDBY
+    }
 
     /// Judges the last distance.
-    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
         let (heard, centimetres) = helm.senses.distance?;
         let is_young = heard >= helm.senses.turned_at + helm.config.ranger_lag;
         let is_stale = helm.now.saturating_sub(heard) > STALE;
@@ -51,5 +62,9 @@ impl Look {
         // One distance alone may be an accident.
         let again = heard > last;
         (again && heard.saturating_sub(first) >= self.patience).then_some(Outcome::Blocked)
+    }
+
+    fn turns_wheels(&self) -> bool {
+        false
     }
 }

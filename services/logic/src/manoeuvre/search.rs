@@ -7,12 +7,14 @@
 //! The sensors may reach no more than the mark's end, and come to rest beside it. So a turn that
 //! begins and ends near where the mark must be has met it: only tape ends a turn so early.
 
-use lager_topics::{FailureKind, Finish};
+use lager_topics::{FailureKind, Finish, Heading, NavigatorStatus};
 use lager_wire::{Command, WheelCommand};
 
-use super::helm::{Helm, Pause, is_no_line};
-use super::outcome::Outcome;
+use super::behaviour::Behaviour;
+use super::helm::{Helm, Pause, Senses, is_no_line};
+use crate::config::LogicConfig;
 use crate::heading::{Compass, Spin};
+use crate::outcome::Outcome;
 
 /// A search; it begins with a robot that looks to about where the mark is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +26,8 @@ pub(crate) struct Search {
     /// It has begun the turn at hand near where the mark must be.
     from_beside: bool,
     /// How often it has turned.
-    pub(crate) turns: u8,
-    pub(crate) pause: Pause,
+    turns: u8,
+    pause: Pause,
 }
 
 impl Search {
@@ -42,21 +44,10 @@ impl Search {
         turns: 0,
         pause: Pause::Wanted,
     };
+}
 
-    /// As a predecessor left it, with `ordered` in force.
-    pub(crate) fn restore(&mut self, turns: u8, ordered: Command) {
-        self.turns = turns;
-        // After that many it has met the edge's tape, or will on its way from there.
-        self.from_edge = turns > 1;
-        self.spin = match ordered {
-            Command::Wheel(WheelCommand::LeftPerp) => Some(Spin::Left),
-            Command::Wheel(WheelCommand::RightPerp) => Some(Spin::Right),
-            _ => return,
-        };
-        self.pause = Pause::None;
-    }
-
-    pub(crate) fn wanted(&self) -> Command {
+impl Behaviour for Search {
+    fn wanted(&self, _: &Senses, _: Heading, _: &LogicConfig) -> Command {
         Command::Wheel(match self.spin {
             Some(Spin::Left) if self.pause == Pause::None => WheelCommand::LeftPerp,
             Some(Spin::Right) if self.pause == Pause::None => WheelCommand::RightPerp,
@@ -65,7 +56,7 @@ impl Search {
     }
 
     /// The order for a turn has ended: the robot stands before it looks.
-    pub(crate) fn ended(&mut self, finish: Finish, helm: &Helm<'_>) -> Option<Outcome> {
+    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
         if finish == Finish::None {
             return None;
         }
@@ -74,7 +65,7 @@ impl Search {
         (finish == Finish::Done && self.from_beside && is_beside).then_some(Outcome::Done)
     }
 
-    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
         let settle = helm.config.settle;
         if !self.pause.is_over(helm.now, settle, helm.active) {
             return None;
@@ -106,5 +97,29 @@ impl Search {
         };
         helm.order.give_anew();
         None
+    }
+
+    fn interrupt(&mut self) {
+        self.pause = Pause::Wanted;
+    }
+
+    fn hear_again(&mut self) {
+        self.interrupt();
+    }
+
+    fn restore(&mut self, status: &NavigatorStatus, ordered: Command) {
+        self.turns = status.tries;
+        // After that many it has met the edge's tape, or will on its way from there.
+        self.from_edge = self.turns > 1;
+        self.spin = match ordered {
+            Command::Wheel(WheelCommand::LeftPerp) => Some(Spin::Left),
+            Command::Wheel(WheelCommand::RightPerp) => Some(Spin::Right),
+            _ => return,
+        };
+        self.pause = Pause::None;
+    }
+
+    fn fill(&self, status: &mut NavigatorStatus) {
+        status.tries = self.turns;
     }
 }

@@ -9,13 +9,18 @@
 //!     +-------> stand for a moment --> judged by angle and line -+
 //! ```
 
-use lager_topics::{FailureKind, Finish, Heading};
+use lager_topics::{FailureKind, Finish, Heading, NavigatorStatus};
 use lager_wire::{Command, LineState, WheelCommand};
 
+use super::behaviour::Behaviour;
 use super::helm::{Helm, Pause, STANDBY, Senses};
-use super::outcome::Outcome;
+use crate::config::LogicConfig;
 use crate::heading::{Compass, Spin};
+use crate::outcome::Outcome;
 use crate::turn::{Turned, done, interrupted, is_bare};
+
+/// In a status's doubt: the quarter before the one at hand ended without tape.
+const FROM_BARE: u8 = 16;
 
 /// Where a turn takes place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,17 +36,17 @@ pub(crate) enum Spot {
 /// A turn to a heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Turn {
-    pub(crate) target: Heading,
-    pub(crate) spot: Spot,
+    target: Heading,
+    pub(super) spot: Spot,
     /// Which way a half turn goes: where its first quarter meets tape too.
-    pub(crate) half: Spin,
+    half: Spin,
     /// How often the order at hand has been begun anew.
-    pub(crate) tries: u8,
+    tries: u8,
     /// It was cut short, or went on unheard.
-    pub(crate) disturbed: bool,
+    disturbed: bool,
     /// The quarter before ended without tape under the sensors.
-    pub(crate) from_bare: bool,
-    pub(crate) pause: Pause,
+    from_bare: bool,
+    pause: Pause,
 }
 
 impl Turn {
@@ -58,72 +63,18 @@ impl Turn {
         }
     }
 
-    pub(crate) fn begin(self, helm: &mut Helm<'_>) {
-        let odometer = &mut helm.senses.odometer;
-        odometer.turned_deg = 0.0;
-        match self.spot {
-            Spot::Node => odometer.travelled_mm = 0.0,
-            Spot::Edge(at_mm) => odometer.travelled_mm = at_mm,
-            Spot::Along(_) => {}
-        }
-        helm.senses.marks.clear();
-        helm.order.give_anew();
+    /// The floor is known only now, in the middle of the turn.
+    pub(crate) fn learn(&mut self, known: &Self) {
+        (self.spot, self.half) = (known.spot, known.half);
     }
 
     /// Which way to turn to the target from `heading`: the short way.
-    pub(crate) fn spin(&self, heading: Heading) -> Spin {
+    fn spin(&self, heading: Heading) -> Spin {
         match heading.quarters_right_to(self.target) {
             1 => Spin::Right,
             2 => self.half,
             _ => Spin::Left,
         }
-    }
-
-    /// The order for the quarter at hand; none while it stands to be judged.
-    pub(crate) fn wanted(&self, heading: Heading) -> Command {
-        if self.pause != Pause::None {
-            return STANDBY;
-        }
-        Command::Wheel(match self.spin(heading) {
-            Spin::Left => WheelCommand::LeftPerp,
-            Spin::Right => WheelCommand::RightPerp,
-        })
-    }
-
-    /// The order for the quarter has ended.
-    pub(crate) fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
-        match finish {
-            Finish::None => None,
-            Finish::Aborted | Finish::Refused | Finish::NoWord | Finish::NoTape => {
-                self.pause = Pause::Wanted;
-                None
-            }
-            Finish::Done => {
-                let seen = helm
-                    .senses
-                    .sight
-                    .map_or(LineState::NotOnLine, |(_, seen)| seen);
-                let angle = self.angle(helm.senses, *helm.heading);
-                let turned = done(angle, seen, self.from_bare);
-                self.from_bare |= is_bare(seen);
-                self.judged(turned, helm)
-            }
-        }
-    }
-
-    /// Judges a turn that was cut short once the robot has stood for a moment.
-    pub(crate) fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
-        if !self
-            .pause
-            .is_over(helm.now, helm.config.settle, helm.active)
-        {
-            return None;
-        }
-        let seen = helm.senses.sure_sight?;
-        self.disturbed = true;
-        let spin = self.spin(*helm.heading);
-        let turned = interrupted(self.angle(helm.senses, *helm.heading), spin, seen);
-        self.judged(turned, helm)
     }
 
     /// Degrees turned in the direction of the quarter at hand.
@@ -166,6 +117,87 @@ impl Turn {
         }
         helm.order.give_anew();
         None
+    }
+}
+
+impl Behaviour for Turn {
+    fn begin(&mut self, helm: &mut Helm<'_>) {
+        let odometer = &mut helm.senses.odometer;
+        odometer.turned_deg = 0.0;
+        match self.spot {
+            Spot::Node => odometer.travelled_mm = 0.0,
+            Spot::Edge(at_mm) => odometer.travelled_mm = at_mm,
+            Spot::Along(_) => {}
+        }
+        helm.senses.marks.clear();
+        helm.order.give_anew();
+    }
+
+    /// The order for the quarter at hand; none while it stands to be judged.
+    fn wanted(&self, _: &Senses, heading: Heading, _: &LogicConfig) -> Command {
+        if self.pause != Pause::None {
+            return STANDBY;
+        }
+        Command::Wheel(match self.spin(heading) {
+            Spin::Left => WheelCommand::LeftPerp,
+            Spin::Right => WheelCommand::RightPerp,
+        })
+    }
+
+    /// The order for the quarter has ended.
+    fn ended(&mut self, finish: Finish, helm: &mut Helm<'_>) -> Option<Outcome> {
+        match finish {
+            Finish::None => None,
+            Finish::Aborted | Finish::Refused | Finish::NoWord | Finish::NoTape => {
+                self.pause = Pause::Wanted;
+                None
+            }
+            Finish::Done => {
+                let seen = helm
+                    .senses
+                    .sight
+                    .map_or(LineState::NotOnLine, |(_, seen)| seen);
+                let angle = self.angle(helm.senses, *helm.heading);
+                let turned = done(angle, seen, self.from_bare);
+                self.from_bare |= is_bare(seen);
+                self.judged(turned, helm)
+            }
+        }
+    }
+
+    /// Judges a turn that was cut short once the robot has stood for a moment.
+    fn go_on(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
+        if !self
+            .pause
+            .is_over(helm.now, helm.config.settle, helm.active)
+        {
+            return None;
+        }
+        let seen = helm.senses.sure_sight?;
+        self.disturbed = true;
+        let spin = self.spin(*helm.heading);
+        let turned = interrupted(self.angle(helm.senses, *helm.heading), spin, seen);
+        self.judged(turned, helm)
+    }
+
+    fn interrupt(&mut self) {
+        self.pause = Pause::Wanted;
+    }
+
+    fn hear_again(&mut self) {
+        (self.pause, self.tries) = (Pause::Wanted, 0);
+    }
+
+    fn restore(&mut self, status: &NavigatorStatus, _: Command) {
+        self.tries = status.tries;
+        self.disturbed = status.doubt & 1 != 0;
+        self.from_bare = status.doubt & FROM_BARE != 0;
+    }
+
+    fn fill(&self, status: &mut NavigatorStatus) {
+        status.tries = self.tries;
+        let from_bare = if self.from_bare { FROM_BARE } else { 0 };
+        status.doubt = u8::from(self.disturbed) | from_bare;
     }
 }
 

@@ -8,9 +8,9 @@ use lager_topics::{
 use super::{Mission, Tables};
 use crate::blocks::{Block, Blocks};
 use crate::heading::Compass;
-use crate::manoeuvre::Outcome;
 use crate::map::{Map, PickStation};
 use crate::node::Node;
+use crate::outcome::Outcome;
 use crate::output::Output;
 use crate::place::Place;
 

@@ -8,7 +8,8 @@ use lager_topics::{FailureKind, Goal, Mode, Phase, SteeringReport, Thought, Thou
 use super::Navigator;
 use crate::battery::Limits;
 use crate::command::News;
-use crate::manoeuvre::{Outcome, STANDBY};
+use crate::manoeuvre::{Behaviour, STANDBY};
+use crate::outcome::Outcome;
 use crate::output::Output;
 
 impl Navigator {
@@ -92,8 +93,12 @@ impl Navigator {
             );
         // An order was taken back at the goods: the arm may still reach out over them.
         let withdraws = self.mission.goal == Goal::Home
-            && self.mission.phase == Phase::Leaving
-            && self.holding.joint_off.is_some();
+            && match self.mission.phase {
+                // It waits there for a way.
+                Phase::Picking => true,
+                Phase::Leaving => self.holding.joint_off.is_some(),
+                _ => false,
+            };
         if !(carries || withdraws) || self.mission.forced {
             self.holding.joint_off = None;
         } else if self.command.command() == STANDBY || !self.active {

@@ -35,9 +35,10 @@ use crate::by_hand::ByHand;
 use crate::command::Standing;
 use crate::config::LogicConfig;
 use crate::holding::Holding;
-use crate::manoeuvre::{Helm, Manoeuvre, Outcome, STANDBY, Senses};
+use crate::manoeuvre::{Behaviour, Helm, Manoeuvre, STANDBY, Senses, Stand};
 use crate::marks::Sides;
 use crate::mission::Mission;
+use crate::outcome::Outcome;
 use crate::output::Output;
 
 /// How long a robot that has to look ahead waits for a distance before it says so.
@@ -87,7 +88,7 @@ impl Navigator {
             stopped: false,
             active: false,
             mission: Mission::new(config),
-            manoeuvre: Manoeuvre::Stand,
+            manoeuvre: Stand.into(),
             senses: Senses::default(),
             holding: Holding::default(),
             by_hand: ByHand::default(),
@@ -240,7 +241,7 @@ impl Navigator {
         out.status_changed = true;
         if place.ask_mark(map, edge, sides, at_mm, self.config.tolerance) {
             self.mission.believe_other_place(out);
-            self.manoeuvre = self.mission.manoeuvre(self.senses.exit_mm);
+            self.manoeuvre = self.chosen();
         }
     }
 
@@ -266,7 +267,9 @@ impl Navigator {
 
     /// A manoeuvre that has ended leads to the next one.
     fn conclude(&mut self, now: Duration, outcome: Outcome, out: &mut Output) {
-        self.mission.next(outcome, out);
+        if outcome != Outcome::Ready {
+            self.mission.next(outcome, out);
+        }
         self.begin(now, out);
     }
 
@@ -276,8 +279,16 @@ impl Navigator {
         if self.mission.phase.needs_reset() {
             self.holding.forget();
         }
-        self.manoeuvre = self.mission.manoeuvre(self.senses.exit_mm);
-        self.steer(now, out, Manoeuvre::begin);
+        self.manoeuvre = self.chosen();
+        self.steer(now, out, |manoeuvre, helm| {
+            manoeuvre.prepare(helm);
+            manoeuvre.begin(helm);
+        });
+    }
+
+    /// The manoeuvre of the mission's phase, not begun yet.
+    fn chosen(&self) -> Manoeuvre {
+        Manoeuvre::choose(&self.mission, &self.senses, &self.holding, &self.config)
     }
 
     /// Goes on where the state allows it without a further input.
@@ -334,13 +345,15 @@ impl Navigator {
             Command::Wheel(_) if hold != Hold::None => STANDBY,
             command => command,
         };
-        let arm_granted = self.waits_for_hand() || hold == Hold::Arm;
-        (command, arm_granted)
+        // While the robot moves the arm, nobody else does.
+        let moves_arm = matches!(command, Command::Arm(_));
+        let waits_for_hand = self.waits_for_hand() || hold == Hold::Arm;
+        (command, waits_for_hand && !moves_arm)
     }
 
     /// It stands at the goods, and a person is to pick them up.
     fn waits_for_hand(&self) -> bool {
-        self.mission.phase == Phase::Picking && matches!(self.manoeuvre, Manoeuvre::Stand)
+        self.mission.phase == Phase::Picking && matches!(self.manoeuvre, Manoeuvre::Stand(_))
     }
 
     /// It has to look ahead, and no distances come.

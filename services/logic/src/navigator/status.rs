@@ -16,7 +16,7 @@ use crate::by_hand::ByHand;
 use crate::command::Standing;
 use crate::config::LogicConfig;
 use crate::heading::Spin;
-use crate::manoeuvre::STANDBY;
+use crate::manoeuvre::{Behaviour, STANDBY};
 use crate::marks::MarkReader;
 use crate::node::Node;
 use crate::place::{Doubt, Place};
@@ -133,11 +133,11 @@ impl Navigator {
         senses.exit_mm = status.exit_mm as f32;
         senses.odometer.travelled_mm = status.travelled_mm as f32;
         senses.odometer.turned_deg = f32::from(status.turned_deg);
-        navigator.manoeuvre = navigator.mission.manoeuvre(senses.exit_mm);
+        status.step.get()?;
+        navigator.manoeuvre = navigator.chosen();
         let command = Command::from_code(status.code).unwrap_or(STANDBY);
-        navigator
-            .manoeuvre
-            .restore(status.step.get()?, status, command, &navigator.config);
+        let config = &navigator.config;
+        navigator.manoeuvre.resume(status, command, config);
         navigator.command = Standing::resumed(status.command_id, command);
         let was_driving = status.mode == Mode::Autonomous && status.stopped == 0;
         if was_driving {

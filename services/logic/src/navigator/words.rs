@@ -6,8 +6,9 @@ use lager_topics::{FailureKind, Goal, Heading, Mode, Phase, Pick, ThoughtKind, W
 
 use super::{Input, Navigator};
 use crate::blocks::Block;
-use crate::manoeuvre::{Manoeuvre, Outcome, STANDBY};
+use crate::manoeuvre::{Manoeuvre, STANDBY, Stand, ahead};
 use crate::node::Node;
+use crate::outcome::Outcome;
 use crate::output::Output;
 
 /// Way of the wheels in manual mode, in mm, after which the known position is useless. The robot
@@ -91,7 +92,7 @@ impl Navigator {
         });
         // Goods that a person holds in the claw already are his to hand over.
         let waits = self.mission.phase == Phase::Picking
-            && matches!(self.manoeuvre, Manoeuvre::Stand)
+            && matches!(self.manoeuvre, Manoeuvre::Stand(_))
             && self.claw_is_empty().is_some();
         if waits && pick == Pick::Auto {
             self.begin(now, out);
@@ -104,7 +105,7 @@ impl Navigator {
         let is_at_goods = self.mission.phase == Phase::Picking;
         let has_goods = match is_at_goods {
             true => {
-                let is_gripping = matches!(self.manoeuvre, Manoeuvre::Arm(_));
+                let is_gripping = matches!(self.manoeuvre, Manoeuvre::ArmSequence(_));
                 is_gripping || self.claw_is_empty().is_none()
             }
             false => self.mission.goal == Goal::Delivery,
@@ -112,11 +113,12 @@ impl Navigator {
         if has_goods {
             return self.mission.keep_order(out);
         }
-        if self.mission.cancel_under_way(out) {
-            self.begin(now, out);
-        }
+        let goes_on = self.mission.cancel_under_way(out);
         if is_at_goods {
             self.holding.watch_arm(&self.senses.arm, &self.config, out);
+        }
+        if goes_on {
+            self.begin(now, out);
         }
     }
 
@@ -149,12 +151,13 @@ impl Navigator {
     fn look_ahead(&mut self, was_known: bool) {
         match &mut self.manoeuvre {
             Manoeuvre::Follow(follow) => {
-                let ahead = self.mission.ahead(follow.until, self.senses.exit_mm);
-                follow.look_ahead(ahead);
+                follow.look_ahead(ahead(&self.mission, follow.until, &self.senses));
             }
-            Manoeuvre::Turn(turn) if !was_known => {
-                if let Manoeuvre::Turn(known) = self.mission.manoeuvre(self.senses.exit_mm) {
-                    (turn.spot, turn.half) = (known.spot, known.half);
+            Manoeuvre::Turn(_) if !was_known => {
+                if let (Manoeuvre::Turn(known), Manoeuvre::Turn(turn)) =
+                    (self.chosen(), &mut self.manoeuvre)
+                {
+                    turn.learn(&known);
                 }
             }
             _ => {}
@@ -173,7 +176,7 @@ impl Navigator {
 
     /// The robot stands where the mission says, with nothing left of what was before.
     fn stand_here(&mut self) {
-        self.manoeuvre = Manoeuvre::Stand;
+        self.manoeuvre = Stand.into();
         self.holding.forget();
         self.senses.odometer.travelled_mm = 0.0;
         self.senses.odometer.forget_way();
@@ -184,7 +187,7 @@ impl Navigator {
 
     fn picked(&mut self, now: Duration, order_id: u32, forced: bool, out: &mut Output) {
         let empty = self.claw_is_empty();
-        let picks = matches!(self.manoeuvre, Manoeuvre::Arm(_));
+        let picks = matches!(self.manoeuvre, Manoeuvre::ArmSequence(_));
         if picks && !forced && empty.is_none() {
             // The routine brings the arm to its end, and finds out by itself.
             return;

@@ -4,9 +4,10 @@
 use std::time::Duration;
 
 use lager_logic::{Input, LogicConfig};
-use lager_topics::{EventKind, FailureKind, Phase, Pick, Remedy, Side};
+use lager_topics::{EventKind, FailureKind, Hold, Phase, Pick, Remedy, Side};
+use lager_wire::Command;
 
-use crate::double::Trouble;
+use crate::double::{CARRYING, Trouble};
 use crate::floor::Exit;
 use crate::trial::{Trial, warehouse};
 
@@ -109,7 +110,7 @@ fn where_there_is_nothing_a_hand_is_waited_for() {
     trial.run_for(SECOND);
     let order = trial.navigator.current_order().unwrap();
     assert_eq!((order.code, order.arm_granted), (1, 1));
-    trial.body.servos = crate::double::CARRYING;
+    trial.body.servos = CARRYING;
     trial.body.claw_load = -311;
     trial.run_for(SECOND / 5);
     let order_id = trial.status.order_id;
@@ -173,4 +174,92 @@ fn an_arm_that_never_obeys_ends_in_a_failure() {
         trial.navigator.status().failure.kind == FailureKind::BoardRefuses
     });
     assert!(gave_up, "{}", trial.story());
+}
+
+/// A robot that has found nothing at product 1, its arm over the empty shelf, whose order is then
+/// taken back. Product 2 is there.
+fn sent_away_from_nothing() -> Trial {
+    let config = LogicConfig {
+        pick: Pick::Auto,
+        ..LogicConfig::default()
+    };
+    let products = [(0, 0, Side::Up), (0, 0, Side::Right)];
+    let map = warehouse((1, 1), (0, 0), 45, &products);
+    let mut trial = Trial::with(config, map, Exit::Straight(450.0), Trouble::NONE, 3);
+    trial.order(1, 1);
+    let gave_up = trial.run_until(SECOND * 400, |trial| {
+        trial.navigator.status().failure.kind == FailureKind::GoodsMissing
+    });
+    assert!(gave_up, "{}", trial.story());
+    trial.run_for(SECOND / 5);
+    trial.tell(Input::Cancel(1));
+    trial.order(2, 2);
+    trial.body.goods_at = Some(512);
+    trial
+}
+
+fn is_folded(trial: &Trial) -> bool {
+    let off = |at: usize| trial.body.servos[at].abs_diff(CARRYING[at]);
+    [0, 1, 3].into_iter().all(|servo| off(servo) <= 20)
+}
+
+#[test]
+fn an_arm_that_found_nothing_is_brought_back_by_the_robot_before_it_leaves() {
+    let mut trial = sent_away_from_nothing();
+    assert!(!is_folded(&trial), "{:?}", trial.body.servos);
+    assert_eq!(trial.phase(), Phase::Leaving);
+    let turned = trial.body.begun.len();
+    let is_turn =
+        |code: &u8| Command::from_code(*code).is_some_and(|it| !matches!(it, Command::Arm(_)));
+    while !is_folded(&trial) {
+        assert!(
+            !trial.body.begun[turned..].iter().any(is_turn),
+            "{}",
+            trial.story()
+        );
+        let order = trial.navigator.current_order().unwrap();
+        let moves_arm = matches!(Command::from_code(order.code), Some(Command::Arm(_)));
+        assert!(
+            !moves_arm || order.arm_granted == 0,
+            "the arm is the robot's own"
+        );
+        trial.step();
+        assert!(trial.body.now < SECOND * 500, "{}", trial.story());
+    }
+    trial.deliver(1);
+    assert_eq!(trial.count(EventKind::ItemDelivered), 1);
+}
+
+#[test]
+fn an_arm_on_its_way_back_survives_a_kill_at_any_moment() {
+    let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
+    let mut trial = sent_away_from_nothing();
+    let mut kills = 0;
+    while trial.phase() == Phase::Leaving && !is_folded(&trial) {
+        let mut fork = trial.clone();
+        fork.kill(outages[kills % outages.len()]);
+        fork.thoughts
+            .push(format!("(killed at {:?})", trial.body.now));
+        fork.deliver(1);
+        kills += 1;
+        trial.run_for(Duration::from_millis(35));
+    }
+    assert!(kills > 20, "only {kills} moments");
+}
+
+#[test]
+fn an_arm_that_does_not_come_back_is_left_to_a_hand() {
+    let mut trial = sent_away_from_nothing();
+    trial.run_for(SECOND / 2);
+    trial.body.refuse = u32::MAX;
+    trial.run_for(SECOND * 10);
+    let (status, order) = (
+        trial.navigator.status(),
+        trial.navigator.current_order().unwrap(),
+    );
+    assert_eq!(status.hold, Hold::Arm, "{}", trial.story());
+    assert_eq!((order.code, order.arm_granted), (1, 1), "{}", trial.story());
+    trial.body.refuse = 0;
+    trial.body.servos = CARRYING;
+    trial.deliver(1);
 }

@@ -258,6 +258,36 @@ fn who_stands_at_goods_that_nobody_picks_leaves_without_them_when_the_arm_is_car
 }
 
 #[test]
+fn who_waits_at_goods_for_a_way_does_not_leave_with_its_arm_over_them() {
+    let mut trial = busy(&[1]);
+    let stands = |trial: &Trial| trial.phase() == Phase::Picking;
+    assert!(trial.run_until(SECOND * 90, stands), "{}", trial.story());
+    for y in [0, 1] {
+        way(&mut trial, (1, y), Heading::Right, false);
+    }
+    let [shoulder, claw] = [1, 7];
+    (trial.body.servos[claw], trial.body.claw_load) = (210, -20);
+    trial.body.servos[shoulder] += 100;
+    trial.run_for(SECOND / 10);
+    trial.tell(Input::Cancel(1));
+    trial.run_for(SECOND);
+    let failure = trial.navigator.status().failure;
+    assert_eq!(failure.kind, FailureKind::NoWay, "{}", trial.story());
+    way(&mut trial, (1, 0), Heading::Right, true);
+    trial.run_for(SECOND);
+    assert_eq!(trial.phase(), Phase::Leaving, "{}", trial.story());
+    let (status, order) = (trial.navigator.status(), trial.navigator.current_order());
+    assert_eq!(status.hold, Hold::Arm, "{}", trial.story());
+    assert_eq!(order.map(|order| order.code), Some(1), "it turns");
+    trial.body.servos[shoulder] -= 100;
+    trial.order(2, 2);
+    trial.run_for(SECOND);
+    (trial.body.servos[claw], trial.body.claw_load) = (399, -311);
+    trial.deliver(1);
+    assert_eq!(orders(&trial, EventKind::ItemDelivered), [2]);
+}
+
+#[test]
 fn a_reset_gives_up_what_is_under_way_and_nothing_that_waits() {
     let mut trial = busy(&[1, 2]);
     trial.body.stopped = true;
