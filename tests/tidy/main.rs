@@ -72,10 +72,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     // What tests and benches stand on.
-    (
-        "lager-rig",
-        &["lager-ports", "lager-topics", "lager-wire"],
-    ),
+    ("lager-rig", &["lager-ports", "lager-topics", "lager-wire"]),
     // floor 4
     (
         "lager-benches",

@@ -195,7 +195,7 @@ mod tests {
         let place = orphan.place();
         let segment = Path::new(SHARED_MEMORY).join(format!("{}left", place.prefix()));
         std::fs::write(&segment, b"left").unwrap();
-        assert_eq!(orphan.left(), [segment.clone()]);
+        assert_eq!(orphan.left(), std::slice::from_ref(&segment));
         std::mem::forget(orphan);
         let _domain = Domain::new(FAMILY).unwrap();
         assert!(!segment.exists() && !place.folder().exists());
