@@ -1014,7 +1014,7 @@ class TruthObstacle(Layout):
 
 class Truth(Layout):
     _type_name_ = "lager::Truth"
-    _hash_ = 0xBBAE686BFF52823E
+    _hash_ = 0xE7C32AED32255959
     _fields_ = [
         ("time_ns", ctypes.c_uint64),
         ("x_mm", ctypes.c_double),
@@ -1029,7 +1029,7 @@ class Truth(Layout):
         ("servo_position", ctypes.c_uint16 * 8),
         ("battery_charge", ctypes.c_float),
         ("collisions", ctypes.c_uint32),
-        ("goods", TruthGood * 64),
+        ("goods", TruthGood * 256),
         ("obstacles", TruthObstacle * 64),
         ("obstacle_count", ctypes.c_uint16),
         ("reserved", ctypes.c_uint8 * 6),
@@ -1037,9 +1037,9 @@ class Truth(Layout):
     _enums_ = {}
     _dtype_ = {
         "names": ["time_ns", "x_mm", "y_mm", "heading_rad", "left_mm_per_s", "right_mm_per_s", "carrying", "good_count", "left_duty", "right_duty", "servo_position", "battery_charge", "collisions", "goods", "obstacles", "obstacle_count", "reserved"],
-        "formats": ["<u8", "<f8", "<f8", "<f8", "<f4", "<f4", "<i4", "<u2", "<u1", "<u1", ("<u2", (8,)), "<f4", "<u4", (TruthGood._dtype_, (64,)), (TruthObstacle._dtype_, (64,)), "<u2", ("<u1", (6,))],
-        "offsets": [0, 8, 16, 24, 32, 36, 40, 44, 46, 47, 48, 64, 68, 72, 1352, 1608, 1610],
-        "itemsize": 1616,
+        "formats": ["<u8", "<f8", "<f8", "<f8", "<f4", "<f4", "<i4", "<u2", "<u1", "<u1", ("<u2", (8,)), "<f4", "<u4", (TruthGood._dtype_, (256,)), (TruthObstacle._dtype_, (64,)), "<u2", ("<u1", (6,))],
+        "offsets": [0, 8, 16, 24, 32, 36, 40, 44, 46, 47, 48, 64, 68, 72, 5192, 5448, 5450],
+        "itemsize": 5456,
     }
 
 

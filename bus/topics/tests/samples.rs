@@ -88,7 +88,7 @@ fn a_count_beyond_the_list_does_not_panic() {
         good_count: u16::MAX,
         ..Truth::default()
     };
-    assert_eq!(truth.goods().len(), 64);
+    assert_eq!(truth.goods().len(), 256);
 }
 
 #[test]

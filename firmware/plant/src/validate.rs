@@ -61,7 +61,7 @@ pub enum WarehouseError {
         /// The shortest that fits the curve.
         least: u16,
     },
-    /// More products than the bus can carry.
+    /// More products than the robot's map holds.
     #[error("there are {0} products; at most {MAX_PRODUCTS} fit")]
     TooManyProducts(usize),
     /// The same number twice.
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_built_is_refused_with_a_sentence() {
-        let cases: [(WarehouseError, &str); 12] = [
+        let cases: [(WarehouseError, &str); 13] = [
             (error(|w| w.size = [0, 2]), "size is 0 x 2"),
             (error(|w| w.size = [2, 100]), "size is 2 x 100"),
             (error(|w| w.side_length_cm = 39), "side must be from 40"),
@@ -270,6 +270,10 @@ mod tests {
                 "with this curve it must be from 88",
             ),
             (error(|w| w.products[1].id = 1), "product 1 is listed twice"),
+            (
+                error(|w| w.products = vec![w.products[0]; 257]),
+                "there are 257 products; at most 256 fit",
+            ),
             (
                 error(|w| w.products[0].square = [2, 0]),
                 "outside the warehouse",

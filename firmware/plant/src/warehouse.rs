@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 
 /// Squares along one axis, at most: the robot's map has up to 100 nodes there.
 pub const MAX_SQUARES: u8 = 99;
-/// Products in one warehouse, at most.
-pub const MAX_PRODUCTS: usize = 64;
+/// Products in one warehouse, at most: as many as the robot's map holds.
+pub const MAX_PRODUCTS: usize = 256;
 /// Smallest side of a square in cm: the marks are 17 cm long and goods stand behind them.
 pub const MIN_SIDE_CM: u16 = 40;
 /// Largest side of a square in cm.

@@ -54,7 +54,7 @@ payload! {
 
 payload! {
     /// The world: enough to resume it in another process.
-    pub struct Truth: 1616 bytes {
+    pub struct Truth: 5456 bytes {
         /// Robot time since the start of the world in ns.
         pub time_ns: u64,
         /// Middle of the axle in mm.
@@ -83,7 +83,7 @@ payload! {
         pub collisions: u32,
         /// The goods.
         #[serde(with = "crate::list")]
-        pub goods: [TruthGood; 64],
+        pub goods: [TruthGood; 256],
         /// What stands on edges.
         #[serde(with = "crate::list")]
         pub obstacles: [TruthObstacle; 64],
