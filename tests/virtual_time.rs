@@ -77,3 +77,48 @@ fn the_same_seed_gives_the_same_run() {
     };
     assert_eq!(strip(simulate(&args).0), strip(simulate(&args).0));
 }
+
+/// As large as a warehouse may be, 100 by 100 crossings and 256 products, with things that stand on
+/// the straight ways to the farthest of them.
+fn largest_warehouse() -> String {
+    let mut text = String::from("size = [99, 99]\nside_length_cm = 50\n");
+    for index in 0..256 {
+        let (id, x, y) = (index + 1, index % 16 * 6, index / 16 * 6);
+        text += &format!("[[product]]\nid = {id}\nsquare = [{x}, {y}]\nside = \"up\"\n");
+    }
+    for at in (4..96).step_by(6) {
+        for [x, y] in [[at, 0], [at, 91], [0, at], [90, at]] {
+            let [to_x, to_y] = if y == at { [x, y + 1] } else { [x + 1, y] };
+            text += &format!("[[obstacle]]\nbetween = [[{x}, {y}], [{to_x}, {to_y}]]\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn the_largest_warehouse_is_crossed_round_what_stands_in_the_way() {
+    let path = std::env::temp_dir().join(format!("lager-largest-{}.toml", std::process::id()));
+    std::fs::write(&path, largest_warehouse()).expect("a temporary file");
+    let warehouse = path.to_str().expect("a name");
+    // 145 edges each way. For 170 the battery of some robots does not last.
+    let args = [
+        "--warehouse",
+        warehouse,
+        "--mission",
+        "205",
+        "--battery",
+        "100",
+        "--seeds",
+        "1..3",
+    ];
+    let (runs, text) = simulate(&args);
+    std::fs::remove_file(&path).expect("the file is there");
+    assert_eq!(runs.len(), 3, "{text}");
+    for run in &runs {
+        assert_eq!(run["delivered"], serde_json::json!([205]), "{run}");
+        assert_eq!(run["collisions"], 0, "{run}");
+        assert_eq!(run["lost"], 0, "{run}");
+        let blocked = run["blocked"].as_u64();
+        assert!(blocked.is_some_and(|count| count > 0), "{run}");
+    }
+}

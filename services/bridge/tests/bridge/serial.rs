@@ -186,6 +186,37 @@ fn a_full_driver_never_tears_a_packet_and_never_blocks() {
 }
 
 #[test]
+fn what_waits_in_the_driver_is_thrown_away_before_a_stop_and_what_follows_is_sent() {
+    let isolation = Isolation::new();
+    let (pty, port) = pair(&isolation);
+    let mut writer = PacketWriter::default();
+    let mut written = 0;
+    // Nobody reads, until the driver takes no more.
+    while writer.write(&port, &[0xEE; 11]).unwrap() != Sent::NotNow {
+        written += 11;
+        assert!(written < 11_000_000, "the driver takes everything");
+    }
+    port.discard_output();
+    let standby = *b"the standby";
+    let mut received = Vec::new();
+    let mut buffer = [0; 4_096];
+    let mut writer = PacketWriter::default();
+    let mut is_sent = false;
+    wait_until("what follows comes", || {
+        let count = pty.read(&mut buffer);
+        received.extend(&buffer[..count]);
+        is_sent = is_sent || writer.write(&port, &standby) == Ok(Sent::Whole);
+        received.ends_with(&standby)
+    });
+    // What the other end of a pseudo terminal has taken in already counts as sent.
+    assert!(
+        received.len() < written / 2,
+        "{} of {written} bytes were sent all the same",
+        received.len()
+    );
+}
+
+#[test]
 fn a_pseudo_terminal_works_without_low_latency() {
     let isolation = Isolation::new();
     let (_pty, port) = pair(&isolation);
