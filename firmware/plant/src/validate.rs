@@ -271,7 +271,7 @@ mod tests {
             ),
             (error(|w| w.products[1].id = 1), "product 1 is listed twice"),
             (
-                error(|w| w.products = vec![w.products[0]; 257]),
+                error(|w| w.products = vec![w.products[0].clone(); 257]),
                 "there are 257 products; at most 256 fit",
             ),
             (
