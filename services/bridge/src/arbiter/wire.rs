@@ -159,9 +159,9 @@ impl Arbiter {
     /// original board would carry out a repetition, so it gets each command once. Standby it gets
     /// as often as the other, because nothing else makes it stand.
     ///
-    /// Only a standby that ends a movement is written while a packet is on the wire. Whoever orders faster than the wire
-    /// carries would fill the driver's buffer otherwise, and a standby would have to wait behind it:
-    /// 4 KiB take 80 ms at 500 000 Bd, and 4 s at 9600.
+    /// Only a standby that ends a movement is written while a packet is on the wire. Whoever orders
+    /// faster than the wire carries would fill the driver's buffer otherwise, and a standby would
+    /// have to wait behind it: 4 KiB take 80 ms at 500 000 Bd, and 4 s at 9600.
     pub fn poll(&mut self, now: Duration) -> Option<SteerCommand> {
         let version = self.board?;
         if self.retry_at.is_some_and(|at| at > now) {
