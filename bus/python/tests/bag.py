@@ -43,7 +43,7 @@ with Bag(path) as bag:
     assert "read-only" in refused(AttributeError, lambda: setattr(second.data, "bits", 1))
     assert second.array()["bits"][0] == second.data.bits
     newest = bag.topic("truth/pose").latest()
-    assert len(newest.data.goods) == 64 and newest.data.goods[0].id > 0
+    assert len(newest.data.goods) == 256 and newest.data.goods[0].id > 0
     assert ctypes.sizeof(newest.copy()) == len(bytes(newest.data))
     # Two at once, and as they come.
     both = zip(bag.topic("sensor/line"), bag.topic("steering/state"))
