@@ -3,6 +3,7 @@ itself, each channel's schema, and the last message of each topic; the schemas h
 
 import asyncio
 import contextlib
+import functools
 import json
 import sys
 
@@ -16,11 +17,17 @@ async def look():
     client = WebSocketBridgeClient(url, min_retry_delay=0.1)
     last, refused, whole = {}, [], asyncio.Event()
 
+    # Made once for each schema: who is slower than the robot finds his pings unanswered.
+    @functools.cache
+    def validator(schema):
+        schema = json.loads(schema)
+        return jsonschema.validators.validator_for(schema)(schema)
+
     def message(channel, unix_ns, data):
         # What a handler raises, the client only logs.
         try:
             value = json.loads(data)
-            jsonschema.validate(value, json.loads(channel["schema"]))
+            validator(channel["schema"]).validate(value)
             assert (channel["encoding"], channel["schemaEncoding"]) == ("json", "jsonschema")
             assert unix_ns > 1_700_000_000_000_000_000, unix_ns
             last[channel["topic"]] = value
