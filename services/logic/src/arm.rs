@@ -62,6 +62,11 @@ impl ArmSeen {
         self.position(servo).filter(|_| self.heard[servo])
     }
 
+    /// Whether no servo has been heard in this life of the link.
+    pub(crate) fn is_unheard(&self) -> bool {
+        self.heard == [false; 8]
+    }
+
     /// Which life of the link to the steering board the last report came from.
     pub(crate) fn life(&self) -> Option<u32> {
         self.life

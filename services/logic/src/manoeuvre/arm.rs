@@ -25,6 +25,7 @@ use lager_wire::{ArmCommand, Command};
 use super::behaviour::Behaviour;
 use super::helm::{Helm, Senses};
 use super::steps::{BASE_JOINT, ELBOW_JOINT, Joint, SHOULDER_JOINT, Steps};
+use crate::arm::ArmSeen;
 use crate::config::LogicConfig;
 use crate::outcome::Outcome;
 
@@ -87,11 +88,22 @@ impl ArmSequence {
         }
     }
 
+    /// Whether the board or the bridge has restarted since the last move. A successor of the
+    /// navigator, who did not see it, knows it by servos that nobody has heard.
+    fn is_of_another_life(&mut self, arm: &ArmSeen) -> bool {
+        let Some(life) = arm.life() else {
+            return false;
+        };
+        match self.life.replace(life) {
+            Some(before) => before != life,
+            None => self.moves > 0 && arm.is_unheard(),
+        }
+    }
+
     /// Gives the next step of the attempt, or judges it.
     fn pick(&mut self, helm: &mut Helm<'_>) -> Option<Outcome> {
         let (profile, arm) = (&helm.config.arm, helm.senses.arm);
-        let life = core::mem::replace(&mut self.life, arm.life());
-        if life.is_some() && life != self.life {
+        if self.is_of_another_life(&arm) {
             self.moves = if self.moves > SQUEEZE { SQUEEZE } else { 0 };
             (self.count, self.gripped_at) = (0, None);
         }

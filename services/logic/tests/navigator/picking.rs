@@ -122,37 +122,56 @@ fn where_there_is_nothing_a_hand_is_waited_for() {
     trial.deliver(1);
 }
 
+/// Delivers after harm at each moment of what the robot does, `apart` from each other. How many
+/// moments there were.
+fn harmed_at_any_moment(
+    mut trial: Trial,
+    apart: Duration,
+    goes_on: impl Fn(&Trial) -> bool,
+    harm: impl Fn(&mut Trial, Duration),
+) -> usize {
+    let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
+    let mut moments = 0;
+    while goes_on(&trial) {
+        let mut fork = trial.clone();
+        harm(&mut fork, outages[moments % outages.len()]);
+        fork.thoughts
+            .push(format!("(harmed at {:?})", trial.body.now));
+        fork.deliver(1);
+        moments += 1;
+        trial.run_for(apart);
+    }
+    moments
+}
+
+fn picks(trial: &Trial) -> bool {
+    trial.phase() == Phase::Picking
+}
+
 #[test]
 fn picking_survives_a_kill_at_any_moment() {
-    let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
-    let mut trial = at_the_goods(Some(533));
-    let mut kills = 0;
-    while trial.phase() == Phase::Picking {
-        let mut fork = trial.clone();
-        fork.kill(outages[kills % outages.len()]);
-        fork.thoughts
-            .push(format!("(killed at {:?})", trial.body.now));
-        fork.deliver(1);
-        kills += 1;
-        trial.run_for(Duration::from_millis(35));
-    }
-    assert!(kills > 100, "only {kills} moments");
+    let trial = at_the_goods(Some(533));
+    let moments = harmed_at_any_moment(trial, SECOND / 28, picks, Trial::kill);
+    assert!(moments > 100, "only {moments} moments");
 }
 
 #[test]
 fn picking_survives_a_restart_of_the_steering_board_at_any_moment() {
-    let mut trial = at_the_goods(Some(533));
-    let mut restarts = 0;
-    while trial.phase() == Phase::Picking {
-        let mut fork = trial.clone();
-        fork.body.restart_board();
-        fork.thoughts
-            .push(format!("(board restarted at {:?})", trial.body.now));
-        fork.deliver(1);
-        restarts += 1;
-        trial.run_for(Duration::from_millis(105));
-    }
-    assert!(restarts > 50, "only {restarts} moments");
+    let trial = at_the_goods(Some(533));
+    let restart = |trial: &mut Trial, _| trial.body.restart_board();
+    let moments = harmed_at_any_moment(trial, SECOND / 10, picks, restart);
+    assert!(moments > 50, "only {moments} moments");
+}
+
+#[test]
+fn picking_survives_a_restart_of_the_board_that_the_navigator_does_not_live_to_see() {
+    let trial = at_the_goods(Some(533));
+    let restart = |trial: &mut Trial, outage| {
+        trial.body.restart_board();
+        trial.kill(outage);
+    };
+    let moments = harmed_at_any_moment(trial, SECOND / 10, picks, restart);
+    assert!(moments > 50, "only {moments} moments");
 }
 
 #[test]
@@ -232,19 +251,10 @@ fn an_arm_that_found_nothing_is_brought_back_by_the_robot_before_it_leaves() {
 
 #[test]
 fn an_arm_on_its_way_back_survives_a_kill_at_any_moment() {
-    let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
-    let mut trial = sent_away_from_nothing();
-    let mut kills = 0;
-    while trial.phase() == Phase::Leaving && !is_folded(&trial) {
-        let mut fork = trial.clone();
-        fork.kill(outages[kills % outages.len()]);
-        fork.thoughts
-            .push(format!("(killed at {:?})", trial.body.now));
-        fork.deliver(1);
-        kills += 1;
-        trial.run_for(Duration::from_millis(35));
-    }
-    assert!(kills > 20, "only {kills} moments");
+    let folds = |trial: &Trial| trial.phase() == Phase::Leaving && !is_folded(trial);
+    let trial = sent_away_from_nothing();
+    let moments = harmed_at_any_moment(trial, SECOND / 28, folds, Trial::kill);
+    assert!(moments > 20, "only {moments} moments");
 }
 
 #[test]
