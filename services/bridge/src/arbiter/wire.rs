@@ -180,7 +180,7 @@ impl Arbiter {
         if self.written == Some(command) && !repeat && !retry {
             return None;
         }
-        if self.waits_for_wire(command) && self.wire_free > now {
+        if !retry && self.waits_for_wire(command) && self.wire_free > now {
             return None;
         }
         let moved = self.written.is_some_and(|written| code_moves(written.code));
@@ -204,6 +204,7 @@ impl Arbiter {
 
     /// What [`Arbiter::poll`] gave last could not be written: it is given again shortly.
     pub fn not_written(&mut self, now: Duration) {
+        self.wire_free = self.wire_free.saturating_sub(self.packet_time);
         self.retry_at = Some(now + RETRY);
     }
 

@@ -332,3 +332,31 @@ fn who_moves_and_stands_in_turn_fills_the_wire_with_no_more_than_it_carries() {
         "{written} of {carried}"
     );
 }
+
+#[test]
+fn what_finds_the_driver_full_is_given_again_shortly_however_long_a_packet_takes() {
+    for command in [STANDBY, FOLLOW] {
+        let mut bench = Bench::manual();
+        bench.arbiter.pace(ms(30));
+        bench.give(drive(Origin::Operator, 1, FORWARD));
+        bench.run(1);
+        match command {
+            STANDBY => bench.arbiter.stop(),
+            _ => drop(bench.give(drive(Origin::Operator, 2, command))),
+        }
+        bench.now += ms(30);
+        let given = |bench: &mut Bench| bench.arbiter.poll(bench.now).map(|it| it.command());
+        assert_eq!(given(&mut bench), Some(Some(command)));
+        for _ in 0..8 {
+            bench.arbiter.not_written(bench.now);
+            bench.now += ms(5);
+            assert_eq!(bench.arbiter.next_due(), Some(bench.now), "{command:?}");
+            assert_eq!(given(&mut bench), Some(Some(command)));
+        }
+        // What was not written has not filled the wire.
+        bench.now += ms(30);
+        bench.arbiter.resume_from_stop();
+        bench.give(drive(Origin::Operator, 3, FORWARD));
+        assert_eq!(given(&mut bench), Some(Some(FORWARD)));
+    }
+}
