@@ -4,10 +4,12 @@
 //! child process the effective configuration on its standard input, so a flag reaches all of them
 //! or none. An unknown key is an error, never ignored.
 
+mod bus;
 mod buttons;
 mod chip;
 mod documented;
 mod gateway;
+mod logic;
 mod realtime;
 mod station;
 
@@ -19,43 +21,26 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use lager_lines::check_names;
 use lager_plant::{MOST_OBSTACLES, Warehouse};
-use lager_ports::{BusConfig, Policy, RobotName};
-use lager_wire::{ArmProfile, SERVO_MAX};
+use lager_ports::{BusConfig, RobotName};
+use lager_wire::ArmProfile;
 use serde::{Deserialize, Serialize};
 
+pub use bus::{BusSection, Waiting};
 pub use buttons::ButtonsSection;
 pub use chip::ChipSection;
 pub use gateway::GatewaySection;
+pub use logic::{LogicSection, PickBy};
 pub use realtime::RealtimeSection;
 pub use station::{CommSection, StationSection, WithoutLink};
 
 use crate::realtime::HIGHEST_PRIORITY;
 use crate::services::Service;
 
-/// A service waits at most this long before it looks at its clock, so a longer spin never comes
-/// to its end.
-const LONGEST_SPIN_US: u64 = 20_000;
-
 /// The rates that boards are built for, in baud: that of today and the original's UBRR 103.
 pub const BAUD_RATES: [u32; 2] = [500_000, 9_600];
 
 /// How many times as fast as real time a robot's clock may run.
 pub const SPEEDS: RangeInclusive<f64> = 0.01..=20.0;
-
-/// Robots that dead reckoning can follow, in mm/s: slower ones are overtaken by its time-outs,
-/// faster ones pass a mark between two frames.
-const CRUISES_MM_PER_S: RangeInclusive<f32> = 10.0..=1_000.0;
-
-/// Where line sensors can be, in mm ahead of the axle: nearer than the tape's width the axle is on
-/// a node as soon as they see it, and farther than the smallest square's side they are past the
-/// next one.
-const SENSORS_AHEAD_MM: RangeInclusive<f32> = 20.0..=400.0;
-/// The same for turns on the spot, in degrees per second.
-const TURNS_DEG_PER_S: RangeInclusive<f32> = 5.0..=180.0;
-/// The same for the tape's width: wider, a crossing is no mark any more.
-const TAPES_MM: RangeInclusive<f32> = 5.0..=50.0;
-/// The same for the ranger's place.
-const RANGERS_AHEAD_MM: RangeInclusive<f32> = 0.0..=400.0;
 
 /// Everything a process of the robot needs to know at start.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -130,45 +115,6 @@ pub struct LogSection {
     pub json: bool,
 }
 
-/// `[bus]`: where it lives, and how it is waited for.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BusSection {
-    /// Its folder; unset, it is the system's or the user's own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub folder: Option<PathBuf>,
-    /// How bridge and logic wait for samples.
-    pub waiting: Waiting,
-    /// The longest that `waiting = "adaptive"` looks without pause for one sample, in µs.
-    pub longest_spin_us: u64,
-}
-
-impl BusSection {
-    /// How bridge and logic wait, as their ports want it.
-    pub fn policy(&self) -> Policy {
-        match self.waiting {
-            Waiting::Block => Policy::Block,
-            Waiting::Spin => Policy::Spin,
-            Waiting::Adaptive => Policy::Adaptive {
-                longest_spin: Duration::from_micros(self.longest_spin_us),
-            },
-        }
-    }
-}
-
-/// How a service waits: `lager_ports::Policy` as a word of the configuration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Waiting {
-    /// Sleep until something comes.
-    #[default]
-    Block,
-    /// Look without pause; costs a core for each service.
-    Spin,
-    /// Look without pause while samples come fast, sleep when they do not.
-    Adaptive,
-}
-
 /// `[serial]`: the cables to the boards.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -184,65 +130,6 @@ pub struct SerialSection {
     pub raw_line: bool,
     /// Whether an original steering board is driven, whose commands have no age limit.
     pub original_boards: bool,
-}
-
-/// `[logic]`: the measures dead reckoning needs.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogicSection {
-    /// Speed in mm/s when both motors run at the standard duty of 100.
-    pub cruise_mm_per_s: f32,
-    /// How far the line sensors are ahead of the wheels' axle, in mm.
-    pub sensor_ahead_mm: f32,
-    /// Degrees per second of a turn on the spot at that duty.
-    pub turn_deg_per_s: f32,
-    /// Width of the tape, in mm.
-    pub tape_mm: f32,
-    /// How far the ranger is ahead of the wheels' axle, in mm.
-    pub ranger_ahead_mm: f32,
-    /// Battery, in tenths of a volt, below which the robot stands at the next crossing; 0 = none.
-    pub low_battery_decivolts: u8,
-    /// How far the ranger sees, in cm; 0 = there is none, and no way is looked at.
-    pub ranger_cm: u8,
-    /// After how many seconds ways that were found blocked are tried again.
-    pub try_again_s: u32,
-    /// The shoulder's servo when the claw is around goods in front of the robot, in units of 0.29
-    /// degrees.
-    pub reach_shoulder: u16,
-    /// The elbow's servo for that.
-    pub reach_elbow: u16,
-    /// Who picks the goods up; none = as usual with the body ([`Config::pick`]).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pick: Option<PickBy>,
-}
-
-/// Who picks the goods up: `lager_topics::Pick` as a word of the configuration and of a command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum PickBy {
-    /// A person moves the arm and says when it is done.
-    Manual,
-    /// The robot, by itself.
-    Auto,
-}
-
-impl PickBy {
-    /// As it stands in the file.
-    pub const fn key(self) -> &'static str {
-        match self {
-            Self::Manual => "manual",
-            Self::Auto => "auto",
-        }
-    }
-}
-
-impl From<PickBy> for lager_topics::Pick {
-    fn from(pick: PickBy) -> Self {
-        match pick {
-            PickBy::Manual => Self::Manual,
-            PickBy::Auto => Self::Auto,
-        }
-    }
 }
 
 /// `[simulator]`: the simulated robot and the emulated boards' world.
@@ -278,20 +165,6 @@ impl Default for Config {
     }
 }
 
-impl Default for BusSection {
-    fn default() -> Self {
-        let longest_spin = match Policy::ADAPTIVE {
-            Policy::Adaptive { longest_spin } => longest_spin,
-            Policy::Block | Policy::Spin => Duration::ZERO,
-        };
-        Self {
-            folder: None,
-            waiting: Waiting::default(),
-            longest_spin_us: longest_spin.as_micros() as u64,
-        }
-    }
-}
-
 impl Default for SerialSection {
     fn default() -> Self {
         Self {
@@ -300,25 +173,6 @@ impl Default for SerialSection {
             baud: 500_000,
             raw_line: false,
             original_boards: false,
-        }
-    }
-}
-
-impl Default for LogicSection {
-    fn default() -> Self {
-        let config = lager_logic::LogicConfig::default();
-        Self {
-            cruise_mm_per_s: config.cruise_mm_per_s,
-            sensor_ahead_mm: config.sensor_ahead_mm,
-            turn_deg_per_s: config.turn_deg_per_s,
-            tape_mm: config.tape_mm,
-            ranger_ahead_mm: config.ranger_ahead_mm,
-            low_battery_decivolts: config.low_battery_decivolts,
-            ranger_cm: 80,
-            try_again_s: config.try_again.as_secs() as u32,
-            reach_shoulder: config.reach_shoulder,
-            reach_elbow: config.reach_elbow,
-            pick: None,
         }
     }
 }
@@ -386,59 +240,8 @@ impl Config {
             );
         }
         self.buttons.validate()?;
-        // Not a number is in no range.
-        for (key, value, range) in [
-            (
-                "cruise_mm_per_s",
-                self.logic.cruise_mm_per_s,
-                CRUISES_MM_PER_S,
-            ),
-            (
-                "sensor_ahead_mm",
-                self.logic.sensor_ahead_mm,
-                SENSORS_AHEAD_MM,
-            ),
-            ("turn_deg_per_s", self.logic.turn_deg_per_s, TURNS_DEG_PER_S),
-            ("tape_mm", self.logic.tape_mm, TAPES_MM),
-            (
-                "ranger_ahead_mm",
-                self.logic.ranger_ahead_mm,
-                RANGERS_AHEAD_MM,
-            ),
-        ] {
-            if !range.contains(&value) {
-                bail!(
-                    "[logic] {key} is {value}; it must be from {} to {}: measure it on the robot, or leave the key out",
-                    range.start(),
-                    range.end()
-                );
-            }
-        }
-        for (key, value) in [
-            ("reach_shoulder", self.logic.reach_shoulder),
-            ("reach_elbow", self.logic.reach_elbow),
-        ] {
-            if value > SERVO_MAX {
-                bail!(
-                    "[logic] {key} is {value}; a servo's position is from 0 to {SERVO_MAX}: step the arm to the goods with `lager arm`, and look with `lager topic echo steering/state`"
-                );
-            }
-        }
-        let margin = self.navigator().ranger_margin_cm;
-        if (1..=margin).contains(&self.logic.ranger_cm) {
-            bail!(
-                "[logic] ranger_cm is {}; it must be from {} to {}, since the last {margin} cm of what it sees block no way, or 0 where there is no ranger",
-                self.logic.ranger_cm,
-                margin + 1,
-                u8::MAX
-            );
-        }
-        if self.bus.longest_spin_us > LONGEST_SPIN_US {
-            bail!(
-                "[bus] longest_spin_us is {}; it must be from 0 to {LONGEST_SPIN_US} (waiting = \"spin\" never sleeps)",
-                self.bus.longest_spin_us
-            );
-        }
+        self.logic.validate()?;
+        self.bus.validate()?;
         if self.realtime.priority > HIGHEST_PRIORITY {
             bail!(
                 "[realtime] priority is {}; it must be from 1 to {HIGHEST_PRIORITY}, or 0 for the normal scheduler",
@@ -517,6 +320,8 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
 
 #[cfg(test)]
 mod tests {
+    use lager_ports::Policy;
+
     use super::*;
 
     #[test]

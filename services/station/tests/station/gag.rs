@@ -40,11 +40,17 @@ fn play(station: &mut Station, lines: &[(Peer, &str, &[&str])]) {
     }
 }
 
-#[test]
-fn a_session_of_a_plain_robot_with_a_gag() {
+/// A station to which both are connected.
+fn between_a_gag_and_a_robot() -> Station {
     let mut station = station();
     station.connected(Peer::Gag);
     station.connected(R1);
+    station
+}
+
+#[test]
+fn a_session_of_a_plain_robot_with_a_gag() {
+    let mut station = between_a_gag_and_a_robot();
     play(
         &mut station,
         &[
@@ -83,9 +89,7 @@ fn a_session_of_a_plain_robot_with_a_gag() {
 
 #[test]
 fn what_a_gag_says_wrongly_it_is_told_and_asked_again() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     play(&mut station, &[(R1, "karta", &["gag: karta"])]);
     for wrong in [
         "karta 0 0 0 0",
@@ -110,9 +114,7 @@ fn what_a_gag_says_wrongly_it_is_told_and_asked_again() {
 
 #[test]
 fn goods_outside_the_map_are_refused_and_the_warehouse_stays() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     for (question, answer) in [("sidelength", "sidelength 40"), ("karta", "karta 2 1 0 0")] {
         station.heard(R1, Ok(question));
         station.heard(Peer::Gag, Ok(answer));
@@ -155,9 +157,7 @@ fn the_station_answers_by_itself_before_a_gag_comes_and_after_it_has_gone() {
 
 #[test]
 fn a_stop_of_the_station_goes_to_a_robot_that_a_gag_drives() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     play(&mut station, &[(R1, "styrcomm", &["gag: styrcomm"])]);
     let stopped = station.stop(&name("robot-1"));
     assert_eq!(stopped, Ok(None), "nothing is confirmed");
@@ -174,9 +174,7 @@ fn a_stop_of_the_station_goes_to_a_robot_that_a_gag_drives() {
 
 #[test]
 fn commands_that_nobody_has_asked_a_gag_for_wait_in_their_order() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     play(
         &mut station,
         &[
@@ -203,9 +201,7 @@ fn commands_that_nobody_has_asked_a_gag_for_wait_in_their_order() {
 
 #[test]
 fn a_stop_takes_the_place_of_a_gags_commands_that_wait() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     let waits: &[(Peer, &str, &[&str])] = &[
         (R1, "styrcomm", &["gag: styrcomm"]),
         (Peer::Gag, "styrcomm 8", &["r1: styrcomm 00001000"]),
@@ -231,9 +227,7 @@ fn a_stop_takes_the_place_of_a_gags_commands_that_wait() {
 
 #[test]
 fn a_gags_commands_that_wait_are_bounded_and_none_is_older_than_the_mode() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     play(
         &mut station,
         &[
@@ -370,9 +364,7 @@ fn a_command_that_nobody_asks_for_is_refused() {
 
 #[test]
 fn what_a_gag_has_fetched_is_its_own_to_repeat() {
-    let mut station = station();
-    station.connected(Peer::Gag);
-    station.connected(R1);
+    let mut station = between_a_gag_and_a_robot();
     play(
         &mut station,
         &[
