@@ -21,6 +21,9 @@ use std::path::{Path, PathBuf};
 use crate::place::Place;
 use crate::shortage::SHARED_MEMORY;
 
+/// The ending of a service's list of ends.
+const LIST: &str = "dynamic";
+
 /// How the kernel marks a mapping whose file was removed.
 const REMOVED: &str = " (deleted)";
 
@@ -35,10 +38,10 @@ impl Inventory {
     /// or whose description is, if the look before missed it too. A process that has ended has
     /// nothing mapped.
     pub fn look(&mut self, place: &Place, processes: &[u32]) -> Option<PathBuf> {
-        let (ports, services) = (ports(place), services(place));
+        let (ports, described) = (ports(place), Described::at(place));
         let mapped = processes.iter().flat_map(|pid| mapped(*pid));
         let missed = mapped
-            .filter(|file| is_missed(file, place, &ports, &services))
+            .filter(|file| is_missed(file, place, &ports, &described))
             .map(|file| file.path)
             .collect();
         let before = core::mem::replace(&mut self.missed, missed);
@@ -73,29 +76,25 @@ fn is_missed(
     file: &Mapped,
     place: &Place,
     ports: &BTreeSet<String>,
-    services: &BTreeSet<u128>,
+    described: &Described,
 ) -> bool {
     let Mapped { path, removed } = file;
     if path.starts_with(place.folder()) {
         // The bridge watches the stop word itself.
         return *removed && (path.ends_with("bells") || path.ends_with("clock"));
     }
-    let name = path.strip_prefix(SHARED_MEMORY).ok().and_then(Path::to_str);
-    let Some((stem, end)) = name
-        .and_then(|name| name.strip_prefix(place.prefix()))
-        .and_then(|name| name.rsplit_once('.'))
-    else {
-        return false;
-    };
-    let number = stem.rsplit('_').next().unwrap_or_default();
-    match end {
-        "dynamic" => {
-            let is_described = |number: u128| services.contains(&number);
-            *removed || !number.parse().is_ok_and(is_described)
-        }
-        "data" => *removed && ports.contains(number),
+    match parts(path, place.prefix()) {
+        Some((_, LIST)) => *removed || described.misses(path),
+        Some((number, "data")) => *removed && ports.contains(number),
         _ => false,
     }
+}
+
+/// The number of a service or port, and the ending, in the name of a segment.
+fn parts<'a>(path: &'a Path, prefix: &str) -> Option<(&'a str, &'a str)> {
+    let name = path.strip_prefix(SHARED_MEMORY).ok()?.to_str()?;
+    let (stem, end) = name.strip_prefix(prefix)?.rsplit_once('.')?;
+    Some((stem.rsplit('_').next().unwrap_or_default(), end))
 }
 
 /// The numbers of the ports that processes have.
@@ -111,11 +110,30 @@ fn ports(place: &Place) -> BTreeSet<String> {
         .collect()
 }
 
-/// The numbers of the services that are described.
-fn services(place: &Place) -> BTreeSet<u128> {
-    entries(&place.transport_folder().join("services"))
-        .filter_map(|file| number_in(&fs::read_to_string(file.path()).ok()?))
-        .collect()
+/// The services that have a description.
+pub(crate) struct Described {
+    prefix: String,
+    numbers: BTreeSet<u128>,
+}
+
+impl Described {
+    pub(crate) fn at(place: &Place) -> Self {
+        Self {
+            prefix: place.prefix().to_owned(),
+            numbers: entries(&place.transport_folder().join("services"))
+                .filter_map(|file| number_in(&fs::read_to_string(file.path()).ok()?))
+                .collect(),
+        }
+    }
+
+    /// Whether a segment is the list of ends of a service without a description.
+    pub(crate) fn misses(&self, segment: &Path) -> bool {
+        let has = |number: u128| self.numbers.contains(&number);
+        match parts(segment, &self.prefix) {
+            Some((number, LIST)) => !number.parse().is_ok_and(has),
+            _ => false,
+        }
+    }
 }
 
 /// The number of the service that a description belongs to; the name of the service's list of ends

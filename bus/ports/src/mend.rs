@@ -5,6 +5,7 @@
 //! |---|---|
 //! | an unfinished segment: empty, or not readable yet | at every look, if no process has it open |
 //! | an unfinished description of a service | likewise |
+//! | a service's list of ends that no description names | likewise |
 //! | a node's folder without the node | likewise, if it is older than a creation takes |
 //! | any segment, description or socket | in [`mend`], if no process has it open |
 //! | a node's files; bells, locks, what `up` kept | likewise |
@@ -20,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use crate::error::OpenError;
+use crate::inventory::Described;
 use crate::lease;
 use crate::lock;
 use crate::name::RobotName;
@@ -107,11 +109,17 @@ pub fn damaged(config: &crate::BusConfig) -> Result<Vec<PathBuf>, OpenError> {
     Ok(segments(&place).filter(|path| is_damaged(path)).collect())
 }
 
-/// Removes what was never finished and whose creator is gone; returns how much it was.
+/// Removes what was never finished and whose creator is gone, and lists of ends whose description
+/// is; returns how much it was. Such a list is left where a sweep had it open while the rest of its
+/// service was removed.
 pub(crate) fn unfinished(place: &Place) -> usize {
     let bad_counter = |path: &Path| is_counter(path) && !is_sound_counter(path);
-    let segments = segments(place)
-        .filter(|path| is_unfinished(path) || bad_counter(path))
+    let all: Vec<PathBuf> = segments(place).collect();
+    // After the segments: a service has its description first.
+    let described = Described::at(place);
+    let segments = all
+        .iter()
+        .filter(|path| is_unfinished(path) || bad_counter(path) || described.misses(path))
         .filter(|path| lease::remove_unused(path))
         .count();
     let descriptions = files(&services(place))

@@ -1,7 +1,7 @@
 //! Files that were never finished, were emptied, or belong to another user: no process waits for
 //! ever, and files without a user are removed.
 
-use std::fs::{self, OpenOptions, Permissions};
+use std::fs::{self, File, OpenOptions, Permissions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt, chown};
 use std::path::PathBuf;
 use std::sync::mpsc;
@@ -167,6 +167,21 @@ fn of_the_dead_alone_mending_leaves_nothing_whatever_their_files_hold() {
         assert_eq!(domain.left_in_folder(), Vec::<PathBuf>::new(), "{damage}");
         assert_eq!(domain.place().robots(), [], "{damage}");
     }
+}
+
+#[test]
+fn a_list_of_ends_that_a_sweep_had_open_goes_when_somebody_comes() {
+    let domain = Domain::new();
+    process::start(&domain, "line-writer").kill();
+    let sweep = File::open(&dynamic(&domain)[0]).unwrap();
+    mend(&domain.config).unwrap();
+    assert_eq!(dynamic(&domain).len(), 1, "it was open");
+    // Also while it is open somebody comes, and the list stays.
+    let bus = domain.open(Role::Observer);
+    assert_eq!(dynamic(&domain).len(), 1);
+    drop(sweep);
+    bus.sweep();
+    assert_eq!(dynamic(&domain), Vec::<PathBuf>::new());
 }
 
 #[test]
