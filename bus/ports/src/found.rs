@@ -63,6 +63,10 @@ impl Found {
     pub fn lost(&self) -> u64 {
         self.reader.streams().lost()
     }
+
+    pub(crate) fn queue(&self) -> usize {
+        self.reader.queue()
+    }
 }
 
 impl fmt::Debug for Found {

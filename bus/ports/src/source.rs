@@ -26,6 +26,9 @@ pub trait Source {
 
     /// Samples missed, as [`Subscriber::lost`] counts them.
     fn lost(&self) -> u64;
+
+    /// How many samples can wait for this end; one more overwrites the oldest.
+    fn queue(&self) -> usize;
 }
 
 impl<T: Topic> Source for Subscriber<T> {
@@ -37,6 +40,10 @@ impl<T: Topic> Source for Subscriber<T> {
     fn lost(&self) -> u64 {
         Self::lost(self)
     }
+
+    fn queue(&self) -> usize {
+        T::QOS.buffer
+    }
 }
 
 impl Source for Found {
@@ -47,5 +54,9 @@ impl Source for Found {
 
     fn lost(&self) -> u64 {
         Self::lost(self)
+    }
+
+    fn queue(&self) -> usize {
+        Self::queue(self)
     }
 }

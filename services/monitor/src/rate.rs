@@ -1,13 +1,13 @@
-//! `topic hz` and `topic bw`: rate, age, bytes and loss of one topic, once a second, from the stamps
-//! alone.
+//! `topic hz` and `topic bw`: rate, bytes and loss of one topic, and how old its samples were when
+//! they were published, once a second, from the stamps alone.
 
 use std::io::Write;
 
 use lager_topics::Stamp;
 use serde_json::{Value, json};
 
-use crate::measure::{Gauge, Limits, Plan, Seen};
-use crate::{POLL, ToolError, Tools};
+use crate::measure::{Gauge, Limits, Pace, Plan, Seen};
+use crate::{ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
     /// `topic hz`: measures the rate of `name` until a limit or the shutdown.
@@ -17,7 +17,7 @@ impl<W: Write> Tools<'_, W> {
     pub fn hz(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
         let plan = Plan {
             limits,
-            pace: POLL,
+            pace: Pace::AsTheQueueAllows,
             head: "",
             gauge: |_| Rate::default(),
         };
@@ -32,7 +32,7 @@ impl<W: Write> Tools<'_, W> {
     pub fn bandwidth(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
         let plan = Plan {
             limits,
-            pace: POLL,
+            pace: Pace::AsTheQueueAllows,
             head: "",
             gauge: |payload| Bandwidth {
                 payload,
@@ -74,7 +74,7 @@ impl Gauge for Rate {
             self.longest_gap_ns = self.longest_gap_ns.max(gap);
         }
         self.last_ns = stamp.publish_time_ns;
-        let age = seen.received_ns.saturating_sub(stamp.source_time_ns);
+        let age = stamp.publish_time_ns.saturating_sub(stamp.source_time_ns);
         self.oldest_source_ns = self.oldest_source_ns.max(age);
         self.samples += 1;
     }
@@ -161,7 +161,7 @@ mod tests {
         }
         assert!((gauge.rate.hz() - 500.0).abs() < 1e-9);
         assert_eq!(gauge.rate.longest_gap_ns, 3_000_000);
-        assert_eq!(gauge.rate.oldest_source_ns, 600);
+        assert_eq!(gauge.rate.oldest_source_ns, 500);
         assert_eq!(gauge.as_json()["bytes_per_s"], json!(500.0 * 120.0));
     }
 

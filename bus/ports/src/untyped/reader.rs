@@ -102,6 +102,11 @@ impl Reader {
         })
     }
 
+    /// How many samples can wait for this end.
+    pub(crate) fn queue(&self) -> usize {
+        self.port.buffer_size()
+    }
+
     /// The next sample, oldest first.
     #[inline(never)]
     pub(crate) fn receive(&mut self) -> Result<Option<Taken>, ReceiveError> {
