@@ -93,6 +93,13 @@ pub(crate) fn gains_are_set_and_put_back_and_a_calibration_goes_step_by_step(
     page.wait_for("#calibration [aria-current]", "move it slowly");
     page.wait_for("#calibration-said", "Calibrating");
     page.wait_until("document.querySelectorAll('#calibration-sensors .on').length > 0");
+    // Meanwhile it tells what each of them reads: more over tape than over floor.
+    page.wait_until(
+        "(() => { const read = (select) => [...document.querySelectorAll(`#calibration-sensors ${select}`)] \
+           .map(({ textContent }) => Number(textContent)); \
+         return read('.value').every((value) => value > 0) && \
+           Math.min(...read('.on .value')) > Math.max(...read('.sensor:not(.on) .value')); })()",
+    );
     page.wait_for("#calibration-said", "of the 11");
     page.wait_until("!document.querySelector('#calibrate').disabled");
 }
@@ -196,9 +203,19 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
         ));
     };
     now("sensor_up=1 line_bits=00001110000");
-    seen(&mut page, "00001110000, of which 0 have");
-    now("sensor_up=1 line_bits=00000111000");
-    seen(&mut page, "00000111000, of which 2 have");
+    seen(&mut page, "line sensors 00001110000");
+    let others = " 30 20 40 0".repeat(9);
+    robot.says(&[
+        "state sensor_up=1 line_bits=00001110000",
+        &format!("sensors 210 20 220 1{others} 60 20 61 1"),
+    ]);
+    seen(
+        &mut page,
+        "210 30 30 30 30 30 30 30 30 30 60; 2 of them have seen",
+    );
+    page.wait_until("document.querySelectorAll('#calibration-sensors .both').length === 2");
+    let height = "document.querySelector('#calibration-sensors .stretch').style.height";
+    assert_eq!(page.value(height), "78.4%", "of 255");
     drop((page, robot));
     stage.end();
 }

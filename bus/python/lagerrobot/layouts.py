@@ -499,9 +499,27 @@ class BoardHealth(Layout):
     }
 
 
+class CalibratedSensor(Layout):
+    _type_name_ = "lager::CalibratedSensor"
+    _hash_ = 0x420310DFA219233F
+    _fields_ = [
+        ("reading", ctypes.c_uint8),
+        ("lowest", ctypes.c_uint8),
+        ("highest", ctypes.c_uint8),
+        ("tells_apart", ctypes.c_uint8),
+    ]
+    _enums_ = {}
+    _dtype_ = {
+        "names": ["reading", "lowest", "highest", "tells_apart"],
+        "formats": ["<u1", "<u1", "<u1", "<u1"],
+        "offsets": [0, 1, 2, 3],
+        "itemsize": 4,
+    }
+
+
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0x7455BDBC8959268E
+    _hash_ = 0x8CD167B01CDA725F
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
@@ -531,17 +549,18 @@ class Health(Layout):
         ("calibration", ctypes.c_uint8),
         ("calibrated_sensors", ctypes.c_uint8),
         ("calibrations_ended", ctypes.c_uint8),
+        ("calibrated", CalibratedSensor * 11),
         ("stop_cause", ctypes.c_uint8),
         ("stop_origin", ctypes.c_uint8),
         ("mode_chosen", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 5),
+        ("reserved", ctypes.c_uint8 * 1),
     ]
     _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ArmProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role}
     _dtype_ = {
-        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
-        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", ("<u1", (5,))],
-        "offsets": [0, 48, 96, 104, 112, 120, 124, 128, 132, 136, 140, 156, 158, 160, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179],
-        "itemsize": 184,
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", ("<u1", (1,))],
+        "offsets": [0, 48, 96, 104, 112, 120, 124, 128, 132, 136, 140, 156, 158, 160, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176, 220, 221, 222, 223],
+        "itemsize": 224,
     }
 
 

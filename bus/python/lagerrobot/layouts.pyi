@@ -400,6 +400,12 @@ class BoardHealth(Layout):
     board_longest_loop_100us: int
     reserved: Sequence[int]
 
+class CalibratedSensor(Layout):
+    reading: int
+    lowest: int
+    highest: int
+    tells_apart: int
+
 class Health(Layout):
     sensor: BoardHealth
     steering: BoardHealth
@@ -429,6 +435,7 @@ class Health(Layout):
     calibration: int
     calibrated_sensors: int
     calibrations_ended: int
+    calibrated: Sequence[CalibratedSensor]
     stop_cause: int
     stop_origin: int
     mode_chosen: int

@@ -102,7 +102,7 @@ impl Decoder {
     #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Packet> {
         match self.version {
-            Version::One => self.push_one(byte),
+            Version::One => self.push_one::<true>(byte),
             Version::Original => {
                 self.keep(byte);
                 self.examine_original()
@@ -110,17 +110,22 @@ impl Decoder {
         }
     }
 
-    /// The same for a decoder of version 1, by name: so the original's rules take no room on the
-    /// boards.
+    /// The same on a board, which hears only the Pi, in version 1. So the original's rules, and how
+    /// packets of boards are read, take no room there.
     #[inline]
-    pub(crate) fn push_one(&mut self, byte: u8) -> Option<Packet> {
+    pub(crate) fn push_on_board(&mut self, byte: u8) -> Option<Packet> {
+        self.push_one::<false>(byte)
+    }
+
+    #[inline]
+    fn push_one<const BOARDS: bool>(&mut self, byte: u8) -> Option<Packet> {
         self.keep(byte);
         match self.length {
             1 | 2 => {
                 self.check_header();
                 None
             }
-            LENGTH_BYTE.. => self.examine_window(),
+            LENGTH_BYTE.. => self.examine_window::<BOARDS>(),
             _ => None,
         }
     }
@@ -160,8 +165,8 @@ impl Decoder {
     }
 
     /// Version 1: the window is full.
-    fn examine_window(&mut self) -> Option<Packet> {
-        match Packet::decode(&self.buffer[..PACKET_LENGTH], Version::One) {
+    fn examine_window<const BOARDS: bool>(&mut self) -> Option<Packet> {
+        match Packet::decode_from::<BOARDS>(&self.buffer[..PACKET_LENGTH], Version::One) {
             Ok(packet) => {
                 self.length = 0;
                 self.counters.packets = self.counters.packets.wrapping_add(1);

@@ -2,7 +2,7 @@
 //!
 //! The same code runs on the boards, in the simulator and in the bridge, so the two ends of a
 //! line cannot disagree about a byte. Layout and codes are the original robot's (technical
-//! documentation, appendix B.1); version 1 adds a check value, a reset cause and four kinds.
+//! documentation, appendix B.1); version 1 adds a check value, a reset cause and five kinds.
 //!
 //! - [`Packet`]: eleven bytes and back.
 //! - [`Decoder`]: bytes as they come, packets out, resynchronised by structure alone.
@@ -38,7 +38,7 @@ pub use command::{ArmCommand, Command, WheelCommand};
 pub use crc::checksum;
 pub use decoder::{Decoder, DecoderCounters};
 pub use handshake::{Callsign, Handshake, ResetCause, SynAck, Version};
-pub use line::{Centimetres, LineBits, LineState};
+pub use line::{Centimetres, LineBits, LineReading, LineState};
 pub use operator::{OperatorArm, OperatorCommand};
 pub use packet::{DecodeError, END, MIN_LENGTH, PACKET_LENGTH, Packet, PacketId};
 pub use payload::{Kind, Payload};

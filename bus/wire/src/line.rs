@@ -1,5 +1,9 @@
-//! What the sensor board tells the Pi: line state, raw line bits, distance (U5, U13, AMB-11,
-//! AMB-13).
+//! What the sensor board tells the Pi: line state, raw line bits, what each line sensor reads while
+//! it is calibrated, distance (U5, U13, AMB-11, AMB-13).
+//!
+//! ```text
+//! line reading   sensor  reading  lowest  highest  tells apart  0 0 0     version 1 only
+//! ```
 
 use core::fmt;
 
@@ -81,6 +85,58 @@ impl LineBits {
             return Err(Fault { index: 1 });
         }
         Ok(Self(bits))
+    }
+}
+
+/// What one line sensor has read in the calibration that runs, in steps of the converter, 0 to 255;
+/// tape reads higher than floor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct LineReading {
+    /// Which: 0 is the leftmost, 10 the rightmost. Another one is refused by the receiver.
+    pub sensor: u8,
+    /// What it reads now.
+    pub reading: u8,
+    /// The least that it has read, at most `reading`.
+    pub lowest: u8,
+    /// The most that it has read, at least `reading`.
+    pub highest: u8,
+    /// Whether the two lie so far apart that the board takes them for floor and tape.
+    pub tells_apart: bool,
+}
+
+impl LineReading {
+    pub(crate) fn write(self, payload: &mut Bytes) {
+        payload[..5].copy_from_slice(&[
+            self.sensor,
+            self.reading,
+            self.lowest,
+            self.highest,
+            self.tells_apart.into(),
+        ]);
+    }
+
+    pub(crate) fn read(payload: &Bytes) -> Result<Self, Fault> {
+        let [sensor, reading, lowest, highest, tells_apart, ..] = *payload;
+        if sensor >= LineBits::SENSORS {
+            return Err(Fault { index: 0 });
+        }
+        if lowest > reading {
+            return Err(Fault { index: 2 });
+        }
+        if highest < reading {
+            return Err(Fault { index: 3 });
+        }
+        if tells_apart > 1 {
+            return Err(Fault { index: 4 });
+        }
+        unused_from(5, payload)?;
+        Ok(Self {
+            sensor,
+            reading,
+            lowest,
+            highest,
+            tells_apart: tells_apart == 1,
+        })
     }
 }
 

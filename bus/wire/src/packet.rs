@@ -154,6 +154,14 @@ impl Packet {
     ///
     /// When they are not a packet of this version; the error says which rule is broken.
     pub fn decode(bytes: &[u8], version: Version) -> Result<Self, DecodeError> {
+        Self::decode_from::<true>(bytes, version)
+    }
+
+    /// The same from boards and the Pi, or only from the Pi.
+    pub(crate) fn decode_from<const BOARDS: bool>(
+        bytes: &[u8],
+        version: Version,
+    ) -> Result<Self, DecodeError> {
         let have = bytes.len();
         if have < MIN_LENGTH {
             return Err(DecodeError::Size {
@@ -181,7 +189,7 @@ impl Packet {
         let given = &content[HEADER_LENGTH..];
         let mut payload = [0; PAYLOAD_LENGTH];
         payload[..given.len()].copy_from_slice(given);
-        match Payload::read(kind, version, &payload, given.len()) {
+        match Payload::read::<BOARDS>(kind, version, &payload, given.len()) {
             Ok(payload) => Ok(Self {
                 id: PacketId::new(bytes[0]),
                 payload,

@@ -7,12 +7,12 @@ use crate::board::{ArmData, BoardStatus};
 use crate::bytes::{Bytes, Fault};
 use crate::coded::coded;
 use crate::handshake::{Callsign, Handshake, Version};
-use crate::line::{Centimetres, LineBits, LineState};
+use crate::line::{Centimetres, LineBits, LineReading, LineState};
 use crate::setting::{Setting, SettingReply};
 use crate::steer::{SteerCommand, SteerData};
 
 coded! {
-    /// A packet's kind, the high nibble of its first byte (U5). 6 to 9 exist in version 1 only.
+    /// A packet's kind, the high nibble of its first byte (U5). 6 to 10 exist in version 1 only.
     pub enum Kind {
         /// SYN or ACK.
         Handshake = 0,
@@ -34,6 +34,8 @@ coded! {
         ArmData = 8,
         /// How a board is.
         BoardStatus = 9,
+        /// One line sensor, while the line sensors are calibrated.
+        LineReading = 10,
     }
 }
 
@@ -49,7 +51,9 @@ impl Kind {
     /// The board that alone sends this kind, if one does.
     pub const fn comes_only_from(self) -> Option<Callsign> {
         match self {
-            Self::LineData | Self::Distance | Self::RawLine => Some(Callsign::Sensor),
+            Self::LineData | Self::Distance | Self::RawLine | Self::LineReading => {
+                Some(Callsign::Sensor)
+            }
             Self::SteerData | Self::ArmData => Some(Callsign::Steering),
             Self::Handshake
             | Self::SteerCommand
@@ -83,6 +87,8 @@ pub enum Payload {
     ArmData(ArmData),
     /// How a board is.
     BoardStatus(BoardStatus),
+    /// One line sensor, while the line sensors are calibrated.
+    LineReading(LineReading),
 }
 
 impl Payload {
@@ -99,6 +105,7 @@ impl Payload {
             Self::SettingReply(_) => Kind::SettingReply,
             Self::ArmData(_) => Kind::ArmData,
             Self::BoardStatus(_) => Kind::BoardStatus,
+            Self::LineReading(_) => Kind::LineReading,
         }
     }
 
@@ -114,11 +121,13 @@ impl Payload {
             Self::SettingReply(reply) => reply.write(payload),
             Self::ArmData(data) => data.write(payload),
             Self::BoardStatus(status) => status.write(payload),
+            Self::LineReading(reading) => reading.write(payload),
         }
     }
 
-    /// `given` is how many of the bytes the packet really had.
-    pub(crate) fn read(
+    /// `given` is how many of the bytes the packet really had. Without `BOARDS`, what only boards
+    /// send has a fault in its first byte.
+    pub(crate) fn read<const BOARDS: bool>(
         kind: Kind,
         version: Version,
         payload: &Bytes,
@@ -126,15 +135,17 @@ impl Payload {
     ) -> Result<Self, Fault> {
         Ok(match kind {
             Kind::Handshake => Self::Handshake(Handshake::read(version, payload)?),
+            Kind::SteerCommand => Self::SteerCommand(SteerCommand::read(version, payload, given)?),
+            Kind::Setting => Self::Setting(Setting::read(payload)?),
+            _ if !BOARDS => return Err(Fault { index: 0 }),
             Kind::LineData => Self::Line(LineState::read(version, payload)?),
             Kind::Distance => Self::Distance(Centimetres::read(version, payload)?),
             Kind::RawLine => Self::RawLine(LineBits::read(version, payload, given)?),
-            Kind::SteerCommand => Self::SteerCommand(SteerCommand::read(version, payload, given)?),
             Kind::SteerData => Self::SteerData(SteerData::read(version, payload)?),
-            Kind::Setting => Self::Setting(Setting::read(payload)?),
             Kind::SettingReply => Self::SettingReply(SettingReply::read(payload)?),
             Kind::ArmData => Self::ArmData(ArmData::read(payload)?),
             Kind::BoardStatus => Self::BoardStatus(BoardStatus::read(payload)?),
+            Kind::LineReading => Self::LineReading(LineReading::read(payload)?),
         })
     }
 }

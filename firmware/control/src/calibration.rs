@@ -7,6 +7,8 @@
 //!
 //! A channel that saw no contrast keeps its threshold.
 
+use lager_wire::LineReading;
+
 use crate::time::reached;
 
 /// Number of line sensors.
@@ -19,6 +21,7 @@ const LEAST_CONTRAST: u8 = 40;
 struct Watch {
     ends_us: u32,
     seq: u8,
+    reading: [u8; CHANNELS],
     lowest: [u8; CHANNELS],
     highest: [u8; CHANNELS],
 }
@@ -55,6 +58,7 @@ impl Calibration {
         self.watch = Some(Watch {
             ends_us: now_us.wrapping_add(span_us),
             seq,
+            reading: [0; CHANNELS],
             lowest: [u8::MAX; CHANNELS],
             highest: [u8::MIN; CHANNELS],
         });
@@ -72,10 +76,26 @@ impl Calibration {
     /// Whether this reading of a channel is tape.
     pub(crate) fn judge(&mut self, channel: usize, reading: u8) -> bool {
         if let Some(watch) = &mut self.watch {
+            watch.reading[channel] = reading;
             watch.lowest[channel] = watch.lowest[channel].min(reading);
             watch.highest[channel] = watch.highest[channel].max(reading);
         }
         reading >= self.thresholds[channel]
+    }
+
+    /// What a channel has shown so far, while the watching runs.
+    pub(crate) fn seen(&self, channel: u8) -> Option<LineReading> {
+        let watch = self.watch.as_ref()?;
+        let index = usize::from(channel);
+        // None before the first pass.
+        let contrast = watch.highest[index].checked_sub(watch.lowest[index])?;
+        Some(LineReading {
+            sensor: channel,
+            reading: watch.reading[index],
+            lowest: watch.lowest[index],
+            highest: watch.highest[index],
+            tells_apart: contrast >= LEAST_CONTRAST,
+        })
     }
 
     /// Ends the watching when its time is up.
@@ -142,6 +162,36 @@ mod tests {
         assert!(!calibration.judge(4, 127));
         assert!(calibration.judge(4, 128));
         assert!(calibration.judge(5, 115));
+    }
+
+    #[test]
+    fn what_a_channel_has_seen_is_told_while_the_watching_runs() {
+        let mut calibration = Calibration::new([128; CHANNELS]);
+        calibration.judge(3, 77);
+        assert_eq!(calibration.seen(3), None, "nothing runs");
+        calibration.start(1, 1_000, 0);
+        assert_eq!(calibration.seen(3), None, "nothing was read");
+        for reading in [40, 20, 59] {
+            calibration.judge(3, reading);
+        }
+        let seen = LineReading {
+            sensor: 3,
+            reading: 59,
+            lowest: 20,
+            highest: 59,
+            tells_apart: false,
+        };
+        assert_eq!(calibration.seen(3), Some(seen));
+        calibration.judge(3, 60);
+        let seen = LineReading {
+            reading: 60,
+            highest: 60,
+            tells_apart: true,
+            ..seen
+        };
+        assert_eq!(calibration.seen(3), Some(seen));
+        calibration.finish(1_000);
+        assert_eq!(calibration.seen(3), None);
     }
 
     #[test]

@@ -7,12 +7,14 @@
 //!     read 11 line sensors --> ExDe word, every pass
 //!                          --> FlipFlop --.-- line packet (raw line packet before it, if set)
 //!                                         '-- read IR --> distance packet
-//!                                             or, when due, an answer to a setting, board status
+//!                                             or, when due, an answer to a setting, board status;
+//!                                             every other time of a calibration one sensor's reading
 //! ```
 //!
 //! The rarer things take the place of a distance, twice a second for the board status. That departs
 //! from the document's FlipFlop, which takes strict turns. But a pass that sends two things is
-//! longer, and delays the next word to the wheels by 0.3 ms.
+//! longer, and delays the next word to the wheels by 0.3 ms. While the line sensors are calibrated every
+//! other distance gives way to what one of them has read, each in its turn.
 //!
 //! The two handshakes do not wait for each other: without the steering board the Pi is served,
 //! without the Pi the steering board is. Packets and words leave by interrupt beside everything
@@ -80,6 +82,9 @@ impl Default for SensorConfig {
 /// The longest a step may be put off, in microseconds; well inside the watchdog's 64 ms.
 const LONGEST_SLEEP_US: u32 = 20_000;
 
+/// The last turn of a round over all line sensors: each has one, and a distance after it.
+const LAST_TURN: u8 = 2 * LineBits::SENSORS - 1;
+
 /// What the next pass tells the Pi (S3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FlipFlop {
@@ -98,6 +103,8 @@ pub struct SensorUnit {
     refused: u8,
     reader: LineReader,
     calibration: Calibration,
+    /// While a calibration runs: twice the sensor that is told of, and one more when a distance is.
+    turn: u8,
     store: Store<CHANNELS>,
     raw_line: bool,
     flip_flop: FlipFlop,
@@ -123,6 +130,7 @@ impl SensorUnit {
             refused: 0,
             reader: LineReader::new(),
             calibration: Calibration::new(thresholds.unwrap_or(config.thresholds)),
+            turn: 0,
             store,
             raw_line: false,
             flip_flop: FlipFlop::Line,
@@ -293,7 +301,7 @@ impl SensorUnit {
             return Some(Payload::SettingReply(reply));
         }
         if !reached(now_us, self.status_due_us) {
-            return None;
+            return self.reading();
         }
         self.status_due_us = now_us.wrapping_add(self.config.status_period_us);
         let (load_percent, longest_loop_100us) = self.load.report(now_us);
@@ -307,6 +315,14 @@ impl SensorUnit {
             load_percent,
             longest_loop_100us,
         }))
+    }
+
+    /// What the next sensor has read in the calibration that runs, every other time.
+    fn reading(&mut self) -> Option<Payload> {
+        let turn = self.turn;
+        let seen = self.calibration.seen(turn / 2)?;
+        self.turn = if turn == LAST_TURN { 0 } else { turn + 1 };
+        (turn % 2 == 0).then_some(Payload::LineReading(seen))
     }
 
     fn send<B: SensorBoard>(&mut self, board: &mut B, payload: Payload) {

@@ -4,8 +4,8 @@ mod support;
 
 use lager_control::SensorConfig;
 use lager_wire::{
-    Callsign, Centimetres, LineBits, LineState, Payload, ResetCause, SettingKey, SettingReply,
-    SettingStatus, SteerCommand,
+    Callsign, Centimetres, LineBits, LineReading, LineState, Payload, ResetCause, SettingKey,
+    SettingReply, SettingStatus, SteerCommand,
 };
 use support::SensorBench;
 
@@ -288,6 +288,59 @@ fn a_calibration_finds_the_thresholds_of_another_floor() {
         status: SettingStatus::Accepted,
     };
     assert_eq!(replies[1], finished);
+}
+
+#[test]
+fn while_a_calibration_runs_each_sensor_tells_in_turn_what_it_has_read() {
+    let mut bench = SensorBench::ready(SensorConfig::default());
+    bench.tape(MIDDLE);
+    let (tape, floor) = (bench.pins.line[5], bench.pins.line[0]);
+    bench.run_ms(200);
+    let told = |bench: &SensorBench| {
+        let readings = bench.pi.all(|payload| match payload {
+            Payload::LineReading(reading) => Some(reading),
+            _ => None,
+        });
+        readings
+            .into_iter()
+            .map(|(_, reading)| reading)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(told(&bench), [], "nothing is calibrated");
+    bench.set(SettingKey::Calibrate, 9, 1);
+    bench.run_ms(1_000);
+    // The tape goes from under the middle, and is under the leftmost sensor.
+    bench.tape(0b100_0000_0000);
+    bench.run_ms(1_000);
+    let readings = told(&bench);
+    // A sensor in every fourth pass of 5 ms, less what a status or an answer takes.
+    assert!((95..=100).contains(&readings.len()), "{}", readings.len());
+    let order: Vec<u8> = readings.iter().map(|reading| reading.sensor).collect();
+    let expected: Vec<u8> = (0..11).cycle().take(order.len()).collect();
+    assert_eq!(order, expected);
+    let last = |sensor: u8| {
+        let told = readings.iter().rev().find(|told| told.sensor == sensor);
+        *told.expect("each is told of")
+    };
+    let seen = |sensor, reading, lowest, highest| LineReading {
+        sensor,
+        reading,
+        lowest,
+        highest,
+        tells_apart: lowest != highest,
+    };
+    assert_eq!(last(0), seen(0, tape, floor, tape));
+    assert_eq!(last(5), seen(5, floor, floor, tape));
+    assert_eq!(last(10), seen(10, floor, floor, floor));
+    // The distance is told less often meanwhile, and as often as before afterwards.
+    bench.run_ms(3_100);
+    bench.pi.packets.clear();
+    bench.run_ms(1_000);
+    assert_eq!(told(&bench), []);
+    let distances = bench
+        .pi
+        .all(|payload| matches!(payload, Payload::Distance(_)).then_some(()));
+    assert_eq!(distances.len(), 98);
 }
 
 #[test]

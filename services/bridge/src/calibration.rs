@@ -9,19 +9,22 @@
 //!
 //! It is apart from the settings because the board answers a calibration twice: when it begins,
 //! which answers the request, and five seconds later when it ends, which no request in this process
-//! waits for. An end without a beginning belongs to a calibration that an earlier bridge began.
+//! waits for. An end without a beginning belongs to a calibration that an earlier bridge began. In
+//! between it tells what the sensors read, one after the other.
 
-use lager_topics::{Calibration as State, Health};
-use lager_wire::{SettingReply, SettingStatus};
+use lager_topics::{CalibratedSensor, Calibration as State, Health};
+use lager_wire::{LineReading, SettingReply, SettingStatus};
 
 /// The last calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Calibration {
     state: State,
     /// Sensors that have a new threshold.
     sensors: u8,
     /// How many have ended, wrapping.
     ended: u8,
+    /// What each line sensor has read in it.
+    readings: [CalibratedSensor; 11],
 }
 
 impl Calibration {
@@ -32,12 +35,26 @@ impl Calibration {
             state: kept.calibration.get().unwrap_or(State::Never),
             sensors: kept.calibrated_sensors,
             ended: kept.calibrations_ended,
+            readings: kept.calibrated,
         }
     }
 
     /// The board has begun one.
     pub(crate) fn begin(&mut self) {
         self.state = State::Running;
+        self.readings = Default::default();
+    }
+
+    /// The board has told what one of the sensors reads.
+    pub(crate) fn hear_reading(&mut self, reading: &LineReading) {
+        if let Some(sensor) = self.readings.get_mut(usize::from(reading.sensor)) {
+            *sensor = CalibratedSensor {
+                reading: reading.reading,
+                lowest: reading.lowest,
+                highest: reading.highest,
+                tells_apart: reading.tells_apart.into(),
+            };
+        }
     }
 
     /// The board has answered, and not for the first time.
@@ -62,6 +79,7 @@ impl Calibration {
         health.calibration = self.state.into();
         health.calibrated_sensors = self.sensors;
         health.calibrations_ended = self.ended;
+        health.calibrated = self.readings;
     }
 
     fn end(&mut self, state: State, sensors: i16) {
@@ -108,6 +126,30 @@ mod tests {
         calibration.begin();
         calibration.hear(&reply(SettingStatus::OutOfRange, 4));
         assert_eq!(shown(&calibration), (Some(State::Partly), 4, 2));
+    }
+
+    #[test]
+    fn what_the_sensors_read_is_shown_until_another_calibration_begins() {
+        let mut calibration = Calibration::new(None);
+        calibration.begin();
+        calibration.hear_reading(&LineReading {
+            sensor: 10,
+            reading: 90,
+            lowest: 30,
+            highest: 120,
+            tells_apart: true,
+        });
+        let read = |calibration: &Calibration| {
+            let mut health = Health::default();
+            calibration.fill(&mut health);
+            let [first, .., last] = health.calibrated;
+            assert!(!first.is_heard());
+            (last.is_heard(), last.reading, last.tells_apart)
+        };
+        calibration.hear(&reply(SettingStatus::OutOfRange, 1));
+        assert_eq!(read(&calibration), (true, 90, 1));
+        calibration.begin();
+        assert!(!read(&calibration).0);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use core::time::Duration;
 
 use lager_wire::link::Up;
-use lager_wire::{ArmData, BoardStatus, SettingReply, SteerData, Version};
+use lager_wire::{ArmData, BoardStatus, LineReading, SettingReply, SteerData, Version};
 
 /// A moment by both of the times the bridge goes by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,4 +58,6 @@ pub enum PortEvent {
     Status(BoardStatus),
     /// A board's answer to a setting.
     Setting(SettingReply),
+    /// What a line sensor reads while the line sensors are calibrated.
+    Reading(LineReading),
 }

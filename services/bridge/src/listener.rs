@@ -152,6 +152,7 @@ impl Listener {
                     ..DistanceFrame::default()
                 }));
             }
+            (Callsign::Sensor, Payload::LineReading(reading)) => PortEvent::Reading(reading),
             (Callsign::Steering, Payload::SteerData(data)) => PortEvent::Steer { data, at },
             (Callsign::Steering, Payload::ArmData(data)) => PortEvent::Arm(data),
             (_, Payload::BoardStatus(status)) => PortEvent::Status(status),

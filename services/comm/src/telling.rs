@@ -10,10 +10,10 @@ use lager_lines::extension::{
 };
 use lager_lines::{Coord, Name, ProductId, Text};
 use lager_topics::{
-    BlockedWays, BoardHealth, Coded, Durations, Failure, LineFrame, Mode as BusMode, OrderQueue,
-    Pick as BusPick, Remedy, Route, Tag, Thought, Truth,
+    BlockedWays, BoardHealth, CalibratedSensor, Calibration, Coded, Durations, Failure, Health,
+    LineFrame, Mode as BusMode, OrderQueue, Pick as BusPick, Remedy, Route, Tag, Thought, Truth,
 };
-use lager_wire::{Binary, LineBits};
+use lager_wire::{Binary, LineBits, LineReading};
 
 use crate::known::{Known, Senses};
 use crate::map::direction;
@@ -33,6 +33,7 @@ pub(crate) struct Telling {
     route: Option<Report>,
     blocked: Option<Report>,
     queue: Option<Report>,
+    sensors: Option<Report>,
     /// What was counted when the latency was told last.
     latency: Durations,
 }
@@ -71,6 +72,7 @@ impl Telling {
             (&mut self.route, known.route.as_deref().map(route)),
             (&mut self.blocked, blocks.as_deref().map(blocked)),
             (&mut self.queue, known.queue.as_ref().map(queue)),
+            (&mut self.sensors, known.health.as_ref().and_then(sensors)),
         ];
         for (told, list) in lists {
             if list.is_some() && *told != list {
@@ -83,7 +85,7 @@ impl Telling {
 }
 
 /// Kinds of reports of which a newer one replaces an older one.
-pub(crate) const KINDS: usize = 6;
+pub(crate) const KINDS: usize = 7;
 
 /// Which of the kinds a report is, the first to be told first; `None` where each counts.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
@@ -94,6 +96,7 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Blocked(_) => Some(3),
         Report::Queue(_) => Some(4),
         Report::Latency(_) => Some(5),
+        Report::Sensors(_) => Some(6),
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }
@@ -340,6 +343,23 @@ fn queue(queue: &OrderQueue) -> Report {
         })
         .collect();
     Report::Queue(Listed::<Queued>::new(&orders))
+}
+
+/// What the line sensors read while they are calibrated, once all have been heard.
+fn sensors(health: &Health) -> Option<Report> {
+    let is_running = health.calibration == Calibration::Running;
+    let read = Some(health.calibrated).filter(|_| is_running)?;
+    let is_heard = read.iter().all(CalibratedSensor::is_heard);
+    let mut sensor = 0..;
+    is_heard.then(|| {
+        Report::Sensors(read.map(|read| LineReading {
+            sensor: sensor.next().unwrap_or(LineBits::SENSORS),
+            reading: read.reading,
+            lowest: read.lowest,
+            highest: read.highest,
+            tells_apart: read.tells_apart != 0,
+        }))
+    })
 }
 
 fn latency(counted: &Durations) -> Report {

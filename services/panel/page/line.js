@@ -5,6 +5,9 @@ import { reason } from "./reasons.js";
 import { SENSORS, sensors } from "./strips.js";
 import { put, say } from "./words.js";
 
+/** The most that a line sensor reads. */
+const MOST = 255;
+
 export class Line {
   constructor(parts, link, robot) {
     Object.assign(this, { parts, link, robot });
@@ -22,9 +25,7 @@ export class Line {
       this.gainsTyped = false;
       this.setGains(this.gainsBefore);
     };
-    /** What each line sensor has seen since the calibration began; null while there is none. */
-    this.seen = null;
-    this.bars = Array.from({ length: SENSORS }, () => parts.sensors.appendChild(document.createElement("span")));
+    this.bars = Array.from({ length: SENSORS }, () => new SensorBar(parts.sensors));
     parts.calibrate.onclick = () => this.calibrate();
   }
 
@@ -33,7 +34,7 @@ export class Line {
     const { calibrate, steps, calibrationSaid } = this.parts;
     const at = (step) => [...steps.children].forEach((line, index) => line.toggleAttribute("aria-current", index === step));
     const robot = this.robot();
-    this.seen = Array.from({ length: SENSORS }, () => new Set());
+    if (robot) robot.sensors = null;
     calibrate.disabled = true;
     at(1);
     put(calibrationSaid, say("calibrating"));
@@ -45,7 +46,7 @@ export class Line {
 
   /** The gains in force stand in the fields, unless somebody types there. */
   draw(robot) {
-    this.drawSensors(robot?.state);
+    this.drawSensors(robot);
     const { gain_p: p, gain_d: d } = robot?.state ?? {};
     this.gainsNow = p === undefined || d === undefined ? null : [p, d];
     put(this.parts.gainsNow, this.gainsNow ? say("gains_now", p, d) : say("gains_unset"));
@@ -56,19 +57,15 @@ export class Line {
     [elements.p.value, elements.d.value] = this.gainsNow;
   }
 
-  /** What the sensors see now, and which have seen both tape and floor. */
-  drawSensors(state) {
-    const bits = sensors(state);
-    let both = 0;
-    this.bars.forEach((bar, index) => {
-      const bit = bits?.[index];
-      if (this.parts.calibrate.disabled && state?.line_bits) this.seen[index].add(bit);
-      const isBoth = this.seen?.[index].size === 2;
-      both += Number(isBoth);
-      bar.classList.toggle("on", bit === "1");
-      bar.classList.toggle("both", isBoth);
-    });
-    const words = bits ? say("sensors_seen", bits, both) : say("sensors_unheard");
+  /** What the sensors see now, and what they have read in the calibration that runs or ran last. */
+  drawSensors(robot) {
+    const bits = sensors(robot?.state);
+    const read = robot?.sensors;
+    this.bars.forEach((bar, index) => bar.draw(bits?.[index], read?.[index]));
+    const both = read?.filter(({ both }) => both).length ?? 0;
+    const values = read?.map(({ reading }) => reading).join(" ") ?? "";
+    const seen = bits ? say("sensors_seen", bits) : say("sensors_unheard");
+    const words = read ? say("sensors_read", values, both) : seen;
     const { sensors: row } = this.parts;
     if (row.getAttribute("aria-label") !== words) row.setAttribute("aria-label", words);
   }
@@ -83,5 +80,29 @@ export class Line {
     // Somebody may be typing others by now.
     const { elements } = this.parts.gains;
     if (elements.p.value === p && elements.d.value === d) this.gainsTyped = false;
+  }
+}
+
+/** One sensor: its reading as a mark on a scale, what it has read so far as a stretch of it. */
+class SensorBar {
+  constructor(parent) {
+    const add = (inside, name) => inside.appendChild(Object.assign(document.createElement("span"), { className: name }));
+    this.column = add(parent, "sensor");
+    this.scale = add(this.column, "scale");
+    this.stretch = add(this.scale, "stretch");
+    this.mark = add(this.scale, "mark");
+    this.value = add(this.column, "value");
+  }
+
+  draw(bit, read) {
+    this.column.classList.toggle("on", bit === "1");
+    this.column.classList.toggle("both", Boolean(read?.both));
+    this.column.classList.toggle("unread", !read);
+    const { reading = 0, lowest = 0, highest = 0 } = read ?? {};
+    const share = (value) => `${((value / MOST) * 100).toFixed(1)}%`;
+    this.mark.style.bottom = share(reading);
+    this.stretch.style.bottom = share(lowest);
+    this.stretch.style.height = share(highest - lowest);
+    put(this.value, read ? String(reading) : "–");
   }
 }

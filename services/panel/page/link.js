@@ -48,6 +48,8 @@ class Robot {
     this.stated = -Infinity;
     this.truth = null;
     this.latency = null;
+    /** What each line sensor has read in the last calibration, the leftmost first. */
+    this.sensors = null;
     this.route = [];
     /** Ways that are not taken, and since when, in s of the robot's clock. */
     this.blocked = new Map();
@@ -228,6 +230,11 @@ export class Link extends EventTarget {
       const [count, p50, p90, p99] = rest.map(Number);
       // Without a frame measured there is no new figure.
       if (count > 0) robot.latency = { p50, p90, p99 };
+    } else if (word === "sensors") {
+      robot.sensors = Array.from({ length: rest.length / 4 }, (_, sensor) => {
+        const [reading, lowest, highest, both] = rest.slice(4 * sensor, 4 * sensor + 4).map(Number);
+        return { reading, lowest, highest, both: both === 1 };
+      });
     } else if (word === "thinks") {
       robot.thinks = fields(rest);
     } else if (word === "event" || word === "thought") {

@@ -61,7 +61,7 @@ pub(crate) struct Visit {
 /// When what a page was told of a robot last was new.
 #[derive(Debug, Default)]
 struct LastTold {
-    at: [Option<Duration>; 6],
+    at: [Option<Duration>; 7],
 }
 
 impl Visit {
@@ -390,6 +390,9 @@ impl Visit {
         }
         if let Some(seen) = &shown.latency {
             tell(5, seen.at, &|| Report::Latency(seen.value));
+        }
+        if let Some(seen) = &shown.sensors {
+            tell(6, seen.at, &|| Report::Sensors(seen.value));
         }
     }
 }

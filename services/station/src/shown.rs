@@ -6,6 +6,7 @@ use lager_lines::extension::{
     Block, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
 };
 use lager_lines::{Coord, Text};
+use lager_wire::LineReading;
 
 /// A value that a robot has told, and when.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +39,8 @@ pub struct Shown {
     pub queue: Option<Seen<Listed<Queued>>>,
     /// How long it takes to react, about once a second.
     pub latency: Option<Seen<Latency>>,
+    /// What each line sensor has read in the last calibration, the leftmost first.
+    pub sensors: Option<Seen<[LineReading; 11]>>,
 }
 
 /// What has become of an action or of a stop.
@@ -85,6 +88,7 @@ impl Shown {
             Report::Blocked(value) => self.blocked = Some(Seen { value, at }),
             Report::Queue(value) => self.queue = Some(Seen { value, at }),
             Report::Latency(value) => self.latency = Some(Seen { value, at }),
+            Report::Sensors(value) => self.sensors = Some(Seen { value, at }),
             Report::Event(event) => return Some(Told::Event(event)),
             Report::Thinks(thinks) => return Some(Told::Thinks(thinks)),
             Report::Done { number } => return replied(number, Reply::Done),

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use lager_wire::LineReading;
+
 use super::fields::Degrees;
 use super::listed::{Block, Listed, Queued};
 use super::order::number;
@@ -51,6 +53,8 @@ pub enum Report {
     Latency(Latency),
     /// Where a simulated robot really is.
     Truth(TruePose),
+    /// What each line sensor has read in the calibration that runs, the leftmost first.
+    Sensors([LineReading; 11]),
 }
 
 /// What has happened on a mission (C8).
@@ -181,6 +185,7 @@ impl Report {
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
             "latency" => |reader: &mut Reader<'_>| Latency::read(reader).map(Self::Latency),
             "truth" => |reader: &mut Reader<'_>| TruePose::read(reader).map(Self::Truth),
+            "sensors" => |reader: &mut Reader<'_>| read_sensors(reader).map(Self::Sensors),
             _ => return None,
         };
         Some(read(&mut reader).and_then(|report| reader.end().map(|()| report)))
@@ -192,6 +197,24 @@ fn read_stopped(reader: &mut Reader<'_>) -> Result<Report, Misread> {
     let wanted = "a time from 0 to 4294967295 ms";
     let after_ms = reader.word().number(wanted, 0, i64::from(u32::MAX))?;
     Ok(Report::Stopped { number, after_ms })
+}
+
+fn read_sensors(reader: &mut Reader<'_>) -> Result<[LineReading; 11], Misread> {
+    let mut sensors = [LineReading::default(); 11];
+    for (sensor, read) in (0..).zip(&mut sensors) {
+        let mut next = || reader.word().number("a reading from 0 to 255", 0, 255);
+        *read = LineReading {
+            sensor,
+            reading: next()?,
+            lowest: next()?,
+            highest: next()?,
+            tells_apart: reader
+                .word()
+                .number("0 or 1", 0, 1)
+                .map(|bit: u8| bit == 1)?,
+        };
+    }
+    Ok(sensors)
 }
 
 /// What stands behind the next word, `None` for a `-`.
@@ -276,6 +299,20 @@ impl fmt::Display for Report {
             Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),
             Self::Latency(latency) => write!(formatter, "latency {latency}"),
             Self::Truth(truth) => write!(formatter, "truth {truth}"),
+            Self::Sensors(sensors) => {
+                formatter.write_str("sensors")?;
+                sensors.iter().try_for_each(|sensor| {
+                    let LineReading {
+                        reading,
+                        lowest,
+                        highest,
+                        tells_apart,
+                        ..
+                    } = sensor;
+                    let tells_apart = u8::from(*tells_apart);
+                    write!(formatter, " {reading} {lowest} {highest} {tells_apart}")
+                })
+            }
         }
     }
 }

@@ -41,6 +41,10 @@ fn every_line_of_the_station_is_read_and_written() {
     }
 }
 
+/// The last of the line sensors has seen tape.
+const SENSORS: &str = "sensors 20 20 21 0 20 20 21 0 20 20 21 0 20 20 21 0 20 20 21 0 20 20 21 0 \
+                       20 20 21 0 20 20 21 0 20 20 21 0 20 20 21 0 255 0 255 1";
+
 #[test]
 fn every_line_of_the_robot_is_read_and_written() {
     for line in [
@@ -71,6 +75,7 @@ fn every_line_of_the_robot_is_read_and_written() {
         "latency 500 110 180 240 900 4294967295",
         "truth -35 2147483647 359 -",
         "truth 0 0 0 7",
+        SENSORS,
     ] {
         let read = RobotLine::read(line).expect(line);
         assert!(!matches!(read, RobotLine::Request(_)), "{line}");

@@ -325,6 +325,13 @@ fn lines_of_the_robot_that_are_none() {
             ),
             ("truth 1 2 360 -", word(11, "360", ANGLE)),
             ("truth 1 2 3", ends(12, PRODUCT)),
+            ("sensors", ends(8, "a reading from 0 to 255")),
+            (
+                "sensors 1 2 256",
+                word(13, "256", "a reading from 0 to 255"),
+            ),
+            ("sensors 1 2 3 2", word(15, "2", "0 or 1")),
+            ("sensors 1 2 3 1", ends(16, "a reading from 0 to 255")),
         ],
     );
 }

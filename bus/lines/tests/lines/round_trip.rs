@@ -11,7 +11,7 @@ use lager_lines::strings::{Good, Goods, map_string, read_map};
 use lager_lines::{
     Coord, Direction, Map, Name, Product, ProductId, Products, SideLength, Text, to_line,
 };
-use lager_wire::{Binary, LineBits, OperatorArm, OperatorCommand};
+use lager_wire::{Binary, LineBits, LineReading, OperatorArm, OperatorCommand};
 use proptest::option::of;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -255,6 +255,19 @@ fn report() -> impl Strategy<Value = Report> {
                 p999_us,
                 max_us,
             })
+        }),
+        any::<[(u8, u8, u8, bool); 11]>().prop_map(|read| {
+            let mut sensors = [LineReading::default(); 11];
+            for (sensor, (reading, lowest, highest, tells_apart)) in (0..).zip(read) {
+                sensors[usize::from(sensor)] = LineReading {
+                    sensor,
+                    reading,
+                    lowest,
+                    highest,
+                    tells_apart,
+                };
+            }
+            Report::Sensors(sensors)
         }),
         (any::<i32>(), any::<i32>(), degrees(), of(product_id())).prop_map(
             |(x_mm, y_mm, heading, carrying)| {

@@ -113,8 +113,30 @@ impl BoardHealth {
 }
 
 payload! {
+    /// What one line sensor has read in a calibration, 0 to 255; tape reads higher than floor. The
+    /// least is above the most as long as nothing has been heard of it.
+    pub struct CalibratedSensor: 4 bytes {
+        /// What it read last.
+        pub reading: u8,
+        /// The least that it has read.
+        pub lowest: u8 = u8::MAX,
+        /// The most that it has read.
+        pub highest: u8,
+        /// 1 = the two lie so far apart that the board takes them for floor and tape.
+        pub tells_apart: u8,
+    }
+}
+
+impl CalibratedSensor {
+    /// Whether the board has told what it reads.
+    pub const fn is_heard(&self) -> bool {
+        self.lowest <= self.highest
+    }
+}
+
+payload! {
     /// Both links and the arbiter: all that a restarted bridge needs to go on.
-    pub struct Health: 184 bytes {
+    pub struct Health: 224 bytes {
         /// The sensor board's link.
         pub sensor: BoardHealth,
         /// The steering board's link.
@@ -173,6 +195,8 @@ payload! {
         pub calibrated_sensors: u8,
         /// Calibrations that have ended; wraps.
         pub calibrations_ended: u8,
+        /// What each line sensor has read in the last one, the leftmost first.
+        pub calibrated: [CalibratedSensor; 11],
         /// Why a stop is latched.
         pub stop_cause: Tag<StopCause>,
         /// Who has set the stop that is latched; without meaning if none is.
@@ -181,7 +205,7 @@ payload! {
         pub mode_chosen: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 5],
+        pub reserved: [u8; 1],
     }
 }
 

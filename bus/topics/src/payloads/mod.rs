@@ -16,7 +16,7 @@ mod truth;
 
 pub use failure::{Failure, FailureKind, Remedy};
 pub use latency::{CommandLatency, Durations, PathLatency};
-pub use link::{ArmProfileState, BoardHealth, Calibration, Health, Mode};
+pub use link::{ArmProfileState, BoardHealth, CalibratedSensor, Calibration, Health, Mode};
 pub use log::{Joint, Thought, ThoughtKind};
 pub use mission::{Event, EventKind, Input, InputKind, Order, OrderQueue, WaitingOrder};
 pub use nav::{

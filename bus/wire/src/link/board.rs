@@ -101,7 +101,7 @@ impl BoardLink {
             self.cut_off = self.cut_off.saturating_add(1);
         }
         self.last_byte_us = now_us;
-        let packet = self.decoder.push_one(byte)?;
+        let packet = self.decoder.push_on_board(byte)?;
         match packet.payload {
             Payload::Handshake(handshake) => self.shake_hands(handshake),
             _ if self.up => {

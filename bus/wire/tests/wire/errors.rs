@@ -141,7 +141,7 @@ fn bytes_without_a_meaning_must_be_zero() {
             Payload::RawLine(_) => 2,
             Payload::SteerCommand(_) => 4,
             Payload::Setting(_) => 6,
-            Payload::SettingReply(_) => 5,
+            Payload::SettingReply(_) | Payload::LineReading(_) => 5,
             Payload::SteerData(_) | Payload::ArmData(_) | Payload::BoardStatus(_) => 8,
         };
         for index in first_unused..8 {

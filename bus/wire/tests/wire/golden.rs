@@ -8,9 +8,9 @@
 
 use lager_wire::{
     ArmData, BoardStatus, Callsign, Centimetres, DecodeError, END, Handshake, Kind, LineBits,
-    LineState, MIN_LENGTH, PACKET_LENGTH, PAYLOAD_LENGTH, Packet, PacketId, Payload, ResetCause,
-    Setting, SettingKey, SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags, SynAck,
-    Version,
+    LineReading, LineState, MIN_LENGTH, PACKET_LENGTH, PAYLOAD_LENGTH, Packet, PacketId, Payload,
+    ResetCause, Setting, SettingKey, SettingReply, SettingStatus, SteerCommand, SteerData,
+    SteerFlags, SynAck, Version,
 };
 
 use crate::sample::{packet, payloads};
@@ -96,6 +96,7 @@ fn enums_have_the_originals_codes() {
         Kind::SettingReply,
         Kind::ArmData,
         Kind::BoardStatus,
+        Kind::LineReading,
     ];
     let signs = [
         Callsign::Error,
@@ -187,7 +188,7 @@ fn version_one_packets() {
         reset: ResetCause::Watchdog,
         was_up: true,
     };
-    let cases: [(Packet, [u8; 11]); 12] = [
+    let cases: [(Packet, [u8; 11]); 13] = [
         (
             packet(0, syn(Callsign::Sensor, Version::One, ResetCause::PowerOn)),
             [0x00, 0x0b, 0x08, 1, 1, 0, 0, 0, 0, 0, 0x09],
@@ -292,6 +293,19 @@ fn version_one_packets() {
             ),
             [0x98, 0x0b, 3, 1, 2, 3, 4, 5, 60, 7, 0x65],
         ),
+        (
+            packet(
+                9,
+                Payload::LineReading(LineReading {
+                    sensor: 10,
+                    reading: 120,
+                    lowest: 30,
+                    highest: 200,
+                    tells_apart: true,
+                }),
+            ),
+            [0xa9, 0x0b, 10, 120, 30, 200, 1, 0, 0, 0, 0xd0],
+        ),
     ];
     for (packet, bytes) in cases {
         assert_eq!(packet.encode(Version::One), bytes, "{packet:?}");
@@ -362,7 +376,7 @@ fn an_error_shows_what_was_found() {
     let mut crc = good;
     crc[10] ^= 1;
     let mut kind = good;
-    kind[0] = 0xA0;
+    kind[0] = 0xB0;
     let mut length = good;
     length[1] = 10;
     let found = |bytes: &[u8]| Packet::decode(bytes, Version::One).unwrap_err();
@@ -373,7 +387,7 @@ fn an_error_shows_what_was_found() {
             found: good[10] ^ 1
         }
     );
-    assert_eq!(found(&kind), DecodeError::Kind { code: 10 });
+    assert_eq!(found(&kind), DecodeError::Kind { code: 11 });
     assert_eq!(found(&length), DecodeError::Length { found: 10 });
     assert_eq!(found(&good[..10]), DecodeError::Size { have: 10, need: 11 });
     assert_eq!(found(&[]), DecodeError::Size { have: 0, need: 4 });

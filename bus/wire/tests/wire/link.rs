@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use lager_wire::link::{BoardEvent, BoardLink, HostEvent, HostLink, HostTransmitter, Up};
 use lager_wire::{
-    Callsign, Centimetres, PACKET_LENGTH, Payload, ResetCause, SteerCommand, Version,
+    Callsign, Centimetres, PACKET_LENGTH, Packet, PacketId, Payload, ResetCause, SteerCommand,
+    Version,
 };
 
 use crate::line::{GAP_US, Harm, Line, board};
@@ -41,6 +42,25 @@ fn a_board_comes_up_at_its_first_syn() {
     assert_eq!(line.host.health().skipped_bytes, 0);
     assert_eq!(line.board.lost_packets(), 0);
     assert_eq!(line.board.bad_packets(), 0);
+}
+
+#[test]
+fn a_board_refuses_what_only_boards_send() {
+    let mut line = Line::new(1);
+    line.run(1);
+    let heard = |link: &mut BoardLink, id, payload| {
+        let id = PacketId::new(id);
+        let bytes = Packet { id, payload }.encode(Version::One);
+        let heard = bytes.map(|byte| link.push(byte, 0));
+        heard.into_iter().flatten().last()
+    };
+    assert_eq!(heard(&mut line.board, 0, line.data), None);
+    assert_eq!(line.board.bad_packets(), 1);
+    // What follows is heard, and one is missing before it.
+    let command = Payload::SteerCommand(SteerCommand { code: 3, seq: 1 });
+    let event = heard(&mut line.board, 1, command);
+    assert!(matches!(event, Some(BoardEvent::Packet(packet)) if packet.payload == command));
+    assert_eq!(line.board.lost_packets(), 1);
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Packets to try things on, and a small generator of reproducible noise.
 
 use lager_wire::{
-    ArmData, BoardStatus, Callsign, Centimetres, Handshake, LineBits, LineState, PACKET_LENGTH,
-    Packet, PacketId, Payload, ResetCause, Setting, SettingKey, SettingReply, SettingStatus,
-    SteerCommand, SteerData, SteerFlags, SynAck, Version,
+    ArmData, BoardStatus, Callsign, Centimetres, Handshake, LineBits, LineReading, LineState,
+    PACKET_LENGTH, Packet, PacketId, Payload, ResetCause, Setting, SettingKey, SettingReply,
+    SettingStatus, SteerCommand, SteerData, SteerFlags, SynAck, Version,
 };
 
 /// Marsaglia's xorshift64*: the same bytes on every machine.
@@ -70,6 +70,15 @@ pub(crate) fn payloads() -> Vec<Payload> {
     payloads.extend(LineState::ALL.iter().copied().map(Payload::Line));
     payloads.extend([0, 11, 37, 80, 255].map(|cm| Payload::Distance(Centimetres(cm))));
     payloads.extend([0, 0x7FF, 0x070, 0x555].map(|bits| Payload::RawLine(LineBits::new(bits))));
+    for (sensor, lowest, reading, highest) in [(0, 0, 0, 0), (10, 0, 255, 255), (5, 11, 11, 190)] {
+        payloads.push(Payload::LineReading(LineReading {
+            sensor,
+            reading,
+            lowest,
+            highest,
+            tells_apart: highest - lowest >= 40,
+        }));
+    }
     for (code, seq) in [(1, 0), (3, 255), (7, 11), (0xFB, 85), (0, 170)] {
         payloads.push(Payload::SteerCommand(SteerCommand { code, seq }));
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lager_emulator::rig::Board;
-use lager_wire::{Payload, Setting, SettingKey, SettingReply, SettingStatus};
+use lager_wire::{LineReading, Payload, Setting, SettingKey, SettingReply, SettingStatus};
 
 use crate::support::Robot;
 
@@ -71,4 +71,37 @@ fn a_damaged_eeprom_is_not_believed() {
         damaged[place] ^= 0x10;
         assert_eq!(in_force(&mut with_eeprom(&damaged)), 2, "byte {place}");
     }
+}
+
+#[test]
+fn while_the_line_sensors_are_calibrated_each_tells_in_turn_what_it_has_read() {
+    let mut robot = Robot::up(4);
+    let start = Setting {
+        key: SettingKey::Calibrate,
+        seq: 7,
+        value: 1,
+    };
+    robot.place(0.0);
+    robot.sensor.packets.clear();
+    robot.sensor.send(&mut robot.rig, Payload::Setting(start));
+    robot.run(Duration::from_millis(200));
+    let told = robot.sensor.packets.iter().map(|arrived| arrived.packet);
+    let readings: Vec<LineReading> = told
+        .clone()
+        .filter_map(|packet| match packet.payload {
+            Payload::LineReading(reading) => Some(reading),
+            _ => None,
+        })
+        .collect();
+    assert!(readings.len() > 5 * 11, "{}", readings.len());
+    for (place, reading) in readings.iter().enumerate() {
+        assert_eq!(usize::from(reading.sensor), place % 11);
+        assert!((reading.lowest..=reading.highest).contains(&reading.reading));
+    }
+    // Its middle is over the tape.
+    let [edge, middle] = [0, 5].map(|sensor| readings[sensor].reading);
+    assert!(middle > edge, "{middle} {edge}");
+    // A distance is told between them.
+    let distances = told.filter(|packet| matches!(packet.payload, Payload::Distance(_)));
+    assert!(distances.count() >= readings.len() - 2);
 }

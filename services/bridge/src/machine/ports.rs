@@ -45,6 +45,7 @@ impl BridgeCore {
             PortEvent::Arm(data) => self.servos.hear(&data),
             PortEvent::Status(status) => self.boards.status(place, &status),
             PortEvent::Setting(reply) => self.setting_answered(now, &reply),
+            PortEvent::Reading(reading) => self.calibration.hear_reading(&reading),
         }
     }
 

@@ -5,7 +5,7 @@ use lager_topics::{
     AskKind, Calibration, Finish, Health, Input, InputKind, Mode, OperatorInput, Outcome, Refusal,
     Role, SteeringReport,
 };
-use lager_wire::{ArmCommand, Command, LineState, SettingStatus, SteerFlags};
+use lager_wire::{ArmCommand, Command, LineReading, LineState, SettingStatus, SteerFlags};
 
 use crate::harness::{
     FOLLOW, FORWARD, LEFT_PERP, Robot, STANDBY, SensorBoard, SteeringBoard, logic, operator,
@@ -265,6 +265,21 @@ fn a_calibration_is_answered_by_the_sensor_board_or_given_up() {
         assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::Done));
         let running = |health: &Health| health.calibration == Calibration::Running;
         let before = robot.hands.wait_for_health("it runs", running);
+        robot.sensor.with(|board| {
+            board.tell(LineReading {
+                sensor: 10,
+                reading: 90,
+                lowest: 20,
+                highest: 120,
+                tells_apart: true,
+            });
+        });
+        let told = robot.hands.wait_for_health("a reading is told", |health| {
+            health.calibrated[10].is_heard()
+        });
+        let [first, .., last] = told.calibrated;
+        assert!(!first.is_heard());
+        assert_eq!((last.lowest, last.highest, last.tells_apart), (20, 120, 1));
         robot
             .sensor
             .with(|board| board.end_calibration(sensors, status));

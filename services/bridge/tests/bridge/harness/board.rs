@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
-    BoardStatus, Callsign, Centimetres, LineBits, LineState, Packet, Payload, ResetCause,
-    SettingKey, SettingReply, SettingStatus,
+    BoardStatus, Callsign, Centimetres, LineBits, LineReading, LineState, Packet, Payload,
+    ResetCause, SettingKey, SettingReply, SettingStatus,
 };
 
 use super::pty::Pty;
@@ -220,6 +220,11 @@ impl SensorBoard {
         self.reset = cause;
         self.raw = false;
         self.restarts += 1;
+    }
+
+    /// Tells what a line sensor reads.
+    pub(crate) fn tell(&mut self, reading: LineReading) {
+        self.answers.push(Payload::LineReading(reading));
     }
 
     /// Ends the calibration that runs, with so many sensors that have seen floor and tape.

@@ -3,8 +3,8 @@
 
 use lager_comm::Senses;
 use lager_topics::{
-    AskKind, Heading, InputKind, Mode, NavigatorStatus, Outcome, Phase, WorldAnswer, WorldAskKind,
-    WorldRefusal,
+    AskKind, CalibratedSensor, Calibration, Heading, InputKind, Mode, NavigatorStatus, Outcome,
+    Phase, WorldAnswer, WorldAskKind, WorldRefusal,
 };
 
 use super::{done, extended, pass};
@@ -53,9 +53,35 @@ fn what_the_bridge_answers_is_handed_on() {
     robot
         .conversation
         .answered_by_bridge(id, done(Outcome::Done));
-    assert_eq!(pass(&mut robot, 5_000), [""; 0], "it has only begun");
+    robot.health.calibration = Calibration::Running.into();
+    robot.health.calibrated[..10].fill(CalibratedSensor {
+        reading: 30,
+        lowest: 20,
+        highest: 40,
+        ..CalibratedSensor::default()
+    });
+    robot.told();
+    robot.shown.clear();
+    assert_eq!(pass(&mut robot, 2_500), [""; 0], "it has only begun");
+    let read = |robot: &Robot| -> Vec<String> {
+        let shown = robot.shown.iter();
+        let read = shown.filter(|line| line.starts_with("sensors "));
+        read.cloned().collect()
+    };
+    assert_eq!(read(&robot), [""; 0], "one of them has not been heard");
+    robot.health.calibrated[10] = CalibratedSensor {
+        reading: 200,
+        lowest: 20,
+        highest: 210,
+        tells_apart: 1,
+    };
+    robot.told();
+    assert_eq!(pass(&mut robot, 2_500), [""; 0]);
+    // Once, as nothing changes.
+    let told = format!("sensors{} 200 20 210 1", " 30 20 40 0".repeat(10));
+    assert_eq!(read(&robot), [told]);
     robot.health.calibrations_ended += 1;
-    robot.health.calibration = lager_topics::Calibration::Partly.into();
+    robot.health.calibration = Calibration::Partly.into();
     robot.health.calibrated_sensors = 9;
     let said = robot.told();
     assert!(
