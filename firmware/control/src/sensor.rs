@@ -322,7 +322,7 @@ impl SensorUnit {
         let turn = self.turn;
         let seen = self.calibration.seen(turn / 2)?;
         self.turn = if turn == LAST_TURN { 0 } else { turn + 1 };
-        (turn % 2 == 0).then_some(Payload::LineReading(seen))
+        turn.is_multiple_of(2).then_some(Payload::LineReading(seen))
     }
 
     fn send<B: SensorBoard>(&mut self, board: &mut B, payload: Payload) {
