@@ -23,14 +23,20 @@ use core::ptr::NonNull;
 
 use lager_topics::Stamp;
 
+use super::anyone::Readers;
 use super::outlet::Outlet;
 use crate::bus::Bus;
 use crate::error::{PortError, SendError};
+use crate::here::{Here, ends_here};
 use crate::kind::{Kind, Side};
+
+ends_here!(Readers);
 
 /// Where everybody but the actors reads.
 pub(crate) struct Copies {
     outlet: Outlet,
+    /// Who reads there.
+    readers: Here<Readers>,
     /// Readers that come later are owed the last sample.
     is_state: bool,
     /// At the last sample there was a reader.
@@ -46,6 +52,7 @@ impl Copies {
         let outlet = Outlet::new(bus, kind, Side::Public)?;
         let size = outlet.payload_size();
         Ok(Self {
+            readers: Here::new(outlet.readers()),
             outlet,
             is_state: kind.qos.history > 0,
             watched: Cell::new(false),
@@ -73,7 +80,7 @@ impl Copies {
     /// Whether a copy of the next sample has to be made.
     #[inline]
     fn are_due(&self) -> bool {
-        let watched = self.outlet.is_read();
+        let watched = self.readers.is_there();
         if self.watched.replace(watched) && !watched {
             // Lets go of what the last reader had.
             self.tick();

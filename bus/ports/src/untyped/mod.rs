@@ -21,6 +21,7 @@
     reason = "the transport leaves it to its caller that bytes are of the stated type"
 )]
 
+mod anyone;
 mod asking;
 mod copies;
 mod foreign;

@@ -11,6 +11,7 @@ use iceoryx2::prelude::{BackpressureStrategy, PortFactory};
 use iceoryx2::sample_mut::SampleMut;
 use lager_topics::Stamp;
 
+use super::anyone::Readers;
 use super::behind;
 use crate::bus::Bus;
 use crate::error::{PortError, SendError};
@@ -110,10 +111,9 @@ impl Outlet {
         })
     }
 
-    /// Whether the service has a reader. A killed one counts until it is swept.
-    #[inline(always)]
-    pub(crate) fn is_read(&self) -> bool {
-        self.service.dynamic_config().number_of_subscribers() > 0
+    /// Who reads the service; not to be asked when this is gone.
+    pub(super) fn readers(&self) -> Readers {
+        Readers::of(&self.service)
     }
 
     /// The size of a payload in bytes.

@@ -2,11 +2,11 @@
 //!
 //! Beside each topic stands an event service of the same name. A stock process that listens there
 //! is notified of every sample, which costs the writer one system call for each listener. While
-//! there is no listener, a writer only reads a counter in shared memory.
+//! there is no listener, a writer only reads a number in shared memory (`anyone`).
 
 use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
-use iceoryx2::prelude::PortFactory;
 
+use super::anyone::Listeners;
 use crate::bus::Bus;
 use crate::error::PortError;
 use crate::kind::Kind;
@@ -16,7 +16,8 @@ use crate::transport::Ipc;
 
 /// The standard listeners of one topic, from a writer's side.
 pub(crate) struct StandardListeners {
-    service: EventService,
+    listeners: Listeners,
+    _service: EventService,
     notifier: Notifier<Ipc>,
 }
 
@@ -38,13 +39,17 @@ impl StandardListeners {
                     other => service::no_resources(kind.name, other),
                 })
         })?;
-        Ok(Self { service, notifier })
+        Ok(Self {
+            listeners: Listeners::of(&service),
+            _service: service,
+            notifier,
+        })
     }
 
     /// Notifies them, if there are any.
     #[inline]
     pub(crate) fn notify(&self) {
-        if self.service.dynamic_config().number_of_listeners() > 0 {
+        if self.listeners.is_there() {
             // A listener that has died or is full needs no notice.
             let _ = self.notifier.notify();
         }
