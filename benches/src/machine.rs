@@ -154,6 +154,10 @@ impl Awake {
 }
 
 /// Runs whenever nothing else wants the core, until it is killed.
+///
+/// It gives way all the time: what has the core keeps it until the kernel's next tick, 4 ms at
+/// 250 Hz, also against a process that yields it for a moment. An adaptive receiver yields every
+/// 4 us (`lager_ports::Waiter`), and lost its core to this process until then.
 fn keep_from_halting(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     let Some(core) = parent.hear::<usize>()? else {
         return Ok(());
@@ -163,6 +167,7 @@ fn keep_from_halting(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     parent.say(&())?;
     loop {
         core::hint::spin_loop();
+        rustix::thread::sched_yield();
     }
 }
 

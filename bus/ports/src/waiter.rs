@@ -8,7 +8,9 @@
 //! that waits for that core, such as the kernel thread that delivers a serial port's bytes; without
 //! the yield that thread waited 2 ms and more. On a machine where this happened every look was in
 //! vain, so waiters stopped looking and adaptive waiting gained nothing: 0.96 to 1.06 of blocking,
-//! also with the code of 2026-11-21. With the yield it is 0.68 to 0.87 there.
+//! also with the code of 2026-11-21. With the yield it is 0.68 to 0.87 there. Whoever else is ready
+//! to run on that core gets it as well, even a process of SCHED_IDLE, and keeps it until the
+//! kernel's next tick, 4 ms at 250 Hz: keep such processes off a core that is to look.
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
