@@ -166,166 +166,129 @@ fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::figures::Built;
+    use std::path::Path;
 
-    fn limits() -> Limits {
-        let limit = |source: &str, figure: &str, at_most, measured| Limit {
+    const RATIO: &str = "hop spin plain: lager / futex p50";
+
+    fn limits(of_send: &str) -> Limits {
+        let text = format!(
+            "[counted.counts]
+             rustc = '1'
+             target = 'here'
+             margin_percent = 5
+             margin_percent_other_rustc = 20
+             [[limit]]
+             source = 'hop'
+             figure = '{RATIO}'
+             at_most = 1.2
+             reason = 'because'
+             [[limit]]
+             source = 'counts'
+             figure = 'send'
+             {of_send}
+             reason = 'because'"
+        );
+        Limits::parse(Path::new("limits.toml"), &text).unwrap()
+    }
+
+    /// What becomes of the one limit of a source, and what is said beside.
+    fn judged(
+        limits: &Limits,
+        source: &str,
+        built: &str,
+        figure: (&str, f64),
+    ) -> (Verdict, String) {
+        let built = built.split_once(' ').map(|(rustc, target)| Built {
+            rustc: rustc.to_owned(),
+            target: target.to_owned(),
+        });
+        let figures = Figures {
             source: source.to_owned(),
-            figure: figure.to_owned(),
-            at_most,
-            at_least: None,
-            measured,
-            margin_percent: None,
-            goal: None,
-            reason: "because".to_owned(),
-        };
-        Limits {
-            counted: [(
-                "counts".to_owned(),
-                Counted {
-                    rustc: "1".to_owned(),
-                    target: "here".to_owned(),
-                    margin_percent: 5.0,
-                    margin_percent_other_rustc: 20.0,
-                },
-            )]
-            .into(),
-            limits: vec![
-                limit("hop", "ratio", Some(1.2), None),
-                limit("counts", "send", None, Some(1000.0)),
-            ],
-        }
-    }
-
-    fn ratio(value: f64) -> Verdict {
-        let figures = Figures {
-            source: "hop".to_owned(),
-            built: None,
-            figures: [("ratio".to_owned(), value)].into(),
+            built,
+            figures: [(figure.0.to_owned(), figure.1)].into(),
             ..Figures::default()
         };
-        judge(&limits(), &figures).0[0].verdict
-    }
-
-    fn count(name: &str, value: f64, rustc: &str, target: &str) -> (Verdict, String) {
-        let figures = Figures {
-            source: "counts".to_owned(),
-            built: Some(Built {
-                rustc: rustc.to_owned(),
-                target: target.to_owned(),
-            }),
-            figures: [(name.to_owned(), value)].into(),
-            ..Figures::default()
-        };
-        let (judgements, notes) = judge(&limits(), &figures);
+        let (judgements, notes) = judge(limits, &figures);
         assert_eq!(judgements.len(), 1, "only its own source's limits");
         (judgements[0].verdict, notes.join("\n"))
     }
 
     #[test]
     fn a_ratio_is_kept_up_to_its_limit() {
-        assert_eq!(ratio(1.2), Verdict::Kept);
-        assert_eq!(ratio(1.21), Verdict::Broken);
-        assert_eq!(ratio(f64::NAN), Verdict::Broken);
-    }
-
-    #[test]
-    fn a_count_is_kept_up_to_its_margin() {
-        assert_eq!(
-            count("send", 1050.0, "1", "here"),
-            (Verdict::Kept, String::new())
-        );
-        assert_eq!(count("send", 1051.0, "1", "here").0, Verdict::Broken);
-    }
-
-    #[test]
-    fn a_limits_own_margin_comes_first_unless_the_compiler_is_another() {
-        let mut limits = limits();
-        limits.limits[1].margin_percent = Some(1.0);
-        for (rustc, bound) in [("1", 1010.0), ("2", 1200.0)] {
-            let figures = Figures {
-                source: "counts".to_owned(),
-                built: Some(Built {
-                    rustc: rustc.to_owned(),
-                    target: "here".to_owned(),
-                }),
-                figures: [("send".to_owned(), 1000.0)].into(),
-                ..Figures::default()
-            };
-            assert_eq!(judge(&limits, &figures).0[0].limit, bound);
-        }
-    }
-
-    #[test]
-    fn what_is_to_be_reached_is_judged_from_below_whatever_the_compiler() {
-        let mut limits = limits();
-        limits.limits[1].measured = None;
-        limits.limits[1].at_least = Some(0.5);
-        for (value, verdict) in [
-            (0.5, Verdict::Kept),
-            (2.0, Verdict::Kept),
-            (0.49, Verdict::Broken),
+        for (value, expected) in [
+            (1.2, Verdict::Kept),
+            (1.21, Verdict::Broken),
             (f64::NAN, Verdict::Broken),
         ] {
-            let figures = Figures {
-                source: "counts".to_owned(),
-                built: Some(Built {
-                    rustc: "2".to_owned(),
-                    target: "here".to_owned(),
-                }),
-                figures: [("send".to_owned(), value)].into(),
-                ..Figures::default()
-            };
-            assert_eq!(judge(&limits, &figures).0[0].verdict, verdict, "{value}");
+            let (verdict, notes) = judged(&limits("measured = 1"), "hop", "", (RATIO, value));
+            assert_eq!((verdict, notes.as_str()), (expected, ""), "{value}");
         }
+    }
+
+    #[test]
+    fn a_count_is_judged_by_its_margin_its_compiler_and_its_target() {
+        use Verdict::{Broken, Kept, Missing, NotJudged};
+        let other = "rustc 1, this is 2";
+        let (count, own) = ("measured = 1000", "measured = 1000\nmargin_percent = 1");
+        let reached = "at_least = 0.5";
+        for (limit, built, figure, value, expected, note) in [
+            (count, "1 here", "send", 1050.0, Kept, ""),
+            (count, "1 here", "send", 1051.0, Broken, ""),
+            // The limit's own margin comes first, unless the compiler is another.
+            (own, "1 here", "send", 1010.0, Kept, ""),
+            (own, "1 here", "send", 1011.0, Broken, ""),
+            (own, "2 here", "send", 1200.0, Kept, other),
+            (count, "2 here", "send", 1200.0, Kept, other),
+            (count, "2 here", "send", 1201.0, Broken, other),
+            // What is to be reached is judged from below, whatever the compiler.
+            (reached, "2 here", "send", 0.5, Kept, other),
+            (reached, "2 here", "send", 0.49, Broken, other),
+            (reached, "2 here", "send", f64::NAN, Broken, other),
+            (count, "1 there", "send", 9000.0, NotJudged, "not judged"),
+            // A limit without its figure fails even on another target.
+            (
+                count,
+                "1 here",
+                "sent",
+                1000.0,
+                Missing,
+                "`sent` (1000) has no limit",
+            ),
+            (
+                count,
+                "1 there",
+                "sent",
+                1000.0,
+                Missing,
+                "`sent` (1000) has no limit",
+            ),
+            (count, "1 here", "send", 800.0, Kept, "come down to 800"),
+        ] {
+            let (verdict, notes) = judged(&limits(limit), "counts", built, (figure, value));
+            let case = format!("{limit}, built by {built}: {figure} is {value}: {notes}");
+            assert_eq!(verdict, expected, "{case}");
+            assert!(
+                notes.contains(note) && notes.is_empty() == note.is_empty(),
+                "{case}"
+            );
+        }
+        assert!([Broken, Missing].iter().all(|verdict| verdict.fails()));
+        assert!(![Kept, NotJudged].iter().any(|verdict| verdict.fails()));
     }
 
     #[test]
     fn what_this_machine_cannot_measure_is_told_and_not_judged() {
-        let figures = Figures {
-            source: "hop".to_owned(),
-            unmeasured: [("rat".to_owned(), "no right".to_owned())].into(),
-            ..Figures::default()
-        };
-        let (judgements, notes) = judge(&limits(), &figures);
-        assert_eq!(judgements[0].verdict, Verdict::Missing, "another scenario");
-        assert_eq!(notes, ["no right"]);
-        let figures = Figures {
-            unmeasured: [("ratio".to_owned(), "no right".to_owned())].into(),
-            ..figures
-        };
-        assert_eq!(judge(&limits(), &figures).0[0].verdict, Verdict::NotJudged);
-    }
-
-    #[test]
-    fn another_compiler_widens_the_margin_and_is_told() {
-        let (verdict, notes) = count("send", 1200.0, "2", "here");
-        assert_eq!(verdict, Verdict::Kept);
-        assert!(notes.contains("rustc 1, this is 2"), "{notes}");
-        assert_eq!(count("send", 1201.0, "2", "here").0, Verdict::Broken);
-    }
-
-    #[test]
-    fn another_target_is_shown_and_not_judged() {
-        let (verdict, notes) = count("send", 9000.0, "1", "there");
-        assert_eq!(verdict, Verdict::NotJudged);
-        assert!(!verdict.fails());
-        assert!(notes.contains("not judged"), "{notes}");
-    }
-
-    #[test]
-    fn a_limit_without_its_figure_fails_even_on_another_target() {
-        for target in ["here", "there"] {
-            let (verdict, notes) = count("sent", 1000.0, "1", target);
-            assert_eq!(verdict, Verdict::Missing);
-            assert!(verdict.fails());
-            assert!(notes.contains("`sent` (1000) has no limit"), "{notes}");
+        for (what, expected) in [("ho", Verdict::Missing), ("hop", Verdict::NotJudged)] {
+            let figures = Figures {
+                source: "hop".to_owned(),
+                unmeasured: [(what.to_owned(), "no right".to_owned())].into(),
+                ..Figures::default()
+            };
+            let (judgements, notes) = judge(&limits("measured = 1"), &figures);
+            assert_eq!(
+                (judgements[0].verdict, notes),
+                (expected, vec!["no right".to_owned()])
+            );
         }
-    }
-
-    #[test]
-    fn a_limit_that_has_come_loose_is_told() {
-        let (verdict, notes) = count("send", 800.0, "1", "here");
-        assert_eq!(verdict, Verdict::Kept);
-        assert!(notes.contains("come down to 800"), "{notes}");
     }
 }

@@ -112,7 +112,7 @@ impl Limits {
         Self::parse(file, &text)
     }
 
-    fn parse(file: &Path, text: &str) -> Result<Self, LimitsError> {
+    pub(crate) fn parse(file: &Path, text: &str) -> Result<Self, LimitsError> {
         let limits: Self = toml::from_str(text).map_err(|error| LimitsError::Syntax {
             file: file.to_owned(),
             detail: error.to_string().trim_end().to_owned(),

@@ -112,20 +112,23 @@ pub(crate) fn run(
 mod tests {
     use super::*;
 
-    fn limits(figures: &[(&str, f64)]) -> Limits {
-        let limits = figures.iter().map(|(figure, at_most)| Limit {
+    fn limits(figures: &[&str], at_most: f64) -> Limits {
+        let limit = |figure: &&str| {
+            format!(
+                "[[limit]]\nsource = 'path'\nfigure = '{figure}'\nat_most = {at_most:?}\nreason = 'a test'\n"
+            )
+        };
+        let text: String = figures.iter().map(limit).collect();
+        Limits::parse(Path::new("limits.toml"), &text).unwrap()
+    }
+
+    fn figures(all: &[&str], ratio: f64, time_ns: f64) -> Figures {
+        let of_each = |value| all.iter().map(|name| ((*name).to_owned(), value)).collect();
+        Figures {
             source: "path".to_owned(),
-            figure: (*figure).to_owned(),
-            at_most: Some(*at_most),
-            at_least: None,
-            measured: None,
-            margin_percent: None,
-            goal: None,
-            reason: "a test".to_owned(),
-        });
-        Limits {
-            counted: [].into(),
-            limits: limits.collect(),
+            figures: of_each(ratio),
+            times_ns: of_each(time_ns),
+            ..Figures::default()
         }
     }
 
@@ -136,13 +139,8 @@ mod tests {
 
     #[test]
     fn a_slow_down_is_as_long_as_its_limit_wants() {
-        let figures = Figures {
-            source: "path".to_owned(),
-            figures: [(BLOCK.to_owned(), 1.2)].into(),
-            times_ns: [(BLOCK.to_owned(), 60_000.0)].into(),
-            ..Figures::default()
-        };
-        let trials = trials(&limits(&[(BLOCK, 1.6)]), &figures);
+        let figures = figures(&[BLOCK], 1.2, 60_000.0);
+        let trials = trials(&limits(&[BLOCK], 1.6), &figures);
         // From 60 us to 1.25 times 1.6 baselines of 50 us.
         assert_eq!(trials[0][0].spin_ns.abs_diff(40_000), 0, "{trials:?}");
     }
@@ -150,14 +148,7 @@ mod tests {
     #[test]
     fn rows_that_are_compared_with_each_other_are_slowed_down_one_after_the_other() {
         let all = [BLOCK, BLOCK_P99, ADAPTIVE, OBSERVED];
-        let figures = Figures {
-            source: "path".to_owned(),
-            figures: all.map(|figure| (figure.to_owned(), 1.0)).into(),
-            times_ns: all.map(|figure| (figure.to_owned(), 1_000.0)).into(),
-            ..Figures::default()
-        };
-        let limits = limits(&all.map(|figure| (figure, 1.3)));
-        let trials = trials(&limits, &figures);
+        let trials = trials(&limits(&all, 1.3), &figures(&all, 1.0, 1_000.0));
         let names: Vec<Vec<&str>> = trials
             .iter()
             .map(|trial| trial.iter().map(|one| one.figure.as_str()).collect())
