@@ -3,39 +3,38 @@
 //! Nothing is measured or decided here; a goal is held by the guard, not by a report.
 
 use core::fmt;
-use core::str::FromStr;
 
 use lager_ports::Policy;
 use serde::{Deserialize, Serialize};
 
+use crate::names::named;
 use crate::stats::Quantiles;
 
-/// How the receiver waits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mode {
-    /// It looks without pause.
-    Spin,
-    /// It looks while samples come fast and sleeps when they do not.
-    Adaptive,
-    /// It sleeps until it is woken.
-    Block,
+named! {
+    /// How the receiver waits.
+    pub enum Mode {
+        /// It looks without pause.
+        Spin = "spin",
+        /// It looks while samples come fast and sleeps when they do not.
+        Adaptive = "adaptive",
+        /// It sleeps until it is woken.
+        Block = "block",
+    }
+}
+
+named! {
+    /// Under which circumstances the two processes run.
+    pub enum Regime {
+        /// A core each, and an idle core may halt: a sleeping receiver pays for leaving the halt.
+        Plain = "plain",
+        /// Both on one core: the cost of the software alone.
+        SameCore = "same-core",
+        /// A core each, kept from halting by a process that runs only when nothing else does.
+        NoHalt = "no-halt",
+    }
 }
 
 impl Mode {
-    /// Every mode, in the order of the tables.
-    pub const ALL: [Self; 3] = [Self::Spin, Self::Adaptive, Self::Block];
-
-    /// The mode's name on the command line and in JSON.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Spin => "spin",
-            Self::Adaptive => "adaptive",
-            Self::Block => "block",
-        }
-    }
-
     /// What a waiter of the typed ports is told.
     pub(crate) const fn policy(self) -> Policy {
         match self {
@@ -44,70 +43,6 @@ impl Mode {
             Self::Block => Policy::Block,
         }
     }
-}
-
-/// Under which circumstances the two processes run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Regime {
-    /// A core each, and an idle core may halt: a sleeping receiver pays for leaving the halt.
-    Plain,
-    /// Both on one core: the cost of the software alone.
-    SameCore,
-    /// A core each, kept from halting by a process that runs only when nothing else does.
-    NoHalt,
-}
-
-impl Regime {
-    /// Every regime, in the order of the tables.
-    pub const ALL: [Self; 3] = [Self::Plain, Self::SameCore, Self::NoHalt];
-
-    /// The regime's name on the command line and in JSON.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Plain => "plain",
-            Self::SameCore => "same-core",
-            Self::NoHalt => "no-halt",
-        }
-    }
-}
-
-macro_rules! named {
-    ($name:ident, $choices:literal) => {
-        impl fmt::Display for $name {
-            fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.pad(self.as_str())
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = UnknownName;
-
-            fn from_str(text: &str) -> Result<Self, UnknownName> {
-                Self::ALL
-                    .into_iter()
-                    .find(|one| one.as_str() == text)
-                    .ok_or_else(|| UnknownName {
-                        text: text.to_owned(),
-                        choices: $choices,
-                    })
-            }
-        }
-    };
-}
-
-named!(Mode, "spin, adaptive or block");
-named!(Regime, "plain, same-core or no-halt");
-
-/// A text that names no mode or regime.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not known here; use {choices}")]
-pub struct UnknownName {
-    /// The text.
-    pub text: String,
-    /// What it could have been.
-    pub choices: &'static str,
 }
 
 /// What to measure, and how thoroughly.

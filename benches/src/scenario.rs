@@ -1,44 +1,25 @@
 //! What can be measured, by name: for `lager bench`, the guard and criterion alike.
 
-use core::fmt;
-
 use crate::error::BenchError;
 use crate::group::Group;
 use crate::machine;
+use crate::names::named;
 use crate::report::{Options, Report};
 use crate::{fanout, hop, path, ring};
 
-/// What is measured by its time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scenario {
-    /// One way between two processes, and what it costs a writer to wake one.
-    Hop,
-    /// From a sensor frame to the command that it causes.
-    Path,
-    /// What publishing costs the writer when many read.
-    Fanout,
+named! {
+    /// What is measured by its time.
+    pub enum Scenario {
+        /// One way between two processes, and what it costs a writer to wake one.
+        Hop = "hop",
+        /// From a sensor frame to the command that it causes.
+        Path = "path",
+        /// What publishing costs the writer when many read.
+        Fanout = "fanout",
+    }
 }
 
 impl Scenario {
-    /// Every scenario, in the order of the tables.
-    pub const ALL: [Self; 3] = [Self::Hop, Self::Path, Self::Fanout];
-
-    /// Its name on the command line.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Hop => "hop",
-            Self::Path => "path",
-            Self::Fanout => "fanout",
-        }
-    }
-
-    /// The scenario of that name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|one| one.as_str() == name)
-    }
-
     /// The rows that `options` want, in groups that take turns.
     #[must_use]
     pub fn groups(self, options: &Options) -> Vec<Group> {
@@ -84,11 +65,5 @@ impl Scenario {
             machine: machine::describe(),
             rows,
         })
-    }
-}
-
-impl fmt::Display for Scenario {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.as_str())
     }
 }

@@ -186,7 +186,7 @@ impl Limit {
                 });
             }
         }
-        let timed = Scenario::named(&self.source).is_some();
+        let timed = self.source.parse::<Scenario>().is_ok();
         match (timed, self.at_most, self.at_least, self.measured) {
             (true, Some(_), None, None) if self.margin_percent.is_none() => self
                 .figure

@@ -151,9 +151,9 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
     };
     for source in sources {
         let counted = counts.iter().find(|figures| figures.source == source);
-        let figures = match (counted, Scenario::named(&source)) {
+        let figures = match (counted, source.parse::<Scenario>()) {
             (Some(figures), _) => figures.clone(),
-            (None, Some(scenario)) => {
+            (None, Ok(scenario)) => {
                 let measured = measure(&limits, scenario, how)?;
                 if measured.attempts > 1 {
                     let times = measured.attempts;
@@ -163,7 +163,7 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
                 }
                 measured.figures
             }
-            (None, None) if source == CYCLES => {
+            (None, Err(_)) if source == CYCLES => {
                 // `benches/guard` runs this in the source tree.
                 let here = Path::new("");
                 let traces =
@@ -171,7 +171,7 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
                 let limited = |name: &str| limits.of(CYCLES).any(|limit| limit.figure == name);
                 Figures::of_traces(CYCLES, &traces, limited)?
             }
-            (None, None) => return Err(GuardError::NoCounts(source)),
+            (None, Err(_)) => return Err(GuardError::NoCounts(source)),
         };
         let (judgements, notes) = judge(&limits, &figures);
         findings.kept &= !judgements.iter().any(|one| one.verdict.fails());
@@ -275,7 +275,7 @@ fn sources(limits: &Limits, only: &[String]) -> Result<Vec<String>, GuardError> 
 /// Those of the sources that are timed.
 fn scenarios(limits: &Limits, arguments: &Arguments) -> Result<Vec<Scenario>, GuardError> {
     let sources = sources(limits, &arguments.only)?;
-    let scenario = |source: &String| Scenario::named(source);
+    let scenario = |source: &String| source.parse().ok();
     Ok(sources.iter().filter_map(scenario).collect())
 }
 
