@@ -121,54 +121,39 @@ impl Trace {
     #[must_use]
     pub fn figures(&self) -> Vec<Figure> {
         let at = baud_name(self.baud);
-        let figure = |name: String, value: f64, unit: &str| Figure {
-            name,
-            value,
-            unit: unit.to_owned(),
-        };
         let mut figures = Vec::new();
+        let mut add = |name: String, value: f64, unit: &str| {
+            figures.push(Figure {
+                name,
+                value,
+                unit: unit.to_owned(),
+            });
+        };
         for (what, span) in [
             ("tape-to-duty", &self.tape_to_duty),
             ("tape-to-uart", &self.tape_to_uart),
         ] {
-            for (which, cycles) in [
-                ("best", span.best),
-                ("median", span.median),
-                ("worst", span.worst),
-            ] {
-                figures.push(figure(
-                    format!("{what}@{at}/{which}"),
-                    cycles as f64,
-                    "cycles",
-                ));
-            }
+            let what = format!("{what}@{at}");
+            add(format!("{what}/best"), span.best as f64, "cycles");
+            add(format!("{what}/median"), span.median as f64, "cycles");
+            add(format!("{what}/worst"), span.worst as f64, "cycles");
         }
         for (name, board) in [("sensor", &self.sensor), ("steering", &self.steering)] {
-            let interrupts = &board.interrupts;
-            let seconds = interrupts.cycles as f64 / self.frequency_hz as f64;
-            let in_a_second = (interrupts.in_interrupts as f64 / seconds).round();
-            let share = interrupts.in_interrupts as f64 / interrupts.cycles as f64;
-            figures.extend([
-                figure(
-                    format!("interrupt-latency@{at}/{name}"),
-                    interrupts.worst_latency as f64,
-                    "cycles",
-                ),
-                figure(format!("interrupts@{at}/{name}"), in_a_second, "cycles/s"),
-                figure(format!("interrupt-share@{at}/{name}"), 100.0 * share, "%"),
-                figure(format!("awake@{at}/{name}"), 100.0 * board.awake_share, "%"),
-                figure(
-                    format!("flash@{at}/{name}"),
-                    board.flash_bytes as f64,
-                    "bytes",
-                ),
-            ]);
+            let Interrupts {
+                cycles,
+                in_interrupts,
+                worst_latency,
+            } = board.interrupts;
+            let share = in_interrupts as f64 / cycles as f64;
+            let in_a_second = (share * self.frequency_hz as f64).round();
+            let of = |what: &str| format!("{what}@{at}/{name}");
+            add(of("interrupt-latency"), worst_latency as f64, "cycles");
+            add(of("interrupts"), in_a_second, "cycles/s");
+            add(of("interrupt-share"), 100.0 * share, "%");
+            add(of("awake"), 100.0 * board.awake_share, "%");
+            add(of("flash"), board.flash_bytes as f64, "bytes");
         }
-        figures.push(figure(
-            format!("real-time@{at}"),
-            self.real_time_factor,
-            "x",
-        ));
+        add(format!("real-time@{at}"), self.real_time_factor, "x");
         figures
     }
 

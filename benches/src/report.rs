@@ -165,27 +165,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// The comparison of the row with that label and mode with the one called `to`, both of the
-    /// same `what` and regime. Labels other than `lager` are unique there, so `to` names one row.
-    #[must_use]
-    pub fn ratio(
-        &self,
-        what: &str,
-        label: &str,
-        mode: Mode,
-        regime: Regime,
-        to: &str,
-    ) -> Option<&Ratio> {
-        self.rows
-            .iter()
-            .find(|row| {
-                row.what == what && row.label() == label && row.mode == mode && row.regime == regime
-            })?
-            .ratios
-            .iter()
-            .find(|ratio| ratio.to == to)
-    }
-
     /// The report as one line of JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
@@ -340,13 +319,5 @@ mod tests {
         assert!(table.contains("0.80 (1.60) iceoryx2/event"), "{table}");
         assert!(table.contains("1.10 (2.20) futex"), "{table}");
         assert!(table.lines().all(|line| line.chars().count() <= 100));
-    }
-
-    #[test]
-    fn a_ratio_is_found_by_what_it_compares() {
-        let report = report();
-        let find = |to| report.ratio("hop", "lager", Mode::Block, Regime::NoHalt, to);
-        assert_eq!(find("futex").map(|ratio| ratio.p50), Some(1.1));
-        assert_eq!(find("pipe"), None);
     }
 }

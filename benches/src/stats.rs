@@ -42,7 +42,7 @@ impl Quantiles {
 }
 
 /// The smallest sample that `permille` of all samples do not exceed (nearest rank).
-fn at(sorted: &[u64], permille: usize) -> Option<u64> {
+pub(crate) fn at(sorted: &[u64], permille: usize) -> Option<u64> {
     let rank = (sorted.len() * permille).div_ceil(1000);
     sorted.get(rank.saturating_sub(1)).copied()
 }
