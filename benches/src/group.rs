@@ -16,9 +16,6 @@ use crate::report::{Mode, Options, Ratio, Regime, Row};
 use crate::slow;
 use crate::stats::{Quantiles, median};
 
-/// A payload of 1 MiB passes over the stack once, unless the compiler saves it the way.
-const STACK: usize = 32 << 20;
-
 /// One line of a report before it is measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
@@ -34,6 +31,20 @@ pub struct Entry {
 }
 
 impl Entry {
+    pub(crate) const fn new(
+        name: &'static str,
+        variant: &'static str,
+        mode: Mode,
+        against: &'static [&'static str],
+    ) -> Self {
+        Self {
+            name,
+            variant,
+            mode,
+            against,
+        }
+    }
+
     /// See [`Row::label`].
     #[must_use]
     pub fn label(&self) -> String {
@@ -58,8 +69,8 @@ impl Entry {
 pub(crate) fn wanted<T>(
     all: impl IntoIterator<Item = (Entry, T)>,
     options: &Options,
-) -> (Vec<Entry>, Vec<T>) {
-    let all: Vec<(Entry, T)> = all.into_iter().collect();
+) -> Vec<(Entry, T)> {
+    let mut all: Vec<(Entry, T)> = all.into_iter().collect();
     let asked = |entry: &Entry| options.modes.contains(&entry.mode);
     let needed: Vec<&'static str> = all
         .iter()
@@ -67,9 +78,8 @@ pub(crate) fn wanted<T>(
         .flat_map(|(entry, _)| entry.against)
         .copied()
         .collect();
-    all.into_iter()
-        .filter(|(entry, _)| asked(entry) || needed.contains(&entry.label().as_str()))
-        .unzip()
+    all.retain(|(entry, _)| asked(entry) || needed.contains(&entry.label().as_str()));
+    all
 }
 
 /// What is open while a group is measured. Stays in the thread that opened it: its processes end
@@ -111,24 +121,24 @@ pub struct Group {
 }
 
 impl Group {
-    /// A group whose entries all have as many rounds in a run and samples in a round: quick, and in
-    /// full.
-    pub(crate) fn new(
+    /// A group whose rows all have as many rounds in a run and samples in a round: quick, and in
+    /// full. `open` is told the rows, each with what it stands for.
+    pub(crate) fn new<T: Clone + Send + 'static>(
         what: impl Into<String>,
         regime: Regime,
-        entries: Vec<Entry>,
+        rows: Vec<(Entry, T)>,
         rounds: [usize; 2],
         samples: [usize; 2],
-        open: impl Fn(Regime) -> Opened + Send + 'static,
+        open: impl Fn(Regime, Vec<(Entry, T)>) -> Opened + Send + 'static,
     ) -> Self {
         Self {
             what: what.into(),
             regime,
-            samples: vec![samples; entries.len()],
-            entries,
+            samples: vec![samples; rows.len()],
+            entries: rows.iter().map(|(entry, _)| entry.clone()).collect(),
             rounds,
             is_real_time: false,
-            open: Box::new(open),
+            open: Box::new(move |regime| open(regime, rows.clone())),
         }
     }
 
@@ -149,7 +159,6 @@ impl Group {
     pub(crate) fn measure(self, options: &Options) -> Result<Vec<Row>, BenchError> {
         std::thread::scope(|scope| {
             std::thread::Builder::new()
-                .stack_size(STACK)
                 .spawn_scoped(scope, move || self.measure_here(options))
                 .map_err(Refused::to_make("a thread"))?
                 .join()
@@ -189,7 +198,8 @@ impl Group {
         } = self;
         let thorough = usize::from(!options.quick);
         let mut runs: Vec<Vec<Quantiles>> = vec![Vec::new(); entries.len()];
-        for run in 0..options.runs.max(1) {
+        let count = options.runs.max(1);
+        for run in 0..count {
             let mut samples: Vec<Vec<u64>> = vec![Vec::new(); entries.len()];
             for turn in 0..self.rounds[thorough] {
                 for place in 0..entries.len() {
@@ -198,8 +208,8 @@ impl Group {
                     }
                     let index = (place + turn) % entries.len();
                     let entry = &entries[index];
-                    progress(what, *regime, run, options, entry);
                     let row = format!("{what} {} {regime}: {}", entry.mode, entry.label());
+                    tell(&format!("{row}, run {} of {count}", run + 1));
                     slow::row(&row);
                     samples[index].extend(session.round(index, self.samples[index][thorough])?);
                 }
@@ -208,7 +218,7 @@ impl Group {
                 runs[index].extend(Quantiles::of(samples));
             }
         }
-        clear_progress();
+        tell("");
         Ok(rows(what, *regime, entries, &runs))
     }
 }
@@ -273,25 +283,11 @@ fn ratio(to: &str, own: &[Quantiles], other: &[Quantiles]) -> Option<Ratio> {
     })
 }
 
-/// Says to a person at a terminal that something is going on.
-fn progress(what: &str, regime: Regime, run: usize, options: &Options, entry: &Entry) {
+/// Tells a person at a terminal what is going on, in the place of what was told before.
+fn tell(now: &str) {
     let mut terminal = std::io::stderr();
     if terminal.is_terminal() {
-        let _ = write!(
-            terminal,
-            "\r\x1b[K{what}, {regime}: run {} of {}, {} {}",
-            run + 1,
-            options.runs.max(1),
-            entry.label(),
-            entry.mode
-        );
-    }
-}
-
-fn clear_progress() {
-    let mut terminal = std::io::stderr();
-    if terminal.is_terminal() {
-        let _ = write!(terminal, "\r\x1b[K");
+        let _ = write!(terminal, "\r\x1b[K{now}");
     }
 }
 
@@ -300,30 +296,10 @@ mod tests {
     use super::*;
 
     const ENTRIES: &[Entry] = &[
-        Entry {
-            name: "lager",
-            variant: "",
-            mode: Mode::Spin,
-            against: &["iceoryx2/header"],
-        },
-        Entry {
-            name: "iceoryx2",
-            variant: "header",
-            mode: Mode::Spin,
-            against: &[],
-        },
-        Entry {
-            name: "lager",
-            variant: "",
-            mode: Mode::Adaptive,
-            against: &["iceoryx2/header"],
-        },
-        Entry {
-            name: "pipe",
-            variant: "",
-            mode: Mode::Block,
-            against: &[],
-        },
+        Entry::new("lager", "", Mode::Spin, &["iceoryx2/header"]),
+        Entry::new("iceoryx2", "header", Mode::Spin, &[]),
+        Entry::new("lager", "", Mode::Adaptive, &["iceoryx2/header"]),
+        Entry::new("pipe", "", Mode::Block, &[]),
     ];
 
     /// What each round of an entry of [`ENTRIES`] yields.
@@ -341,9 +317,9 @@ mod tests {
         rounds: usize,
         round: impl FnMut(usize) -> Result<Vec<u64>, BenchError>,
     ) -> Result<Vec<Row>, BenchError> {
-        let entries = entries.to_vec();
-        let open = |_| unreachable!("it is open");
-        let group = Group::new("hop", Regime::Plain, entries, [rounds; 2], [1; 2], open);
+        let rows: Vec<_> = entries.iter().map(|entry| (entry.clone(), ())).collect();
+        let open = |_, _| unreachable!("it is open");
+        let group = Group::new("hop", Regime::Plain, rows, [rounds; 2], [1; 2], open);
         let options = Options {
             runs,
             ..Options::default()
@@ -359,7 +335,8 @@ mod tests {
                 ..Options::default()
             };
             let numbered = ENTRIES.iter().cloned().zip(0..);
-            wanted(numbered, &options).1
+            let wanted = wanted(numbered, &options).into_iter();
+            wanted.map(|(_, number)| number).collect::<Vec<_>>()
         };
         assert_eq!(wanted(&[Mode::Adaptive]), [1, 2]);
         assert_eq!(wanted(&[Mode::Block]), [3]);

@@ -28,12 +28,11 @@ use rustix::event::{EventfdFlags, eventfd};
 
 use crate::baseline::stream;
 use crate::error::BenchError;
-use crate::group::{Group, Session, wanted};
+use crate::group::{Entry, Group, wanted};
 use crate::pair::Pair;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
-use crate::slow;
 use contender::Contender;
-use processes::{Lanes, Lines, Round, Timing};
+use processes::{Job, Lanes, Lines, Timing};
 
 const SENDER: &str = "sender of the hop";
 const RECEIVER: &str = "receiver of the hop";
@@ -42,125 +41,60 @@ pub(crate) const PROCESSES: &[(&str, Main)] =
     &[(SENDER, processes::sender), (RECEIVER, processes::receiver)];
 
 /// From one sample to the next when they come at 10 kHz.
-const PACE_NS: u64 = 100_000;
-
-/// What takes part where the receiver adapts.
-const BESIDE_ADAPTIVE: [Contender; 3] = [
-    Contender::Lager(Mode::Spin),
-    Contender::IceoryxHeader,
-    Contender::Lager(Mode::Adaptive),
-];
+const PACE: Duration = Duration::from_micros(100);
 
 /// The groups of one regime.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let alike = Contender::ALL
-        .into_iter()
-        .filter(|contender| contender.mode() != Mode::Adaptive)
-        .collect();
-    let adaptive = match options.modes.contains(&Mode::Adaptive) {
-        true => BESIDE_ADAPTIVE.to_vec(),
-        false => Vec::new(),
-    };
-    [
-        ("hop", alike, Timing::RoundTrip),
-        (
-            "hop@full-rate",
-            adaptive.clone(),
-            Timing::OneWay { gap_ns: 0 },
-        ),
-        ("hop@10kHz", adaptive, Timing::OneWay { gap_ns: PACE_NS }),
-    ]
-    .map(|(what, contenders, timing)| group(what, contenders, timing, regime, options))
-    .into()
+    let mut groups = vec![group("hop", Timing::RoundTrip, regime, options)];
+    if options.modes.contains(&Mode::Adaptive) {
+        let full_rate = Timing::OneWay(Duration::ZERO);
+        groups.push(group("hop@full-rate", full_rate, regime, options));
+        groups.push(group("hop@10kHz", Timing::OneWay(PACE), regime, options));
+    }
+    groups
 }
 
-fn group(
-    what: &str,
-    contenders: Vec<Contender>,
-    timing: Timing,
-    regime: Regime,
-    options: &Options,
-) -> Group {
-    let working = contenders
-        .into_iter()
-        .filter(|contender| contender.works_in(regime))
-        .map(|contender| (contender.entry(), contender));
-    let (entries, contenders) = wanted(working, options);
-    let samples = contenders
+fn group(what: &str, timing: Timing, regime: Regime, options: &Options) -> Group {
+    let takes_part = |(entry, contender): &(Entry, Contender)| {
+        let is_timed_so = match timing {
+            Timing::RoundTrip => entry.mode != Mode::Adaptive,
+            Timing::OneWay(_) => matches!(
+                contender,
+                Contender::Lager(Mode::Spin | Mode::Adaptive) | Contender::IceoryxHeader
+            ),
+        };
+        // On a shared core, whoever looks without pause keeps the sender from sending.
+        is_timed_so && (regime != Regime::SameCore || entry.mode == Mode::Block)
+    };
+    let working = Contender::ALL
         .iter()
-        .map(|contender| samples(*contender, timing))
+        .filter(|one| takes_part(one))
+        .cloned()
+        .map(|(entry, contender)| (entry, Job { contender, timing }));
+    let rows = wanted(working, options);
+    let samples = rows
+        .iter()
+        .map(|(entry, _)| samples(entry.mode, timing))
         .collect();
-    let group = Group::new(what, regime, entries, [2, 4], [0; 2], move |regime| {
-        Ok(Box::new(Hop::open(regime, contenders.clone(), timing)?))
+    let group = Group::new(what, regime, rows, [2, 4], [0; 2], move |regime, rows| {
+        let lines = lines()?;
+        // Both processes inherit the lines when they start.
+        let numbers = lines
+            .each_ref()
+            .map(|pair| pair.each_ref().map(OwnedFd::as_raw_fd));
+        let ends = [SENDER, RECEIVER];
+        let pair = Pair::<Lanes, _>::start(regime, ends, &numbers, rows, timing.gap())?;
+        Ok(Box::new(pair))
     });
     Group { samples, ..group }
 }
 
 /// Samples of a round: as many as take a fraction of a second.
-fn samples(contender: Contender, timing: Timing) -> [usize; 2] {
-    match (contender.mode(), timing.gap_ns() > 0) {
+fn samples(mode: Mode, timing: Timing) -> [usize; 2] {
+    match (mode, timing.gap().is_zero()) {
         (Mode::Block, _) => [500, 2_500],
-        (_, true) => [500, 2_000],
-        (_, false) => [5_000, 20_000],
-    }
-}
-
-/// Sender and receiver, which measure any contender.
-struct Hop {
-    pair: Pair<Lanes>,
-    // The processes have inherited them.
-    _lines: Lines<OwnedFd>,
-    contenders: Vec<Contender>,
-    timing: Timing,
-}
-
-impl Hop {
-    fn open(
-        regime: Regime,
-        contenders: Vec<Contender>,
-        timing: Timing,
-    ) -> Result<Self, BenchError> {
-        let lines = lines()?;
-        let numbers: Lines<i32> = lines.each_ref().map(|pair| {
-            pair.each_ref()
-                .map(|descriptor: &OwnedFd| descriptor.as_raw_fd())
-        });
-        Ok(Self {
-            pair: Pair::start(regime, [SENDER, RECEIVER], &numbers)?,
-            _lines: lines,
-            contenders,
-            timing,
-        })
-    }
-}
-
-impl Session for Hop {
-    /// Some samples more are sent before, to warm up.
-    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
-        let (contender, timing) = (self.contenders[index], self.timing);
-        let samples = u32::try_from(samples).unwrap_or(u32::MAX);
-        // Both give up by themselves when nothing comes; this is for those that cannot, because
-        // a bare `read` has no time-out: ten times what the slowest machine should need.
-        let limit = Duration::from_secs(60)
-            + (Duration::from_nanos(timing.gap_ns()) + Duration::from_micros(500))
-                * (samples + samples / 10);
-        let round = |number| Round {
-            contender,
-            warm_up: samples / 10 + 10,
-            samples,
-            timing,
-            number,
-            spin_ns: slow::spin_ns(),
-        };
-        let (sender, receiver): (Vec<u64>, Vec<u64>) = self.pair.round(round, limit)?;
-        if timing == Timing::RoundTrip {
-            return Ok(sender);
-        }
-        Ok(sender
-            .iter()
-            .zip(&receiver)
-            .map(|(sent, received)| received.saturating_sub(*sent))
-            .collect())
+        (_, false) => [500, 2_000],
+        (_, true) => [5_000, 20_000],
     }
 }
 

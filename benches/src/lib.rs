@@ -30,6 +30,7 @@ pub mod slow;
 mod stats;
 pub mod steps;
 pub mod times;
+mod turns;
 
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};

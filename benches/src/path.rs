@@ -30,6 +30,7 @@ mod processes;
 mod robot;
 mod services;
 mod stages;
+mod turn;
 
 use crate::error::BenchError;
 use crate::group::{Entry, Group, Session, wanted};
@@ -37,9 +38,9 @@ use crate::machine::{Bound, cores_for};
 use crate::report::{Mode, Options, Regime, Row};
 use crate::stats::Quantiles;
 use floor::Floor;
-use pace::{Chain, TURN, turn};
 use robot::Robot;
 use services::{Place, RealTime};
+use turn::{Chain, TURN, turn};
 
 pub(crate) use floor::PROCESSES as FLOOR_PROCESSES;
 pub(crate) use services::PROCESSES;
@@ -54,41 +55,30 @@ const A_SECOND: usize = 1_100;
 const SERVICES: i32 = 40;
 const BOARDS: i32 = 50;
 
-/// A row of ours or of the floor.
-const fn entry(
-    name: &'static str,
-    variant: &'static str,
-    mode: Mode,
-    against: &'static [&'static str],
-) -> Entry {
-    Entry {
-        name,
-        variant,
-        mode,
-        against,
-    }
-}
-
-const ALONE: [Entry; 3] = [
-    entry("lager", "block", Mode::Block, &["floor"]),
-    entry("floor", "", Mode::Block, &[]),
-    entry(
-        "lager",
-        "adaptive",
-        Mode::Adaptive,
-        &["lager/block", "floor"],
+/// What is measured with nobody watching, and the number of observers: 0.
+const ALONE: [(Entry, usize); 3] = [
+    (Entry::new("lager", "block", Mode::Block, &["floor"]), 0),
+    (Entry::new("floor", "", Mode::Block, &[]), 0),
+    (
+        Entry::new(
+            "lager",
+            "adaptive",
+            Mode::Adaptive,
+            &["lager/block", "floor"],
+        ),
+        0,
     ),
 ];
 
-/// With so many observers.
+/// The same with so many observers.
 const OBSERVED: [(Entry, usize); 3] = [
-    (entry("lager", "alone", Mode::Block, &[]), 0),
+    (Entry::new("lager", "alone", Mode::Block, &[]), 0),
     (
-        entry("lager", "8 observers", Mode::Block, &["lager/alone"]),
+        Entry::new("lager", "8 observers", Mode::Block, &["lager/alone"]),
         8,
     ),
     (
-        entry("lager", "64 observers", Mode::Block, &["lager/alone"]),
+        Entry::new("lager", "64 observers", Mode::Block, &["lager/alone"]),
         64,
     ),
 ];
@@ -101,79 +91,66 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
         // Nobody spins on the only core that the others have.
         options.modes.retain(|mode| *mode != Mode::Adaptive);
     }
-    let (entries, _) = wanted(ALONE.map(|entry| (entry, ())), &options);
-    let chains = entries.clone();
-    let alone = Group::new("path", regime, entries, TURNS, [TURN; 2], move |regime| {
-        Ok(Box::new(Chains::alone(regime, &chains)?))
-    });
-    if regime == Regime::SameCore {
-        return vec![alone];
-    }
-    let (entries, observers) = wanted(OBSERVED, &options);
-    let robots: Vec<_> = entries.iter().cloned().zip(observers).collect();
-    let what = "path@observed";
-    let observed = Group::new(what, regime, entries, TURNS, [TURN; 2], move |regime| {
-        Ok(Box::new(Chains::observed(regime, &robots)?))
-    });
-    vec![
-        alone,
+    let group = |what: &str, rows: [(Entry, usize); 3], is_real_time: bool| {
+        let rows = wanted(rows, &options);
+        let group = Group::new(what, regime, rows, TURNS, [TURN; 2], move |regime, rows| {
+            Ok(Box::new(Chains::start(regime, &rows, is_real_time)?))
+        });
         Group {
-            is_real_time: true,
-            ..observed
-        },
-    ]
+            is_real_time,
+            ..group
+        }
+    };
+    let mut groups = vec![group("path", ALONE, false)];
+    if regime != Regime::SameCore {
+        groups.push(group("path@observed", OBSERVED, true));
+    }
+    groups
 }
 
 /// The chains that take turns; the thread that plays their boards is bound to a core meanwhile.
 struct Chains {
     chains: Vec<Box<dyn Chain>>,
     regime: Regime,
-    /// The robots publish where the time goes; it is asked of those that nobody watches.
+    /// The robots publish where the time goes; it is asked of those that are not in real time.
     tells_stages: bool,
     _bound: Bound,
 }
 
 impl Chains {
-    /// Blocking, the floor, and adaptive.
-    fn alone(regime: Regime, entries: &[Entry]) -> Result<Self, BenchError> {
-        let [at_ends, at_logic] = places(regime, None)?;
-        let start = |entry: &Entry| -> Result<Box<dyn Chain>, BenchError> {
-            Ok(if entry.name == "floor" {
-                Box::new(Floor::start(at_ends, at_logic)?)
-            } else {
-                Box::new(Robot::start(&entry.label(), entry.mode, at_ends, at_logic)?)
-            })
-        };
-        Self::of(regime, entries.iter().map(start), true)
-    }
-
-    /// With nobody watching, and with observers; services and boards in real time.
-    fn observed(regime: Regime, robots: &[(Entry, usize)]) -> Result<Self, BenchError> {
-        let [at_ends, at_logic] = places(regime, Some(SERVICES))?;
+    /// Robots, each with so many observers, and the floor; services and boards in real time, if
+    /// that is wanted.
+    fn start(
+        regime: Regime,
+        rows: &[(Entry, usize)],
+        is_real_time: bool,
+    ) -> Result<Self, BenchError> {
+        let (ends, logic) = cores_for(regime)?;
+        let [ends, logic] = [ends, logic].map(|core| Place {
+            core: Some(core),
+            priority: is_real_time.then_some(SERVICES),
+        });
         let start = |(entry, observers): &(Entry, usize)| -> Result<Box<dyn Chain>, BenchError> {
-            let mut robot = Robot::start(&entry.label(), entry.mode, at_ends, at_logic)?;
+            if entry.name == "floor" {
+                return Ok(Box::new(Floor::start(ends, logic)?));
+            }
+            let mut robot = Robot::start(&entry.label(), entry.mode, ends, logic)?;
             robot.observed_by(*observers)?;
-            robot.with_boards_at(BOARDS)?;
+            if is_real_time {
+                robot.with_boards_at(BOARDS)?;
+            }
             Ok(Box::new(robot))
         };
-        Self::of(regime, robots.iter().map(start), false)
-    }
-
-    fn of(
-        regime: Regime,
-        started: impl Iterator<Item = Result<Box<dyn Chain>, BenchError>>,
-        tells_stages: bool,
-    ) -> Result<Self, BenchError> {
         let mut chains = Vec::new();
-        for chain in started {
-            let mut chain = chain?;
-            chain.end()?;
+        for row in rows {
+            let mut chain = start(row)?;
+            chain.processes().rest();
             chains.push(chain);
         }
         Ok(Self {
             chains,
             regime,
-            tells_stages,
+            tells_stages: !is_real_time,
             // Last of all: what a thread starts inherits its core.
             _bound: Bound::to(cores_for(regime)?.0)?,
         })
@@ -190,7 +167,7 @@ impl Session for Chains {
         let mut more = Vec::new();
         for (row, chain) in rows.iter_mut().zip(&mut self.chains) {
             if self.tells_stages {
-                row.cpu_percent = chain.cpu_percent();
+                row.cpu_percent = chain.processes().cpu_percent();
             }
             if row.name == "floor" {
                 continue;
@@ -216,15 +193,6 @@ impl Session for Chains {
         rows.extend(more);
         Ok(())
     }
-}
-
-/// Where bridge and boards are, and where logic is.
-fn places(regime: Regime, priority: Option<i32>) -> Result<[Place; 2], BenchError> {
-    let (ends, logic) = cores_for(regime)?;
-    Ok([ends, logic].map(|core| Place {
-        core: Some(core),
-        priority,
-    }))
 }
 
 /// Whether this process may have real time, without which nothing is `path@observed`.

@@ -18,21 +18,17 @@
 mod readers;
 mod writer;
 
-use core::sync::atomic::AtomicU64;
 use core::time::Duration;
 
-use lager_rig::Shareable;
 use lager_rig::process::Main;
 use lager_topics::{OBSERVERS, Qos, Topic};
 use serde::{Deserialize, Serialize};
 
-use crate::baseline::Fault;
-use crate::error::BenchError;
-use crate::group::{Entry, Group, Session, wanted};
-use crate::pair::{Pair, Side};
+use crate::group::{Entry, Group, wanted};
+use crate::pair::{self, Pair};
 use crate::report::{Mode, Options, Regime};
 use crate::sample::{Ping, Sample};
-use crate::slow;
+use crate::turns::Turns;
 
 const WRITER: &str = "writer of ring-64";
 const READERS: &str = "readers of ring-64";
@@ -111,12 +107,7 @@ impl Contender {
             Self::Notify(Listeners::Actor) => ("iceoryx2", "notify-1", &[]),
             Self::Event(Listeners::Actor) => ("iceoryx2", "event-1", &[]),
         };
-        Entry {
-            name,
-            variant,
-            mode,
-            against,
-        }
+        Entry::new(name, variant, mode, against)
     }
 }
 
@@ -124,17 +115,20 @@ impl Contender {
 /// that looks.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     let group = |mode: Mode| {
-        let all = Contender::ALL.map(|contender| (contender.entry(mode), contender));
-        let (entries, contenders) = wanted(all, options);
-        let open = move |regime| {
-            let ring = Ring {
-                pair: Pair::start(regime, [WRITER, READERS], &())?,
-                contenders: contenders.clone(),
-                mode,
-            };
-            Ok(Box::new(ring) as Box<dyn Session>)
-        };
-        Group::new("ring-64", regime, entries, [2, 4], [100, 500], open)
+        let job = |contender: Contender| (contender.entry(mode), Job { contender, mode });
+        let rows = wanted(Contender::ALL.map(job), options);
+        Group::new(
+            "ring-64",
+            regime,
+            rows,
+            [2, 4],
+            [100, 500],
+            |regime, rows| {
+                let ends = [WRITER, READERS];
+                let pair = Pair::<Turns, _>::start(regime, ends, &(), rows, Duration::ZERO)?;
+                Ok(Box::new(pair))
+            },
+        )
     };
     [Mode::Spin, Mode::Block]
         .into_iter()
@@ -144,64 +138,25 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
         .collect()
 }
 
-/// What writer and readers share.
-#[derive(Debug)]
-#[repr(C)]
-struct Ready {
-    /// The sample that the readers are ready for.
-    number: AtomicU64,
-}
-
-// SAFETY: atomics only.
-#[allow(unsafe_code)]
-unsafe impl Shareable for Ready {}
-
+/// What is measured in a round.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct Round {
+struct Job {
     contender: Contender,
     mode: Mode,
-    samples: usize,
-    number: u32,
-    /// A deliberate slow-down of each sample, in ns.
-    spin_ns: u64,
 }
 
-impl Round {
-    /// The numbers of the samples; those of [`Contender::Ring`] come in pairs.
-    fn all(&self) -> impl Iterator<Item = u64> {
-        let base = u64::from(self.number) << 32;
-        let each = match self.contender {
-            Contender::Ring => 2,
-            _ => 1,
-        };
-        (1..=each * self.samples as u64).map(move |sample| base + sample)
-    }
+type Round = pair::Round<Job>;
 
-    fn failed(&self, sample: u64, fault: Fault) -> BenchError {
-        fault.of(&self.contender.entry(self.mode).label(), sample)
-    }
-}
-
-struct Ring {
-    pair: Pair<Ready>,
-    contenders: Vec<Contender>,
-    mode: Mode,
-}
-
-impl Session for Ring {
-    fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
-        const PATIENCE: Duration = Duration::from_secs(60);
-        let (contender, mode) = (self.contenders[index], self.mode);
-        let round = |number| Round {
-            contender,
-            mode,
-            samples,
-            number,
-            spin_ns: slow::spin_ns(),
-        };
-        self.pair.round(round, PATIENCE).map(|(times, ())| times)
-    }
+/// The samples of a round; those of [`Contender::Ring`] come in pairs.
+fn samples(round: &Round) -> impl Iterator<Item = u64> {
+    let each = match round.what.contender {
+        Contender::Ring => 2,
+        _ => 1,
+    };
+    round
+        .all()
+        .flat_map(move |sample| (0..each).map(move |part| 2 * sample + part))
 }
 
 /// What each of the two has at hand.
-type Own = Side<Ready, ()>;
+type Own = pair::Side<Turns, ()>;

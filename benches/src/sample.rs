@@ -1,66 +1,91 @@
-//! What the scenarios send between two processes: 64 bytes whose every word is checked, and the
-//! topics of the typed ports for them.
+//! What the scenarios send between processes: blocks of words that are checked, and the topics of
+//! the typed ports for them.
 
-use lager_topics::{Qos, Role, SensorLine, Topic, payload};
+use iceoryx2::prelude::ZeroCopySend;
+use lager_topics::{
+    Field, FieldInfo, Make, Payload, Qos, Role, Schema, SensorLine, StructInfo, Topic,
+};
+use serde::{Deserialize, Serialize};
 
-payload! {
-    /// A payload of 64 bytes.
-    pub struct Sample: 64 bytes {
-        /// Which one it is, unique within a measurement.
-        pub number: u64,
-        /// What follows from the number.
-        pub rest: [u64; 7],
-    }
+/// A payload of `WORDS` words of eight bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Block<const WORDS: usize> {
+    /// The first one is the number of the block.
+    #[serde(with = "lager_topics::list")]
+    pub(crate) words: [u64; WORDS],
 }
+
+/// A payload of 64 bytes.
+pub(crate) type Sample = Block<8>;
 
 /// Bytes of a sample.
 pub(crate) const SIZE: usize = size_of::<Sample>();
 
-impl Sample {
-    /// The sample with that number.
+impl<const WORDS: usize> Block<WORDS> {
+    /// The block with that number, from which all its words follow.
     pub(crate) fn new(number: u64) -> Self {
         Self {
-            number,
-            rest: core::array::from_fn(|index| number ^ index as u64),
+            words: core::array::from_fn(|index| number ^ index as u64),
         }
     }
 
-    /// Whether every word is what [`Sample::new`] wrote.
+    /// Which one it is, unique within a measurement.
+    pub(crate) const fn number(&self) -> u64 {
+        self.words[0]
+    }
+
+    /// Whether every word is what [`Block::new`] wrote.
     pub(crate) fn is_whole(&self) -> bool {
-        *self == Self::new(self.number)
+        *self == Self::new(self.number())
     }
 
-    /// As eight words.
-    pub(crate) fn words(&self) -> [u64; 8] {
-        let mut words = [self.number; 8];
-        words[1..].copy_from_slice(&self.rest);
-        words
-    }
-
-    /// From eight words.
-    pub(crate) fn from_words(words: [u64; 8]) -> Self {
-        let [number, rest @ ..] = words;
-        Self { number, rest }
-    }
-
-    /// As bytes, for what carries bytes only.
-    pub(crate) fn bytes(&self) -> [u8; SIZE] {
-        let mut bytes = [0; SIZE];
-        for (to, word) in bytes.chunks_exact_mut(8).zip(self.words()) {
-            to.copy_from_slice(&word.to_ne_bytes());
+    /// From its bytes ([`lager_topics::bytes_of`]); what is missing of them is 0.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
+        let mut block = Self::default();
+        for (word, bytes) in block.words.iter_mut().zip(bytes.chunks_exact(8)) {
+            *word = u64::from_ne_bytes(bytes.try_into().expect("chunks of eight"));
         }
-        bytes
-    }
-
-    /// From bytes.
-    pub(crate) fn from_bytes(bytes: &[u8; SIZE]) -> Self {
-        Self::from_words(core::array::from_fn(|index| {
-            let mut word = [0; 8];
-            word.copy_from_slice(&bytes[8 * index..8 * index + 8]);
-            u64::from_ne_bytes(word)
-        }))
+        block
     }
 }
+
+// SAFETY: `repr(C)`, words without padding, no pointer inside.
+#[allow(unsafe_code)]
+unsafe impl<const WORDS: usize> ZeroCopySend for Block<WORDS> {
+    unsafe fn type_name() -> &'static str {
+        <Self as Schema>::TYPE_NAME
+    }
+}
+
+// SAFETY: words, of which any bits are one, without padding.
+#[allow(unsafe_code)]
+unsafe impl<const WORDS: usize> Field for Block<WORDS> {
+    const MAKE: Make = Make::Record(StructInfo::of::<Self>());
+    const SHAPE: u64 = <Self as Schema>::HASH;
+    const BLANK: Self = Self { words: [0; WORDS] };
+}
+
+impl<const WORDS: usize> Default for Block<WORDS> {
+    fn default() -> Self {
+        Self::BLANK
+    }
+}
+
+impl<const WORDS: usize> Schema for Block<WORDS> {
+    const TYPE_NAME: &'static str = "lager::bench::Block";
+    // It lives no longer than a measurement, in which all processes are one executable.
+    const HASH: u64 = WORDS as u64;
+    const FIELDS: &'static [FieldInfo] = &[FieldInfo {
+        name: "words",
+        type_name: "[u64]",
+        offset: 0,
+        size: 8 * WORDS,
+        make: <[u64; WORDS]>::MAKE,
+    }];
+}
+
+impl<const WORDS: usize> Payload for Block<WORDS> {}
 
 /// From the sender to the receiver; as wide and deep as `sensor/line`.
 pub(crate) struct Ping;
@@ -97,20 +122,20 @@ pub(crate) const RECEIVER: Role = Role::Logic;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lager_topics::bytes_of;
 
     #[test]
     fn a_sample_is_the_same_whatever_carried_it() {
         let sample = Sample::new(0x0123_4567_89ab_cdef);
         assert_eq!(SIZE, 64);
-        assert_eq!(Sample::from_words(sample.words()), sample);
-        assert_eq!(Sample::from_bytes(&sample.bytes()), sample);
+        assert_eq!(Sample::from_bytes(bytes_of(&sample)), sample);
     }
 
     #[test]
     fn a_changed_word_is_noticed() {
-        let mut words = Sample::new(9).words();
-        assert!(Sample::from_words(words).is_whole());
-        words[5] ^= 1 << 40;
-        assert!(!Sample::from_words(words).is_whole());
+        let mut sample = Sample::new(9);
+        assert!(sample.is_whole());
+        sample.words[5] ^= 1 << 40;
+        assert!(!sample.is_whole());
     }
 }

@@ -19,6 +19,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
     LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level,
 };
+use iceoryx2::service::port_factory::{event, publish_subscribe};
 use lager_ports::{BusConfig, Clock};
 use lager_topics::{Qos, Stamp};
 
@@ -95,46 +96,62 @@ impl Member {
             .config(config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create()
-            .map_err(|error| failed("bare iceoryx2 could not be joined", error))?;
+            .map_err(|error| failed("a node", error))?;
         Ok(Self { node })
     }
 
-    /// A publisher of samples; `None` leaves iceoryx2's limits as they are.
-    pub(crate) fn publisher<H: Header>(
+    /// A publisher of any payload; `None` leaves iceoryx2's limits as they are.
+    pub(crate) fn publisher<P: Debug + ZeroCopySend, H: Header>(
         &self,
         name: &str,
         limits: Option<&Qos>,
-    ) -> Result<Publisher<ipc::Service, Sample, H>, BenchError> {
-        patiently("a publisher of bare iceoryx2 could not be made", || {
-            let service = self.topic::<Sample, H>(name, limits)?;
-            Ok(service.publisher_builder().create()?)
+    ) -> Result<Publisher<ipc::Service, P, H>, BenchError> {
+        patiently("a publisher", || {
+            Ok(self.topic(name, limits)?.publisher_builder().create()?)
         })
     }
 
-    /// A subscriber to samples; limits as for the publisher.
-    pub(crate) fn subscriber<H: Header>(
+    /// A subscriber; limits as for the publisher.
+    pub(crate) fn subscriber<P: Debug + ZeroCopySend, H: Header>(
         &self,
         name: &str,
         limits: Option<&Qos>,
-    ) -> Result<Subscriber<ipc::Service, Sample, H>, BenchError> {
-        patiently("a subscriber of bare iceoryx2 could not be made", || {
-            let service = self.topic::<Sample, H>(name, limits)?;
-            Ok(service.subscriber_builder().create()?)
+    ) -> Result<Subscriber<ipc::Service, P, H>, BenchError> {
+        patiently("a subscriber", || {
+            Ok(self.topic(name, limits)?.subscriber_builder().create()?)
         })
     }
 
-    /// A topic of any payload; limits as for the publisher.
-    pub(crate) fn topic<P: Debug + ZeroCopySend, H: Header>(
+    /// What rings at every listener of an event.
+    pub(crate) fn notifier(
+        &self,
+        name: &str,
+        listeners: usize,
+    ) -> Result<Notifier<ipc::Service>, BenchError> {
+        patiently("a notifier", || {
+            Ok(self.event(name, listeners)?.notifier_builder().create()?)
+        })
+    }
+
+    /// What is rung at.
+    pub(crate) fn listener(
+        &self,
+        name: &str,
+        listeners: usize,
+    ) -> Result<Listener<ipc::Service>, BenchError> {
+        patiently("a listener", || {
+            Ok(self.event(name, listeners)?.listener_builder().create()?)
+        })
+    }
+
+    fn topic<P: Debug + ZeroCopySend, H: Header>(
         &self,
         name: &str,
         limits: Option<&Qos>,
-    ) -> Result<
-        iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, P, H>,
-        BenchError,
-    > {
+    ) -> Result<publish_subscribe::PortFactory<ipc::Service, P, H>, Box<dyn Error>> {
         let builder = self
             .node
-            .service_builder(&service_name(name))
+            .service_builder(&ServiceName::new(name)?)
             .publish_subscribe::<P>()
             .user_header::<H>();
         let builder = match limits {
@@ -148,70 +165,42 @@ impl Member {
                 .history_size(qos.history)
                 .enable_safe_overflow(true),
         };
-        builder
-            .open_or_create()
-            .map_err(|error| failed("a service of bare iceoryx2 could not be opened", error))
-    }
-
-    /// What rings at every listener of an event.
-    pub(crate) fn notifier(
-        &self,
-        name: &str,
-        listeners: usize,
-    ) -> Result<Notifier<ipc::Service>, BenchError> {
-        patiently("a notifier of bare iceoryx2 could not be made", || {
-            Ok(self.event(name, listeners)?.notifier_builder().create()?)
-        })
-    }
-
-    /// What is rung at.
-    pub(crate) fn listener(
-        &self,
-        name: &str,
-        listeners: usize,
-    ) -> Result<Listener<ipc::Service>, BenchError> {
-        patiently("a listener of bare iceoryx2 could not be made", || {
-            Ok(self.event(name, listeners)?.listener_builder().create()?)
-        })
+        Ok(builder.open_or_create()?)
     }
 
     fn event(
         &self,
         name: &str,
         listeners: usize,
-    ) -> Result<iceoryx2::service::port_factory::event::PortFactory<ipc::Service>, BenchError> {
-        self.node
-            .service_builder(&service_name(name))
+    ) -> Result<event::PortFactory<ipc::Service>, Box<dyn Error>> {
+        Ok(self
+            .node
+            .service_builder(&ServiceName::new(name)?)
             .event()
             .max_listeners(listeners)
             // Each wake looks at every id there may be, so one is the fastest.
             .event_id_max_value(0)
-            .open_or_create()
-            .map_err(|error| failed("an event of bare iceoryx2 could not be opened", error))
+            .open_or_create()?)
     }
 }
 
 /// What `lager config --iceoryx2` shows.
 fn config(bus: &BusConfig) -> Result<Config, BenchError> {
-    const WHAT: &str = "bare iceoryx2 could not be configured";
+    const WHAT: &str = "its configuration";
     let shown = bus.iceoryx2_toml().map_err(|error| failed(WHAT, error))?;
     toml::from_str(&shown).map_err(|error| failed(WHAT, error))
 }
 
-fn service_name(name: &str) -> ServiceName {
-    ServiceName::new(name).expect("the scenarios' names are short")
-}
-
-fn failed(what: &'static str, detail: impl Debug) -> BenchError {
+fn failed(what: &str, detail: impl Debug) -> BenchError {
     BenchError::Bus {
-        what,
-        detail: format!("{detail:?}"),
+        what: "bare iceoryx2",
+        detail: format!("{what} could not be had: {detail:?}"),
     }
 }
 
 /// Tries again while the other process is in the middle of creating or removing the same thing.
 fn patiently<T>(
-    what: &'static str,
+    what: &str,
     mut attempt: impl FnMut() -> Result<T, Box<dyn Error>>,
 ) -> Result<T, BenchError> {
     const PATIENCE: Duration = Duration::from_secs(3);
@@ -283,14 +272,11 @@ impl<H: Header> End for Polling<H> {
     }
 }
 
-/// Both directions with a receiver that sleeps on an event.
+/// The same with a receiver that sleeps on an event.
 pub(crate) struct Listening {
-    sender: Sender<Stamp>,
-    subscriber: Subscriber<ipc::Service, Sample, Stamp>,
     notifier: Notifier<ipc::Service>,
     listener: Listener<ipc::Service>,
-    // The ports need it to live.
-    _member: Member,
+    ports: Polling<Stamp>,
 }
 
 impl Listening {
@@ -303,35 +289,28 @@ impl Listening {
         // As many as iceoryx2 allows by default.
         const LISTENERS: usize = 16;
         Ok(Self {
-            subscriber: member.subscriber(back, Some(limits))?,
             listener: member.listener(back, LISTENERS)?,
-            sender: Sender::new(member.publisher(out, Some(limits))?),
             notifier: member.notifier(out, LISTENERS)?,
-            _member: member,
+            ports: Polling::new(member, (out, back), Some(limits))?,
         })
     }
 }
 
 impl End for Listening {
     fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.sender.send(sample)?;
+        self.ports.send(sample)?;
         self.notifier.notify().map_err(broken)?;
         Ok(())
     }
 
     fn receive(&mut self) -> Result<Sample, Fault> {
-        sleep_until(|| receive(&self.subscriber), || sleep(&self.listener))
+        let sleep = || match self.listener.timed_wait(|_| (), TIME_OUT) {
+            Ok(0) => Ok(Slept::TimedOut),
+            Ok(_) => Ok(Slept::Woken),
+            Err(error) => Err(broken(error)),
+        };
+        sleep_until(|| receive(&self.ports.subscriber), sleep)
     }
-}
-
-/// Sleeps until the event is notified, at most [`TIME_OUT`].
-pub(crate) fn sleep(listener: &Listener<ipc::Service>) -> Result<Slept, Fault> {
-    let rings = listener.timed_wait(|_| (), TIME_OUT).map_err(broken)?;
-    Ok(if rings == 0 {
-        Slept::TimedOut
-    } else {
-        Slept::Woken
-    })
 }
 
 /// The next sample, if there is one.
@@ -354,7 +333,7 @@ mod tests {
 
     #[test]
     fn the_same_limits_are_those_of_the_typed_ports_and_not_the_defaults() {
-        let domain = Domain::new("lager-bench").unwrap();
+        let domain = Domain::new(crate::FAMILY).unwrap();
         let ours = config(&domain.config()).unwrap();
         let places = |config: &Config| {
             let streams = &config.defaults.publish_subscribe;

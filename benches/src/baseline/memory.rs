@@ -8,31 +8,29 @@ use rustix::thread::futex;
 use rustix::time::Timespec;
 
 use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
-use crate::sample::Sample;
+use crate::sample::{Block, Sample};
 
-/// One cache line that holds a sample; the number is written last.
+/// A cache line that holds a block; the number is written last.
 #[derive(Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Slot {
-    words: [AtomicU64; 8],
+pub(crate) struct Slot<const WORDS: usize> {
+    words: [AtomicU64; WORDS],
 }
 
-impl Slot {
-    pub(crate) fn write(&self, sample: &Sample) {
-        let words = sample.words();
-        for (to, word) in self.words.iter().zip(words).skip(1) {
+impl<const WORDS: usize> Slot<WORDS> {
+    pub(crate) fn write(&self, block: &Block<WORDS>) {
+        for (to, word) in self.words.iter().zip(block.words).skip(1) {
             to.store(word, Ordering::Relaxed);
         }
-        self.words[0].store(words[0], Ordering::Release);
+        self.words[0].store(block.number(), Ordering::Release);
     }
 
-    pub(crate) fn read(&self) -> Sample {
-        let number = self.words[0].load(Ordering::Acquire);
-        let mut words = [number; 8];
+    pub(crate) fn read(&self) -> Block<WORDS> {
+        let mut words = [self.number(); WORDS];
         for (word, from) in words.iter_mut().zip(&self.words).skip(1) {
             *word = from.load(Ordering::Relaxed);
         }
-        Sample::from_words(words)
+        Block { words }
     }
 
     fn number(&self) -> u64 {
@@ -71,23 +69,23 @@ impl Word {
     }
 }
 
-/// What both directions of a line need of shared memory.
+/// What one direction of a line needs of shared memory.
 #[derive(Debug)]
 #[repr(C)]
-pub(crate) struct Lane {
-    pub(crate) slot: Slot,
+pub(crate) struct Lane<const WORDS: usize> {
+    pub(crate) slot: Slot<WORDS>,
     pub(crate) word: Word,
 }
 
 /// A cache line each way, watched without pause.
 pub(crate) struct CacheLine<'memory> {
-    out: &'memory Slot,
-    back: &'memory Slot,
+    out: &'memory Slot<8>,
+    back: &'memory Slot<8>,
     seen: u64,
 }
 
 impl<'memory> CacheLine<'memory> {
-    pub(crate) fn new(out: &'memory Lane, back: &'memory Lane) -> Self {
+    pub(crate) fn new(out: &'memory Lane<8>, back: &'memory Lane<8>) -> Self {
         Self {
             out: &out.slot,
             back: &back.slot,
@@ -106,20 +104,20 @@ impl End for CacheLine<'_> {
         let (back, seen) = (self.back, self.seen);
         spin(|| Ok((back.number() != seen).then_some(())))?;
         let sample = back.read();
-        self.seen = sample.number;
+        self.seen = sample.number();
         Ok(sample)
     }
 }
 
 /// A cache line each way, and a futex to sleep on.
 pub(crate) struct Futex<'memory> {
-    out: &'memory Lane,
-    back: &'memory Lane,
+    out: &'memory Lane<8>,
+    back: &'memory Lane<8>,
     seen: u32,
 }
 
 impl<'memory> Futex<'memory> {
-    pub(crate) fn new(out: &'memory Lane, back: &'memory Lane) -> Self {
+    pub(crate) fn new(out: &'memory Lane<8>, back: &'memory Lane<8>) -> Self {
         Self {
             out,
             back,
@@ -149,16 +147,16 @@ impl End for Futex<'_> {
 
 /// A cache line each way, and an eventfd to sleep on, without a time-out.
 pub(crate) struct EventFd<'memory> {
-    out: &'memory Slot,
-    back: &'memory Slot,
+    out: &'memory Slot<8>,
+    back: &'memory Slot<8>,
     ring: &'memory OwnedFd,
     bell: &'memory OwnedFd,
 }
 
 impl<'memory> EventFd<'memory> {
     pub(crate) fn new(
-        (out, ring): (&'memory Lane, &'memory OwnedFd),
-        (back, bell): (&'memory Lane, &'memory OwnedFd),
+        (out, ring): (&'memory Lane<8>, &'memory OwnedFd),
+        (back, bell): (&'memory Lane<8>, &'memory OwnedFd),
     ) -> Self {
         Self {
             out: &out.slot,
@@ -189,7 +187,7 @@ mod tests {
     use lager_rig::{Shareable, Shared};
 
     #[repr(C)]
-    struct Lanes([Lane; 2]);
+    struct Lanes([Lane<8>; 2]);
 
     // SAFETY: atomics only.
     #[allow(unsafe_code)]
@@ -211,26 +209,14 @@ mod tests {
     }
 
     #[test]
-    fn samples_come_back_over_a_cache_line() {
+    fn samples_come_back_over_each_of_them() {
+        use rustix::event::{EventfdFlags, eventfd};
         let memory = Shared::<Lanes>::new().unwrap();
         let [there, back] = &memory.0;
         there_and_back(CacheLine::new(there, back), CacheLine::new(back, there));
-    }
-
-    #[test]
-    fn samples_come_back_over_a_futex() {
-        let memory = Shared::<Lanes>::new().unwrap();
-        let [there, back] = &memory.0;
         there_and_back(Futex::new(there, back), Futex::new(back, there));
-    }
-
-    #[test]
-    fn samples_come_back_over_an_eventfd() {
-        use rustix::event::{EventfdFlags, eventfd};
-        let memory = Shared::<Lanes>::new().unwrap();
         let bells = [0, 1].map(|_| eventfd(0, EventfdFlags::CLOEXEC).unwrap());
-        let there = (&memory.0[0], &bells[0]);
-        let back = (&memory.0[1], &bells[1]);
+        let [there, back] = [(there, &bells[0]), (back, &bells[1])];
         there_and_back(EventFd::new(there, back), EventFd::new(back, there));
     }
 }

@@ -4,6 +4,7 @@
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::os::fd::OwnedFd;
 
+use lager_topics::bytes_of;
 use rustix::io::{Errno, FdFlags, fcntl_setfd, read, write};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
 use rustix::pipe::pipe;
@@ -20,7 +21,7 @@ pub(crate) struct Stream<'line> {
 impl End for Stream<'_> {
     fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
         // All three take 64 bytes whole while there is room, and one sample is on its way at a time.
-        match write(self.out, &sample.bytes())? {
+        match write(self.out, bytes_of(sample))? {
             SIZE => Ok(()),
             short => Err(Fault::Broken(format!(
                 "only {short} of {SIZE} bytes went out"

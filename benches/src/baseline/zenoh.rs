@@ -18,6 +18,7 @@ use core::fmt::Display;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use lager_topics::bytes_of;
 use serde_json::json;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -85,18 +86,18 @@ impl Peer {
 
 impl End for Peer {
     fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.publisher.put(sample.bytes()).wait().map_err(broken)
+        let bytes = bytes_of(sample);
+        self.publisher.put(bytes).wait().map_err(broken)
     }
 
     fn receive(&mut self) -> Result<Sample, Fault> {
         let received = self.subscriber.recv_timeout(LIMIT).map_err(broken)?;
         let received = received.ok_or(Fault::Silent)?;
         let bytes = received.payload().to_bytes();
-        match <&[u8; SIZE]>::try_from(&*bytes) {
-            Ok(bytes) => Ok(Sample::from_bytes(bytes)),
-            Err(_) => Err(Fault::Broken(format!(
-                "{} bytes came, and a sample has {SIZE}",
-                bytes.len()
+        match bytes.len() {
+            SIZE => Ok(Sample::from_bytes(&bytes)),
+            other => Err(Fault::Broken(format!(
+                "{other} bytes came, and a sample has {SIZE}"
             ))),
         }
     }

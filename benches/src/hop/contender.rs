@@ -1,11 +1,9 @@
 //! What takes part in the hop, and what is compared with what.
 
-use core::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use crate::group::Entry;
-use crate::report::{Mode, Regime};
+use crate::report::Mode;
 
 /// What carries the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,76 +35,51 @@ pub(super) enum Contender {
     Zenoh,
 }
 
-/// How many take part; one is there only with its feature.
-const COUNT: usize = if cfg!(feature = "zenoh") { 14 } else { 13 };
-
 impl Contender {
-    /// Everything that takes part, in the order of the tables.
-    pub(super) const ALL: [Self; COUNT] = [
-        Self::Lager(Mode::Spin),
-        Self::IceoryxHeader,
-        Self::IceoryxBare,
-        Self::IceoryxDefaults,
-        Self::CacheLine,
-        Self::Lager(Mode::Adaptive),
-        Self::Lager(Mode::Block),
-        Self::IceoryxEvent,
-        Self::Futex,
-        Self::EventFd,
-        Self::Pipe,
-        Self::Uds,
-        Self::Tcp,
-        #[cfg(feature = "zenoh")]
-        Self::Zenoh,
-    ];
-
-    /// How its receiver waits.
-    pub(super) const fn mode(self) -> Mode {
-        self.entry().mode
-    }
-
-    /// Whether it works in `regime`: on a shared core, whoever looks without pause keeps the
-    /// sender from sending.
-    pub(super) fn works_in(self, regime: Regime) -> bool {
-        regime != Regime::SameCore || self.mode() == Mode::Block
-    }
-
-    /// Its row, and what that is compared with.
-    pub(super) const fn entry(self) -> Entry {
+    /// Everything that takes part, in the order of the tables: its row, and what that is compared
+    /// with.
+    pub(super) const ALL: &[(Entry, Self)] = {
         const SPINNING: &[&str] = &["iceoryx2/header"];
         const SLEEPING: &[&str] = &["iceoryx2/event"];
         const SPIN: &[&str] = &["iceoryx2/header", "iceoryx2/bare", "iceoryx2/defaults"];
         const BLOCK: &[&str] = &["iceoryx2/event", "futex"];
-        let (name, variant, mode, against): (_, _, _, &[&str]) = match self {
-            Self::Lager(Mode::Spin) => ("lager", "", Mode::Spin, SPIN),
-            Self::Lager(Mode::Adaptive) => ("lager", "", Mode::Adaptive, SPINNING),
-            Self::Lager(Mode::Block) => ("lager", "", Mode::Block, BLOCK),
-            Self::IceoryxHeader => ("iceoryx2", "header", Mode::Spin, &[]),
-            Self::IceoryxBare => ("iceoryx2", "bare", Mode::Spin, SPINNING),
-            Self::IceoryxDefaults => ("iceoryx2", "defaults", Mode::Spin, SPINNING),
-            Self::IceoryxEvent => ("iceoryx2", "event", Mode::Block, &[]),
-            Self::CacheLine => ("cacheline", "", Mode::Spin, SPINNING),
-            Self::Futex => ("futex", "", Mode::Block, SLEEPING),
-            Self::EventFd => ("eventfd", "", Mode::Block, SLEEPING),
-            Self::Pipe => ("pipe", "", Mode::Block, SLEEPING),
-            Self::Uds => ("uds", "", Mode::Block, SLEEPING),
-            Self::Tcp => ("tcp", "", Mode::Block, SLEEPING),
-            #[cfg(feature = "zenoh")]
-            Self::Zenoh => ("zenoh", "", Mode::Block, SLEEPING),
-        };
-        Entry {
-            name,
-            variant,
-            mode,
-            against,
+        const fn spins(
+            name: &'static str,
+            variant: &'static str,
+            against: &'static [&'static str],
+        ) -> Entry {
+            Entry::new(name, variant, Mode::Spin, against)
         }
-    }
-}
-
-impl fmt::Display for Contender {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} {}", self.entry().label(), self.mode())
-    }
+        const fn sleeps(name: &'static str, against: &'static [&'static str]) -> Entry {
+            Entry::new(name, "", Mode::Block, against)
+        }
+        &[
+            (spins("lager", "", SPIN), Self::Lager(Mode::Spin)),
+            (spins("iceoryx2", "header", &[]), Self::IceoryxHeader),
+            (spins("iceoryx2", "bare", SPINNING), Self::IceoryxBare),
+            (
+                spins("iceoryx2", "defaults", SPINNING),
+                Self::IceoryxDefaults,
+            ),
+            (spins("cacheline", "", SPINNING), Self::CacheLine),
+            (
+                Entry::new("lager", "", Mode::Adaptive, SPINNING),
+                Self::Lager(Mode::Adaptive),
+            ),
+            (sleeps("lager", BLOCK), Self::Lager(Mode::Block)),
+            (
+                Entry::new("iceoryx2", "event", Mode::Block, &[]),
+                Self::IceoryxEvent,
+            ),
+            (sleeps("futex", SLEEPING), Self::Futex),
+            (sleeps("eventfd", SLEEPING), Self::EventFd),
+            (sleeps("pipe", SLEEPING), Self::Pipe),
+            (sleeps("uds", SLEEPING), Self::Uds),
+            (sleeps("tcp", SLEEPING), Self::Tcp),
+            #[cfg(feature = "zenoh")]
+            (sleeps("zenoh", SLEEPING), Self::Zenoh),
+        ]
+    };
 }
 
 #[cfg(test)]
@@ -115,26 +88,12 @@ mod tests {
 
     #[test]
     fn whatever_is_compared_with_is_there_once() {
-        let labels: Vec<String> = Contender::ALL
-            .iter()
-            .map(|one| one.entry().label())
-            .collect();
-        for contender in Contender::ALL {
-            for label in contender.entry().against {
-                let found = labels.iter().filter(|other| other == label).count();
-                assert_eq!(found, 1, "{contender} against {label}");
+        let labels = || Contender::ALL.iter().map(|(entry, _)| entry.label());
+        for (entry, contender) in Contender::ALL {
+            for label in entry.against {
+                let found = labels().filter(|other| other == label).count();
+                assert_eq!(found, 1, "{contender:?} against {label}");
             }
-        }
-    }
-
-    #[test]
-    fn nobody_spins_on_a_shared_core() {
-        for contender in Contender::ALL {
-            assert_eq!(
-                contender.works_in(Regime::SameCore),
-                contender.mode() == Mode::Block
-            );
-            assert!(contender.works_in(Regime::Plain));
         }
     }
 }

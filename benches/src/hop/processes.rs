@@ -1,6 +1,7 @@
 //! The two processes of the hop: the sender times each sample's way, the receiver sends back what
 //! it receives.
 
+use core::time::Duration;
 use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};
 
@@ -11,22 +12,21 @@ use serde::{Deserialize, Serialize};
 
 use super::contender::Contender;
 use super::ours::Ours;
+use crate::baseline::End;
 use crate::baseline::iceoryx::{Header, Listening, Member, Polling};
 use crate::baseline::memory::{CacheLine, EventFd, Futex, Lane};
 use crate::baseline::stream::Stream;
 #[cfg(feature = "zenoh")]
 use crate::baseline::zenoh;
-use crate::baseline::{End, Fault};
 use crate::error::BenchError;
-use crate::pair::Side;
+use crate::pair::{self, Side};
 use crate::report::Mode;
 use crate::sample::{self, Ping, Pong, Sample};
-use crate::slow;
 
 /// What sender and receiver write into, in shared memory.
 #[derive(Debug)]
 #[repr(C)]
-pub(super) struct Lanes([Lane; 2]);
+pub(super) struct Lanes([Lane<8>; 2]);
 
 // SAFETY: atomics only.
 #[allow(unsafe_code)]
@@ -50,60 +50,30 @@ pub(super) enum Timing {
     /// As half of the round trip, as fast as samples come back. One clock, at one end; a tail shows
     /// by half.
     RoundTrip,
-    /// By itself, from the sender's clock to the receiver's.
-    OneWay {
-        /// From one sample to the next, at least; 0 is as fast as they come back. In ns.
-        gap_ns: u64,
-    },
+    /// By itself, from the sender's clock to the receiver's, with at least so long from one sample
+    /// to the next; zero is as fast as they come back.
+    OneWay(Duration),
 }
 
 impl Timing {
-    pub(super) const fn gap_ns(self) -> u64 {
+    pub(super) const fn gap(self) -> Duration {
         match self {
-            Self::RoundTrip => 0,
-            Self::OneWay { gap_ns } => gap_ns,
+            Self::RoundTrip => Duration::ZERO,
+            Self::OneWay(gap) => gap,
         }
     }
 }
 
-/// What both are told for each round.
+/// What is measured in a round.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(super) struct Round {
+pub(super) struct Job {
     /// What carries the samples.
     pub(super) contender: Contender,
-    /// Samples that are sent before any is timed.
-    pub(super) warm_up: u32,
-    /// Samples that are timed.
-    pub(super) samples: u32,
     /// How one way is timed.
     pub(super) timing: Timing,
-    /// Which round it is, from 1.
-    pub(super) number: u32,
-    /// A deliberate slow-down of each sample, in ns.
-    pub(super) spin_ns: u64,
 }
 
-impl Round {
-    fn all(&self) -> impl Iterator<Item = u64> {
-        let base = u64::from(self.number) << 32;
-        (1..=u64::from(self.warm_up) + u64::from(self.samples)).map(move |sample| base + sample)
-    }
-
-    fn check(&self, expected: u64, sample: &Sample) -> Result<(), BenchError> {
-        if sample.number == expected && sample.is_whole() {
-            return Ok(());
-        }
-        Err(BenchError::WrongSample {
-            contender: self.contender.to_string(),
-            expected: expected & u64::from(u32::MAX),
-            got: sample.number & u64::from(u32::MAX),
-        })
-    }
-
-    fn failed(&self, expected: u64, fault: Fault) -> BenchError {
-        fault.of(&self.contender.to_string(), expected)
-    }
-}
+type Round = pair::Round<Job>;
 
 /// Which of the two processes this is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,28 +84,20 @@ enum Who {
 
 /// The process that times.
 pub(super) fn sender(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    run(parent, Who::Sender)
+    pair::measure(
+        parent,
+        |side| Carriers::of(Who::Sender, side),
+        Carriers::round,
+    )
 }
 
 /// The process that sends back.
 pub(super) fn receiver(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    run(parent, Who::Receiver)
-}
-
-fn run(parent: &mut Parent, who: Who) -> Result<(), Box<dyn Error>> {
-    let Some(side) = Side::<Lanes, Lines<RawFd>>::enter(parent)? else {
-        return Ok(());
-    };
-    let carriers = Carriers {
-        who,
-        lines: side.more.map(|pair| pair.map(inherit)),
-        side,
-    };
-    while let Some(round) = parent.hear::<Round>()? {
-        slow::spins_for(round.spin_ns);
-        parent.say(&carriers.round(&round)?)?;
-    }
-    Ok(())
+    pair::measure(
+        parent,
+        |side| Carriers::of(Who::Receiver, side),
+        Carriers::round,
+    )
 }
 
 impl Who {
@@ -150,10 +112,11 @@ impl Who {
 }
 
 fn send_and_time(end: &mut impl End, round: &Round) -> Result<Vec<u64>, BenchError> {
-    let mut times = Vec::with_capacity(round.samples as usize);
-    let gap_ns = round.timing.gap_ns();
+    let mut times = Vec::with_capacity(round.all().count());
+    let timing = round.what.timing;
+    let gap_ns = timing.gap().as_nanos() as u64;
     let mut due = Clock::monotonic_ns();
-    for (index, number) in round.all().enumerate() {
+    for number in round.all() {
         if gap_ns > 0 {
             due = (due + gap_ns).max(Clock::monotonic_ns());
             while Clock::monotonic_ns() < due {}
@@ -164,30 +127,36 @@ fn send_and_time(end: &mut impl End, round: &Round) -> Result<Vec<u64>, BenchErr
             .and_then(|()| end.receive())
             .map_err(|fault| round.failed(number, fault))?;
         let received = Clock::monotonic_ns();
-        round.check(number, &sample)?;
-        if index >= round.warm_up as usize {
-            times.push(match round.timing {
-                Timing::RoundTrip => (received - sent) / 2,
-                Timing::OneWay { .. } => sent,
-            });
-        }
+        check(round, number, &sample)?;
+        times.push(match timing {
+            Timing::RoundTrip => (received - sent) / 2,
+            Timing::OneWay(_) => sent,
+        });
     }
-    Ok(times)
+    Ok(round.timed(times))
 }
 
 fn send_back(end: &mut impl End, round: &Round) -> Result<Vec<u64>, BenchError> {
-    let one_way = round.timing != Timing::RoundTrip;
-    let mut times = Vec::with_capacity(if one_way { round.samples as usize } else { 0 });
-    for (index, number) in round.all().enumerate() {
+    let one_way = round.what.timing != Timing::RoundTrip;
+    let mut times = Vec::with_capacity(round.all().count());
+    for number in round.all() {
         let sample = end.receive().map_err(|fault| round.failed(number, fault))?;
-        if one_way && index >= round.warm_up as usize {
+        if one_way {
             times.push(Clock::monotonic_ns());
         }
         end.send(&sample)
             .map_err(|fault| round.failed(number, fault))?;
-        round.check(number, &sample)?;
+        check(round, number, &sample)?;
     }
-    Ok(times)
+    Ok(if one_way { round.timed(times) } else { times })
+}
+
+fn check(round: &Round, expected: u64, sample: &Sample) -> Result<(), BenchError> {
+    if sample.number() == expected && sample.is_whole() {
+        Ok(())
+    } else {
+        Err(round.wrong(expected, sample.number()))
+    }
 }
 
 /// What one of the two has at hand to carry samples with.
@@ -198,6 +167,14 @@ struct Carriers {
 }
 
 impl Carriers {
+    fn of(who: Who, side: Side<Lanes, Lines<RawFd>>) -> Self {
+        Self {
+            who,
+            lines: side.more.map(|pair| pair.map(inherit)),
+            side,
+        }
+    }
+
     /// One round, with ends of its own.
     fn round(&self, round: &Round) -> Result<Vec<u64>, BenchError> {
         let is_sender = self.who == Who::Sender;
@@ -206,7 +183,7 @@ impl Carriers {
         let (out, back) = (&lanes[own], &lanes[other]);
         let bells = &self.lines[EVENTFDS];
         let pipes = &self.lines[PIPES..];
-        match round.contender {
+        match round.what.contender {
             Contender::Lager(mode) => {
                 let policy = match mode {
                     // One of two cores at most is given to adaptive spinning, and it is the
@@ -277,7 +254,7 @@ impl Carriers {
     /// Keeps the end until the other process is done with its own.
     fn with(&self, mut end: impl End, round: &Round) -> Result<Vec<u64>, BenchError> {
         self.side
-            .together(round.number, || self.who.exchange(&mut end, round))
+            .together(round, || self.who.exchange(&mut end, round))
     }
 
     /// What to publish to and what to subscribe to.

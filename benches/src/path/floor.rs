@@ -10,95 +10,69 @@
 //! the same cores, but no packets, no decision and no bus. The time that a robot takes beyond this
 //! is its software's.
 
-use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};
 use std::path::PathBuf;
 
 use lager_rig::process::Main;
-use lager_rig::{Cable, Parent, Process, Refused, Shareable, Shared, timespec};
+use lager_rig::{Cable, Parent, Refused, Shareable, Shared};
+use lager_topics::bytes_of;
 use lager_wire::PACKET_LENGTH;
 use rustix::fs::{Mode as FileMode, OFlags};
 use rustix::io::Errno;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
-use rustix::thread::futex;
 use serde::{Deserialize, Serialize};
 
-use super::pace::{ANSWER_WITHIN, Chain, now_ns, sleep_until_due};
+use super::pace::{ANSWER_WITHIN, now_ns, sleep_until_due};
 use super::processes::Processes;
 use super::services::Place;
+use super::turn::Chain;
+use crate::baseline::memory::Lane;
 use crate::error::BenchError;
+use crate::sample::Block;
 
 const ENDS: &str = "path, floor's ends";
 const MIDDLE: &str = "path, floor's middle";
 
 pub(crate) const PROCESSES: &[(&str, Main)] = &[(ENDS, ends), (MIDDLE, middle)];
 
-/// Longest sleep in a futex, in ns: as long as the robot's services sleep.
-const LONGEST_WAIT_NS: u64 = 20_000_000;
-
-/// What a sample is here.
+/// What a sample is here, and the block that carries it.
 type Bytes = [u8; PACKET_LENGTH];
-
-/// One sample, and a word that says which one it is.
-#[derive(Debug)]
-#[repr(C, align(64))]
-struct Slot {
-    words: [AtomicU64; 2],
-    number: AtomicU32,
-}
+type Wide = Block<2>;
 
 /// What the processes of the floor share.
 #[derive(Debug)]
 #[repr(C)]
-struct Slots([Slot; 2]);
+struct Lanes([Lane<2>; 2]);
 
 // SAFETY: atomics only, and zeros are valid.
 #[allow(unsafe_code)]
-unsafe impl Shareable for Slots {}
+unsafe impl Shareable for Lanes {}
 
-impl Slot {
-    /// Writes the sample and wakes who waits for it.
-    fn put(&self, bytes: &Bytes) {
-        let mut wide = [0; 16];
-        wide[..PACKET_LENGTH].copy_from_slice(bytes);
-        let (low, high) = wide.split_at(8);
-        for (word, half) in self.words.iter().zip([low, high]) {
-            let half = half.try_into().expect("half of sixteen is eight");
-            word.store(u64::from_le_bytes(half), Ordering::Relaxed);
-        }
-        self.number.fetch_add(1, Ordering::Release);
-        // Nobody waiting is no failure.
-        let _ = futex::wake(&self.number, futex::Flags::empty(), 1);
-    }
+/// Writes the sample and wakes who waits for it.
+fn put(lane: &Lane<2>, bytes: &Bytes) -> Result<(), Errno> {
+    let mut wide = [0; size_of::<Wide>()];
+    wide[..PACKET_LENGTH].copy_from_slice(bytes);
+    lane.slot.write(&Wide::from_bytes(&wide));
+    lane.word.wake()
+}
 
-    /// Sleeps until there is another sample than number `seen`, and reads it.
-    fn take(&self, seen: &mut u32) -> Bytes {
-        loop {
-            let number = self.number.load(Ordering::Acquire);
-            if number != *seen {
-                *seen = number;
-                break;
-            }
-            let longest = timespec(LONGEST_WAIT_NS);
-            // Whatever ended the sleep, the word says whether there is something.
-            let _ = futex::wait(&self.number, futex::Flags::empty(), number, Some(&longest));
-        }
-        let mut wide = [0; 16];
-        for (word, half) in self.words.iter().zip(wide.chunks_exact_mut(8)) {
-            half.copy_from_slice(&word.load(Ordering::Relaxed).to_le_bytes());
-        }
-        wide[..PACKET_LENGTH]
-            .try_into()
-            .expect("a packet fits into two words")
+/// Sleeps until there is another sample than number `seen`, and reads it.
+fn take(lane: &Lane<2>, seen: &mut u32) -> Result<Bytes, Errno> {
+    while lane.word.count() == *seen {
+        lane.word.sleep(*seen)?;
     }
+    *seen = lane.word.count();
+    let mut bytes = Bytes::default();
+    bytes.copy_from_slice(&bytes_of(&lane.slot.read())[..PACKET_LENGTH]);
+    Ok(bytes)
 }
 
 /// What the floor's processes are told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Setup {
     place: Place,
-    slots: RawFd,
+    lanes: RawFd,
     ports: [PathBuf; 2],
 }
 
@@ -107,20 +81,18 @@ fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     setup.place.take()?;
-    let slots = Shared::<Slots>::inherited(setup.slots)?;
+    let lanes = Shared::<Lanes>::inherited(setup.lanes)?;
     let [sensor, steering] = [open(&setup.ports[0])?, open(&setup.ports[1])?];
     parent.say(&())?;
-    let [first, second] = &slots.0;
+    let [first, second] = &lanes.0;
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let mut bytes = Bytes::default();
-            while read_whole(&sensor, &mut bytes).is_ok() {
-                first.put(&bytes);
-            }
+            while read_whole(&sensor, &mut bytes).is_ok() && put(first, &bytes).is_ok() {}
         });
         let mut seen = 0;
         loop {
-            let bytes = second.take(&mut seen);
+            let bytes = take(second, &mut seen)?;
             rustix::io::write(&steering, &bytes).map_err(port_error)?;
         }
     })
@@ -131,12 +103,12 @@ fn middle(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     setup.place.take()?;
-    let slots = Shared::<Slots>::inherited(setup.slots)?;
+    let lanes = Shared::<Lanes>::inherited(setup.lanes)?;
     parent.say(&())?;
-    let [first, second] = &slots.0;
+    let [first, second] = &lanes.0;
     let mut seen = 0;
     loop {
-        second.put(&first.take(&mut seen));
+        put(second, &take(first, &mut seen)?)?;
     }
 }
 
@@ -172,9 +144,9 @@ fn read_whole(port: &OwnedFd, bytes: &mut Bytes) -> Result<(), Errno> {
 
 /// The floor's chain with both its processes.
 pub(super) struct Floor {
-    // Before the slots and the cables: the processes end first.
+    // Before the lanes and the cables: the processes end first.
     processes: Processes,
-    _slots: Shared<Slots>,
+    _lanes: Shared<Lanes>,
     cables: [Cable; 2],
     sent: u64,
 }
@@ -182,22 +154,17 @@ pub(super) struct Floor {
 impl Floor {
     /// Starts it; `ends` is where the bridge would be, `logic` where logic would be.
     pub(super) fn start(ends: Place, logic: Place) -> Result<Self, BenchError> {
-        let slots = Shared::<Slots>::new()?;
+        let lanes = Shared::<Lanes>::new()?;
         let cables = [Cable::new()?, Cable::new()?];
         let setup = |place| Setup {
             place,
-            slots: slots.number(),
+            lanes: lanes.number(),
             ports: [0, 1].map(|cable: usize| cables[cable].path().clone()),
         };
-        let mut processes = Vec::new();
-        for (name, place) in [(MIDDLE, logic), (ENDS, ends)] {
-            let mut process = Process::start(name)?;
-            let () = process.ask(&setup(place))?;
-            processes.push(process);
-        }
+        let processes = Processes::start([(MIDDLE, setup(logic)), (ENDS, setup(ends))])?;
         Ok(Self {
-            processes: Processes::new(processes),
-            _slots: slots,
+            processes,
+            _lanes: lanes,
             cables,
             sent: 0,
         })
@@ -205,8 +172,8 @@ impl Floor {
 }
 
 impl Chain for Floor {
-    fn begin(&mut self) -> Result<(), BenchError> {
-        self.processes.wake()
+    fn processes(&mut self) -> &mut Processes {
+        &mut self.processes
     }
 
     fn frame(&mut self) -> Result<u64, BenchError> {
@@ -237,17 +204,5 @@ impl Chain for Floor {
                 return Ok(end - start);
             }
         }
-    }
-
-    fn count(&mut self) -> Result<(), BenchError> {
-        self.processes.start_counting()
-    }
-
-    fn end(&mut self) -> Result<(), BenchError> {
-        self.processes.rest()
-    }
-
-    fn cpu_percent(&self) -> Option<f64> {
-        self.processes.cpu_percent()
     }
 }

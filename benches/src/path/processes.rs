@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use lager_rig::{Process, ProcessError};
 use rustix::process::{Pid, Signal, kill_process};
+use serde::Serialize;
 
 use super::pace::{ANSWER_WITHIN, now_ns};
 use crate::error::BenchError;
@@ -21,14 +22,20 @@ pub(super) struct Processes {
 }
 
 impl Processes {
-    /// All of `processes` are counted.
-    pub(super) fn new(processes: Vec<Process>) -> Self {
-        Self {
+    /// Starts them, each with what it is told, one after the other; all are counted.
+    pub(super) fn start<S: Serialize>(all: [(&str, S); 2]) -> Result<Self, BenchError> {
+        let mut processes = Vec::new();
+        for (name, setup) in all {
+            let mut process = Process::start(name)?;
+            let () = process.ask(&setup)?;
+            processes.push(process);
+        }
+        Ok(Self {
             counted: processes.len(),
             processes,
             began: None,
             total: (0, 0),
-        }
+        })
     }
 
     /// More processes, which are not counted.
@@ -37,23 +44,22 @@ impl Processes {
     }
 
     /// Lets them run.
-    pub(super) fn wake(&self) -> Result<(), BenchError> {
-        self.signal(Signal::CONT)
+    pub(super) fn wake(&self) {
+        self.signal(Signal::CONT);
     }
 
     /// The turn is over: lets them stand still until [`Processes::wake`].
-    pub(super) fn rest(&mut self) -> Result<(), BenchError> {
+    pub(super) fn rest(&mut self) {
         if let Some((processor, real)) = self.began.take() {
             self.total.0 += self.processor_ns().saturating_sub(processor);
             self.total.1 += now_ns().saturating_sub(real);
         }
-        self.signal(Signal::STOP)
+        self.signal(Signal::STOP);
     }
 
     /// From now on processor time is counted.
-    pub(super) fn start_counting(&mut self) -> Result<(), BenchError> {
+    pub(super) fn start_counting(&mut self) {
         self.began = Some((self.processor_ns(), now_ns()));
-        Ok(())
     }
 
     /// Processor time per real time over all turns, in percent of one core.
@@ -84,13 +90,12 @@ impl Processes {
         }
     }
 
-    fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+    fn signal(&self, signal: Signal) {
         for process in &self.processes {
             let pid = i32::try_from(process.pid()).ok().and_then(Pid::from_raw);
             // One that has ended is found out with the next frame.
             let _ = pid.map(|pid| kill_process(pid, signal));
         }
-        Ok(())
     }
 
     /// Processor time of all threads of the counted processes, in ns.
@@ -104,12 +109,7 @@ impl Processes {
 
 /// The kernel counts each thread's time on a processor in ns, first in its `schedstat`.
 fn processor_ns(process: &Process) -> u64 {
-    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", process.pid())) else {
-        return 0;
-    };
-    threads
-        .flatten()
-        .filter_map(|thread| std::fs::read_to_string(thread.path().join("schedstat")).ok())
+    of_threads(process, "schedstat")
         .filter_map(|text| text.split_whitespace().next()?.parse::<u64>().ok())
         .sum()
 }
@@ -117,12 +117,17 @@ fn processor_ns(process: &Process) -> u64 {
 /// Whether a thread of it is ready to run. Asked of a process that should have answered long ago:
 /// one that waits for a wake-up sleeps.
 fn wants_to_run(process: &Process) -> bool {
-    let Ok(threads) = std::fs::read_dir(format!("/proc/{}/task", process.pid())) else {
-        return false;
-    };
-    threads
-        .flatten()
-        .filter_map(|thread| std::fs::read_to_string(thread.path().join("stat")).ok())
+    of_threads(process, "stat")
         // The state follows the name, which stands in brackets.
         .any(|stat| matches!(stat.rsplit_once(") "), Some((_, rest)) if rest.starts_with('R')))
+}
+
+/// What the kernel says of each of its threads.
+fn of_threads(process: &Process, file: &'static str) -> impl Iterator<Item = String> {
+    let threads = std::fs::read_dir(format!("/proc/{}/task", process.pid()));
+    threads
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter_map(move |thread| std::fs::read_to_string(thread.path().join(file)).ok())
 }

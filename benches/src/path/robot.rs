@@ -114,20 +114,16 @@ impl Robot {
             ports: [sensor.cable.path().clone(), steering.cable.path().clone()],
         };
         let bus = setup.open(Role::Operator)?;
-        let mut processes = Vec::new();
-        for (name, place) in [(LOGIC, logic), (BRIDGE, bridge)] {
-            let mut process = Process::start(name)?;
-            let () = process.ask(&Setup {
-                place,
-                ..setup.clone()
-            })?;
-            processes.push(process);
-        }
+        let at = |place| Setup {
+            place,
+            ..setup.clone()
+        };
+        let processes = Processes::start([(LOGIC, at(logic)), (BRIDGE, at(bridge))])?;
         let mut robot = Self {
             urgent: None,
             boards_priority: None,
             name: name.to_owned(),
-            processes: Processes::new(processes),
+            processes,
             sensor,
             steering,
             last: (0, 0),

@@ -12,41 +12,28 @@ pub(super) struct Counted {
     pub(super) command: CommandLatency,
 }
 
-/// One row for each stage, in the order of the way, and one for each whole, of what was counted
-/// between the two.
+/// What was counted of a stage.
+type Stage = fn(&Counted) -> &Durations;
+
+/// The stages in the order of the way, and each whole.
+const STAGES: [(&str, Stage); 7] = [
+    ("read to publish", |counted| &counted.path.read_publish),
+    ("publish to logic", |counted| &counted.path.publish_receive),
+    ("logic to decided", |counted| &counted.path.decide),
+    ("read to decided", |counted| &counted.path.total),
+    ("order to bridge", |counted| &counted.command.order_receive),
+    ("receive to written", |counted| {
+        &counted.command.receive_write
+    }),
+    ("read to written", |counted| &counted.command.total),
+];
+
+/// One row for each stage, of what was counted between the two.
 pub(super) fn rows(before: &Counted, after: &Counted, regime: Regime, mode: Mode) -> Vec<Row> {
-    let ([path, earlier_path], [command, earlier_command]) = (
-        [&after.path, &before.path],
-        [&after.command, &before.command],
-    );
-    [
-        (
-            "read to publish",
-            &path.read_publish,
-            &earlier_path.read_publish,
-        ),
-        (
-            "publish to logic",
-            &path.publish_receive,
-            &earlier_path.publish_receive,
-        ),
-        ("logic to decided", &path.decide, &earlier_path.decide),
-        ("read to decided", &path.total, &earlier_path.total),
-        (
-            "order to bridge",
-            &command.order_receive,
-            &earlier_command.order_receive,
-        ),
-        (
-            "receive to written",
-            &command.receive_write,
-            &earlier_command.receive_write,
-        ),
-        ("read to written", &command.total, &earlier_command.total),
-    ]
-    .into_iter()
-    .map(|(stage, after, before)| row(stage, &after.since(before), regime, mode))
-    .collect()
+    STAGES
+        .into_iter()
+        .map(|(stage, of)| row(stage, &of(after).since(of(before)), regime, mode))
+        .collect()
 }
 
 fn row(stage: &str, counted: &Durations, regime: Regime, mode: Mode) -> Row {

@@ -1,6 +1,5 @@
 //! The readers of `ring-64`, all in one process: an actor that is rung, and observers.
 
-use core::sync::atomic::Ordering;
 use std::error::Error;
 use std::time::Instant;
 
@@ -11,33 +10,31 @@ use lager_ports::{Subscriber, Waiter};
 use lager_rig::Parent;
 use lager_topics::{OBSERVERS, Role, SensorLine, Stamp, Topic};
 
-use super::{Contender, Observed, Own, Round};
+use super::{Contender, Job, Observed, Own, Round, samples};
 use crate::baseline::iceoryx::{self, Member};
 use crate::baseline::{Fault, LIMIT, TIME_OUT, broken};
 use crate::error::{BenchError, no_bus};
+use crate::pair;
 use crate::report::Mode;
 use crate::sample::{Ping, RECEIVER, Sample};
 
 pub(super) fn readers(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(own) = Own::enter(parent)? else {
-        return Ok(());
-    };
-    while let Some(round) = parent.hear::<Round>()? {
-        let mut ports = Ports::open(&own, round.contender, round.mode)?;
-        own.together(round.number, || {
-            for number in round.all() {
-                ports.drain().map_err(|fault| round.failed(number, fault))?;
-                own.memory().number.store(number, Ordering::Release);
-                ports
-                    .until_rung(round.mode)
-                    .map_err(|fault| round.failed(number, fault))?;
-            }
-            Ok(())
-        })?;
-        drop(ports);
-        parent.say(&())?;
-    }
-    Ok(())
+    pair::measure(parent, |own| own, read)
+}
+
+/// Reads the samples of a round, and has no times to tell.
+fn read(own: &Own, round: &Round) -> Result<Vec<u64>, BenchError> {
+    let Job { contender, mode } = round.what;
+    let mut ports = Ports::open(own, contender, mode)?;
+    own.together(round, || {
+        for number in samples(round) {
+            let failed = |fault| round.failed(number, fault);
+            ports.drain().map_err(failed)?;
+            own.memory().are_ready_for(number);
+            ports.until_rung(mode).map_err(failed)?;
+        }
+        Ok(Vec::new())
+    })
 }
 
 /// The readers' ports.

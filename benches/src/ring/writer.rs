@@ -1,6 +1,5 @@
 //! The writer of `ring-64`: waits until its readers are ready, and is timed while it rings.
 
-use core::sync::atomic::Ordering;
 use core::time::Duration;
 use std::error::Error;
 use std::time::Instant;
@@ -11,155 +10,98 @@ use lager_ports::{Clock, Publisher};
 use lager_rig::Parent;
 use lager_topics::{OBSERVERS, SensorLine, Stamp, Topic};
 
-use super::{Contender, Listeners, Observed, Own, Round};
+use super::{Contender, Listeners, Observed, Own, Round, samples};
 use crate::baseline::iceoryx::{self, Member, Sender};
-use crate::baseline::{Fault, LIMIT, broken};
+use crate::baseline::{Fault, broken};
 use crate::error::{BenchError, no_bus};
+use crate::pair;
 use crate::report::Mode;
 use crate::sample::{Ping, SENDER, Sample};
 use crate::slow;
 
 pub(super) fn writer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(own) = Own::enter(parent)? else {
-        return Ok(());
-    };
-    while let Some(round) = parent.hear::<Round>()? {
-        slow::spins_for(round.spin_ns);
-        let mut ports = Ports::open(&own, round.contender)?;
-        let times = own.together(round.number, || write(&own, &round, &mut ports))?;
-        drop(ports);
-        parent.say(&times)?;
-    }
-    Ok(())
+    pair::measure(parent, |own| own, write)
 }
 
 /// Writes the samples of a round; what each took, in ns.
-fn write(own: &Own, round: &Round, ports: &mut Ports) -> Result<Vec<u64>, BenchError> {
-    let mut times: Vec<u64> = Vec::with_capacity(round.samples);
-    for number in round.all() {
-        await_readiness(own, round, number)?;
-        let sample = Sample::new(number);
-        let before = Clock::monotonic_ns();
-        ports
-            .send(&sample)
-            .map_err(|fault| round.failed(number, fault))?;
-        let cost = Clock::monotonic_ns() - before;
-        match (&*ports, times.last_mut()) {
-            // The second of a pair: what it costs more than the first.
-            (
-                Ports::Ring {
-                    is_quiet: false, ..
-                },
-                Some(first),
-            ) => {
-                *first = cost.saturating_sub(*first);
-            }
-            _ => times.push(cost),
+fn write(own: &Own, round: &Round) -> Result<Vec<u64>, BenchError> {
+    let nothing = |_: &Sample| Ok(());
+    let times = match round.what.contender {
+        Contender::Lager => {
+            let publisher = own.bus(SENDER)?.publisher::<Ping>().map_err(no_bus)?;
+            timed(own, round, |sample| send(&publisher, sample), nothing)?
         }
-        ports
-            .follow_up(&sample)
-            .map_err(|fault| round.failed(number, fault))?;
-    }
-    Ok(times)
+        Contender::Ring => {
+            let bus = own.bus(SENDER)?;
+            let quiet = bus.publisher::<Observed>().map_err(no_bus)?;
+            let loud = bus.publisher::<Ping>().map_err(no_bus)?;
+            // The first of a pair goes where nobody is rung.
+            let is_first = |sample: &Sample| sample.number().is_multiple_of(2);
+            let publish = |sample: &Sample| match is_first(sample) {
+                true => send(&quiet, sample),
+                false => send(&loud, sample),
+            };
+            // The readers need a ring all the same, to go on.
+            let ring = |sample: &Sample| match is_first(sample) {
+                true => send(&loud, sample),
+                false => Ok(()),
+            };
+            let times = timed(own, round, publish, ring)?;
+            let pairs = times.chunks_exact(2);
+            pairs.map(|pair| pair[1].saturating_sub(pair[0])).collect()
+        }
+        Contender::Notify(listeners) => {
+            let member = Member::join(&own.config)?;
+            let notifier = member.notifier(listeners.service(), listeners.count())?;
+            timed(own, round, |_| notify(&notifier, listeners), nothing)?
+        }
+        Contender::Event(listeners) => {
+            let member = Member::join(&own.config)?;
+            let notifier = member.notifier(listeners.service(), listeners.count())?;
+            let limits = Some(&SensorLine::QOS);
+            let mut sender = Sender::<Stamp>::new(member.publisher(listeners.service(), limits)?);
+            let publish = |sample: &Sample| {
+                sender.send(sample)?;
+                notify(&notifier, listeners)
+            };
+            timed(own, round, publish, nothing)?
+        }
+    };
+    Ok(round.timed(times))
+}
+
+/// Publishes each sample of a round when the readers are ready for it; how long each took, in ns.
+fn timed(
+    own: &Own,
+    round: &Round,
+    mut publish: impl FnMut(&Sample) -> Result<(), Fault>,
+    mut follow_up: impl FnMut(&Sample) -> Result<(), Fault>,
+) -> Result<Vec<u64>, BenchError> {
+    own.together(round, || {
+        let mut times = Vec::with_capacity(samples(round).count());
+        for number in samples(round) {
+            let failed = |fault| round.failed(number, fault);
+            await_readers(own, round.what.mode, number).map_err(failed)?;
+            let sample = Sample::new(number);
+            let before = Clock::monotonic_ns();
+            publish(&sample).map_err(failed)?;
+            times.push(Clock::monotonic_ns() - before);
+            follow_up(&sample).map_err(failed)?;
+        }
+        Ok(times)
+    })
 }
 
 /// Waits until the readers are ready, and for an actor that sleeps until it surely does.
-fn await_readiness(own: &Own, round: &Round, number: u64) -> Result<(), BenchError> {
+fn await_readers(own: &Own, mode: Mode, number: u64) -> Result<(), Fault> {
     const TO_SLEEP: Duration = Duration::from_micros(60);
-    let start = Instant::now();
-    while own.memory().number.load(Ordering::Acquire) != number {
-        if start.elapsed() > LIMIT {
-            return Err(round.failed(number, Fault::Silent));
-        }
+    own.memory().await_readers(number)?;
+    let ready = Instant::now();
+    while mode == Mode::Block && ready.elapsed() < TO_SLEEP {
+        // It may be on this core.
         rustix::thread::sched_yield();
     }
-    if round.mode == Mode::Block {
-        let ready = Instant::now();
-        while ready.elapsed() < TO_SLEEP {
-            // It may be on this core.
-            rustix::thread::sched_yield();
-        }
-    }
     Ok(())
-}
-
-/// The writer's ports.
-// One of them lives at a time, so nothing is saved by making it smaller.
-#[allow(clippy::large_enum_variant)]
-enum Ports {
-    Lager(Publisher<Ping>),
-    Ring {
-        quiet: Publisher<Observed>,
-        loud: Publisher<Ping>,
-        /// Whether the last sample went where nobody is rung.
-        is_quiet: bool,
-    },
-    Notify(Notifier<ipc::Service>, Listeners),
-    Event(Notifier<ipc::Service>, Listeners, Sender<Stamp>),
-}
-
-impl Ports {
-    fn open(own: &Own, contender: Contender) -> Result<Self, BenchError> {
-        Ok(match contender {
-            Contender::Lager => Self::Lager(own.bus(SENDER)?.publisher().map_err(no_bus)?),
-            Contender::Ring => {
-                let bus = own.bus(SENDER)?;
-                Self::Ring {
-                    quiet: bus.publisher().map_err(no_bus)?,
-                    loud: bus.publisher().map_err(no_bus)?,
-                    is_quiet: false,
-                }
-            }
-            Contender::Notify(listeners) => {
-                Self::Notify(notifier(&Member::join(&own.config)?, listeners)?, listeners)
-            }
-            Contender::Event(listeners) => {
-                let member = Member::join(&own.config)?;
-                let publisher = member.publisher(listeners.service(), Some(&SensorLine::QOS))?;
-                Self::Event(
-                    notifier(&member, listeners)?,
-                    listeners,
-                    Sender::new(publisher),
-                )
-            }
-        })
-    }
-
-    /// What is timed.
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        match self {
-            Self::Lager(publisher) => send(publisher, sample),
-            Self::Ring {
-                quiet,
-                loud,
-                is_quiet,
-            } => {
-                *is_quiet = !*is_quiet;
-                if *is_quiet {
-                    send(quiet, sample)
-                } else {
-                    send(loud, sample)
-                }
-            }
-            Self::Notify(notifier, listeners) => notify(notifier, *listeners),
-            Self::Event(notifier, listeners, sender) => {
-                sender.send(sample)?;
-                notify(notifier, *listeners)
-            }
-        }
-    }
-
-    /// What the readers need besides, to go on.
-    fn follow_up(&mut self, sample: &Sample) -> Result<(), Fault> {
-        match self {
-            Self::Ring {
-                loud,
-                is_quiet: true,
-                ..
-            } => send(loud, sample),
-            _ => Ok(()),
-        }
-    }
 }
 
 fn send<T: Topic<Payload = Sample>>(
@@ -172,10 +114,6 @@ fn send<T: Topic<Payload = Sample>>(
         slow::publish(OBSERVERS);
     }
     loan.send().map_err(broken)
-}
-
-fn notifier(member: &Member, listeners: Listeners) -> Result<Notifier<ipc::Service>, BenchError> {
-    member.notifier(listeners.service(), listeners.count())
 }
 
 fn notify(notifier: &Notifier<ipc::Service>, listeners: Listeners) -> Result<(), Fault> {

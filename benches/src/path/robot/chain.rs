@@ -7,13 +7,18 @@ use lager_rig::interrupted;
 
 use super::{Answer, FOLLOW, IN_A_ROW, Robot, UP_WITHIN};
 use crate::error::BenchError;
-use crate::path::pace::{ANSWER_WITHIN, Chain};
+use crate::path::pace::ANSWER_WITHIN;
+use crate::path::processes::Processes;
 use crate::path::services::{RealTime, bus_error};
 use crate::path::stages::Counted;
+use crate::path::turn::Chain;
 
 impl Chain for Robot {
+    fn processes(&mut self) -> &mut Processes {
+        &mut self.processes
+    }
+
     fn begin(&mut self) -> Result<(), BenchError> {
-        self.processes.wake()?;
         let start = Instant::now();
         let mut in_a_row = 0;
         // It may have stood still for longer than leases and links hold, and finds its way back by
@@ -53,20 +58,11 @@ impl Chain for Robot {
         Ok(time)
     }
 
-    fn count(&mut self) -> Result<(), BenchError> {
-        self.counts = true;
-        self.urgent = self.boards_priority.map(RealTime::begin).transpose()?;
-        self.processes.start_counting()
-    }
-
-    fn end(&mut self) -> Result<(), BenchError> {
-        self.counts = false;
-        self.urgent = None;
-        self.processes.rest()
-    }
-
-    fn cpu_percent(&self) -> Option<f64> {
-        self.processes.cpu_percent()
+    fn counts(&mut self, counts: bool) -> Result<(), BenchError> {
+        self.counts = counts;
+        let priority = self.boards_priority.filter(|_| counts);
+        self.urgent = priority.map(RealTime::begin).transpose()?;
+        Ok(())
     }
 
     fn overtaken(&self) -> &[u64] {
