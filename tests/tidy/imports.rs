@@ -275,7 +275,8 @@ fn named(tokens: &[String]) -> Vec<Named> {
                 within.retain(|(_, outside)| *outside < depth);
                 at += 1;
             }
-            "use" => {
+            // Not what a returned `impl` captures, as in `use<>`.
+            "use" if token(at + 1) != "<" => {
                 let mut uses = Vec::new();
                 at = tree(tokens, at + 1, &[], &mut uses);
                 found.extend(uses.into_iter().map(|segments| Named {
@@ -348,6 +349,7 @@ fn paths_are_found_wherever_they_stand_and_nowhere_else() {
         const S: &str = r#"crate::nor::this "quoted" "#;
         fn g<'a>(h: &'a crate::i::J) { 'x'; let _ = "crate::nor::\"that"; b'\''; k::l(); }
         mod tests { use super::*; fn m() { { super::n::o() } } }
+        fn o() -> impl Copy + use<> { [1; 2] }
         use crate::p;
     "##;
     let found: Vec<(String, String)> = named(&tokens(source))
