@@ -34,6 +34,8 @@
 //!   `pickup_done` that nobody has asked for wait with Robert, as long as the robot asks for
 //!   commands at all. At most 32 wait, a stop takes their place, and what does not wait is refused
 //!   in a `thought` (C5).
+//! - A command that never ends by itself ends with its GaG: where the socket closes, Robert has the
+//!   robot stand.
 //! - `pickup_done` is the answer to `armcomm` that ends the picking; the document has the signal
 //!   but no word for it (AMB-44).
 //! - The codes of commands are read in four forms and written in one; see

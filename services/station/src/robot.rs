@@ -14,12 +14,14 @@
 //! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
 //!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. A robot that speaks the
 //!   extension is told it at once, though it asks nothing while it turns. When the robot asks for
-//!   something else, or its connection ends, they are dropped: nobody's old command moves it later.
+//!   something else, its connection ends or somebody takes its wheel, they are dropped: nobody's
+//!   old command moves it later.
 //! - A product leaves the queue when the robot is told it. If the connection ends before the robot
 //!   has said another word, it is put back, since it may not have arrived.
 //! - The queue outlives connections.
 //! - While a GaG speaks for the robot only commands are answered from here: those that it gave
-//!   before it was asked, and those that were given besides, a stop above all.
+//!   before it was asked, and those that were given besides, a stop above all. The robot stands when
+//!   a GaG that drives it leaves, or somebody takes the wheel from it.
 //!
 //! - A robot that speaks the extension is given numbered actions besides, and answers each. What it
 //!   shows of itself is kept with the time when it came ([`Shown`]). Who drives it by actions holds
@@ -142,6 +144,8 @@ pub struct Robot {
     is_unanswered: bool,
     commands: VecDeque<OperatorCommand>,
     is_picked: bool,
+    /// The last command to its wheels was another than to stand.
+    turns_wheels: bool,
     has_gag: bool,
     node: Option<Coord>,
     looks: Option<Direction>,
@@ -189,6 +193,7 @@ impl Robot {
         if command == OperatorCommand::Stop {
             self.commands.clear();
             if self.hello.is_some() && self.held.get().is_none() {
+                self.told_command(command);
                 return Ok(Some(StationLine::Answer(Answer::Command(command))));
             }
         }
@@ -256,10 +261,11 @@ impl Robot {
 
 /// What a GaG says for it.
 impl Robot {
-    /// Whether a GaG speaks for it from now on.
+    /// Whether a GaG speaks for it from now on. One that leaves drives it no further.
     pub fn set_gag(&mut self, has_gag: bool) -> Option<StationLine> {
-        self.has_gag = has_gag;
-        self.answer()
+        let has_left = core::mem::replace(&mut self.has_gag, has_gag) && !has_gag;
+        let stands = has_left.then(|| self.end_commands()).flatten();
+        stands.or_else(|| self.answer())
     }
 
     /// Passes on what the GaG answers.
@@ -276,7 +282,12 @@ impl Robot {
                 self.is_unanswered = false;
             }
             Answer::PickupDone => self.doing = Doing::Fetching,
-            Answer::Command(OperatorCommand::Stop) => self.commands.clear(),
+            Answer::Command(command) => {
+                self.told_command(command);
+                if command == OperatorCommand::Stop {
+                    self.commands.clear();
+                }
+            }
             _ => {}
         }
         Ok(StationLine::Answer(answer.spelled_as(query)))
@@ -301,6 +312,7 @@ impl Robot {
         self.hello = None;
         self.is_unanswered = false;
         self.drop_commands();
+        self.turns_wheels = false;
         let lost = self.asked.lost(self.now, true);
         self.lose(lost);
     }
@@ -335,6 +347,7 @@ impl Robot {
     }
 
     fn asked(&mut self, query: Query) -> Option<StationLine> {
+        let before = self.doing;
         self.doing = match query {
             Query::SideLength | Query::Map | Query::Products(_) => Doing::Starting,
             Query::Fetch => Doing::Idle,
@@ -344,8 +357,11 @@ impl Robot {
         if self.doing != Doing::Picking {
             self.is_picked = false;
         }
-        if !self.doing.takes_commands() {
+        // One of this project asks for either kind of command in a mode of its own.
+        let has_turned = self.hello.is_some() && self.doing != before;
+        if has_turned || !self.doing.takes_commands() {
             self.drop_commands();
+            self.turns_wheels = false;
         }
         self.held.ask(query);
         self.answer()
@@ -358,9 +374,27 @@ impl Robot {
         self.doing = Doing::Fetching;
     }
 
+    /// Whoever gave commands gives no more: none of them waits any longer, and the robot stands where
+    /// one of them turns its wheels.
+    pub(crate) fn end_commands(&mut self) -> Option<StationLine> {
+        self.drop_commands();
+        let turns = core::mem::take(&mut self.turns_wheels);
+        // It asks for commands, or none was given.
+        turns.then(|| self.command(OperatorCommand::Stop).ok())??
+    }
+
     fn drop_commands(&mut self) {
         self.commands.clear();
         self.is_picked = false;
+    }
+
+    /// It is told this command.
+    fn told_command(&mut self, command: OperatorCommand) {
+        self.turns_wheels = match command {
+            OperatorCommand::Stop => false,
+            OperatorCommand::Arm(_) => self.turns_wheels,
+            _ => true,
+        };
     }
 
     /// The answer to the question that is held, if it can be given now.
@@ -380,7 +414,10 @@ impl Robot {
                 Answer::Fetch(product)
             }
             Query::Arm | Query::Wheels => match self.commands.pop_front() {
-                Some(command) => Answer::Command(command),
+                Some(command) => {
+                    self.told_command(command);
+                    Answer::Command(command)
+                }
                 None if query == Query::Arm && self.is_picked => {
                     self.is_picked = false;
                     self.doing = Doing::Fetching;

@@ -8,7 +8,7 @@ use lager_lines::extension::Action;
 use lager_wire::OperatorArm;
 
 use super::{Station, WishRefused};
-use crate::robot::Robot;
+use crate::robot::{ActRefused, Robot};
 use crate::shown::Told;
 use crate::wheel::Key;
 
@@ -48,13 +48,22 @@ impl Station {
         Ok(number)
     }
 
-    /// Lets `who` drive a robot, and nobody else.
+    /// Lets `who` drive a robot, and nobody else: what a GaG has told it ends.
     ///
     /// # Errors
     ///
     /// When somebody else drives it.
     pub fn take_wheel(&mut self, name: &Name, who: &str) -> Result<Key, WishRefused> {
-        Ok(self.known(name)?.take_wheel(who)?)
+        let robot = self.known(name)?;
+        let key = robot.take_wheel(who)?;
+        let waited = robot.commands().next().is_some();
+        let line = robot.end_commands();
+        self.say(name, line);
+        if waited {
+            let by = who.to_owned();
+            self.tell_gag_of(name, &ActRefused::Driven { by }.to_string());
+        }
+        Ok(key)
     }
 
     /// Its driver turns the wheels, for 150 ms unless he does so again.

@@ -78,6 +78,14 @@ impl Station {
         }
     }
 
+    /// Tells a GaG that speaks for this robot why its commands are dropped.
+    pub(super) fn tell_gag_of(&mut self, name: &Name, why: &str) {
+        let speaks = |gag: &super::Gag| gag.robot.as_ref() == Some(name);
+        if self.gag.as_ref().is_some_and(speaks) {
+            self.put(Peer::Gag, &thought(why));
+        }
+    }
+
     /// Tells the GaG what is wrong, and asks again what is still asked.
     fn correct_gag(&mut self, why: &str) {
         self.put(Peer::Gag, &thought(why));

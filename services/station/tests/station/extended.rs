@@ -254,3 +254,31 @@ fn a_gag_does_not_drive_a_robot_that_somebody_drives() {
     station.heard(Peer::Gag, Ok("styrcomm 2"));
     assert_eq!(said(&mut station), ["styrcomm 00000010"]);
 }
+
+#[test]
+fn whoever_takes_the_wheel_from_a_gag_ends_what_it_gave() {
+    let mut station = extended();
+    station.connected(Peer::Gag);
+    station.heard(LINK, Ok("styrcomm"));
+    station.heard(Peer::Gag, Ok("styrcomm 8"));
+    assert_eq!(said(&mut station), ["styrcomm", "styrcomm 00001000"]);
+    // The robot turns, and more waits.
+    station.heard(Peer::Gag, Ok("styrcomm 2"));
+    let anna = station.take_wheel(&r1(), "anna").expect("the seat is free");
+    let told = said(&mut station);
+    assert_eq!(told[0], "styrcomm 00000001", "it stands until she drives");
+    assert!(told[1].starts_with("thought anna drives"), "{told:?}");
+    assert_eq!(told.len(), 2);
+    station.heard(LINK, Ok("styrcomm"));
+    assert_eq!(said(&mut station), ["styrcomm"], "nothing waits");
+    // A GaG that leaves does not stop what she does.
+    station.drive(&r1(), anna, wheels("2")).expect("she drives");
+    said(&mut station);
+    station.disconnected(Peer::Gag);
+    assert_eq!(said(&mut station), [""; 0]);
+    // Nor does she stop a robot that stands.
+    station.leave_wheel(&r1(), anna);
+    said(&mut station);
+    assert!(station.take_wheel(&r1(), "bo").is_ok());
+    assert_eq!(said(&mut station), [""; 0]);
+}

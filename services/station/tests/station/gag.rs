@@ -226,6 +226,88 @@ fn a_stop_takes_the_place_of_a_gags_commands_that_wait() {
 }
 
 #[test]
+fn a_robot_stands_when_the_gag_that_drives_it_leaves() {
+    let mut station = between_a_gag_and_a_robot();
+    let drives: &[(Peer, &str, &[&str])] = &[
+        (R1, "styrcomm", &["gag: styrcomm"]),
+        (Peer::Gag, "styrcomm 2", &["r1: styrcomm 00000010"]),
+    ];
+    play(&mut station, drives);
+    play(&mut station, &[(R1, "styrcomm", &["gag: styrcomm"])]);
+    station.disconnected(Peer::Gag);
+    assert_eq!(said(&mut station), ["r1: styrcomm 00000001"]);
+    // What waits goes with it as well, and a robot that asks nothing is told when it asks.
+    station.connected(Peer::Gag);
+    play(&mut station, drives);
+    play(&mut station, &[(Peer::Gag, "styrcomm 8", &[])]);
+    station.disconnected(Peer::Gag);
+    assert_eq!(said(&mut station), [""; 0]);
+    play(
+        &mut station,
+        &[
+            (R1, "styrcomm", &["r1: styrcomm 00000001"]),
+            (R1, "styrcomm", &[]),
+        ],
+    );
+    // One that speaks the extension is told at once.
+    play(
+        &mut station,
+        &[(R1, "lager 1 north", &["r1: lager 1 lager"])],
+    );
+    station.connected(Peer::Gag);
+    assert_eq!(said(&mut station), ["gag: styrcomm"]);
+    play(
+        &mut station,
+        &[(Peer::Gag, "styrcomm 2", &["r1: styrcomm 00000010"])],
+    );
+    station.disconnected(Peer::Gag);
+    assert_eq!(said(&mut station), ["r1: styrcomm 00000001"]);
+    // A robot that stands by its word, or fetches by itself, is left alone.
+    station.connected(Peer::Gag);
+    play(&mut station, drives);
+    play(
+        &mut station,
+        &[
+            (R1, "styrcomm", &["gag: styrcomm"]),
+            (Peer::Gag, "styrcomm 1", &["r1: styrcomm 00000001"]),
+            (R1, "styrcomm", &["gag: styrcomm"]),
+        ],
+    );
+    station.disconnected(Peer::Gag);
+    assert_eq!(said(&mut station), [""; 0]);
+    station.connected(Peer::Gag);
+    assert_eq!(said(&mut station), ["gag: styrcomm"]);
+    play(
+        &mut station,
+        &[
+            (Peer::Gag, "styrcomm 2", &["r1: styrcomm 00000010"]),
+            (R1, "fetchprod", &["gag: fetchprod"]),
+        ],
+    );
+    station.disconnected(Peer::Gag);
+    assert_eq!(said(&mut station), [""; 0]);
+}
+
+#[test]
+fn what_a_gag_gave_by_hand_does_not_move_the_arm_at_goods() {
+    let mut station = between_a_gag_and_a_robot();
+    play(
+        &mut station,
+        &[
+            (R1, "lager 1 north", &["r1: lager 1 lager"]),
+            (R1, "styrcomm", &["gag: styrcomm"]),
+            (Peer::Gag, "armcomm F1", &["r1: armcomm 11110001"]),
+            (Peer::Gag, "armcomm F3", &[]),
+            // The switch is turned while the arm moves.
+            (R1, "armcomm", &["gag: armcomm"]),
+            (Peer::Gag, "armcomm F4", &["r1: armcomm 11110100"]),
+            (Peer::Gag, "armcomm F3", &[]),
+            (R1, "styrcomm", &["gag: styrcomm"]),
+        ],
+    );
+}
+
+#[test]
 fn a_gags_commands_that_wait_are_bounded_and_none_is_older_than_the_mode() {
     let mut station = between_a_gag_and_a_robot();
     play(
