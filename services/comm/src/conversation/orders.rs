@@ -27,6 +27,9 @@ impl Conversation {
         } else if whose == For::Question {
             self.stand(now, STOPPED);
             return Ok(());
+        } else if self.known.mode() == Some(Mode::Autonomous) && !self.driving.is_running() {
+            // Logic would drive on.
+            return Err(Refusal::NotInCharge.to_string());
         }
         if let For::Action {
             number,

@@ -46,6 +46,12 @@ fn a_drive_ends_with_the_link_and_is_refused_where_logic_steers() {
         said[0].starts_with("refused 1 somebody else steers"),
         "{said:?}"
     );
+    // To let it stand as well, which logic would not heed.
+    let said = robot.hears(&["do 3 drive 1 100"]);
+    assert!(
+        said[0].starts_with("refused 3 somebody else steers"),
+        "{said:?}"
+    );
     assert_eq!(robot.steered, None);
     robot.mode(Mode::Manual);
     robot.health.blocked = Refusal::BoardSilent.into();
