@@ -124,6 +124,14 @@ pub enum StationLineError {
     Order(ActionError),
 }
 
+impl StationLineError {
+    /// Whether its first word is none that an external computer says, as where a peer answers the
+    /// extension's first line that it does not understand it.
+    pub fn is_of_nobody(&self) -> bool {
+        matches!(self, Self::Answer(AnswerError::Misread(misread)) if misread.column == 1)
+    }
+}
+
 impl StationLine {
     /// Reads a line without its end.
     ///

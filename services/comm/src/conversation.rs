@@ -236,7 +236,7 @@ impl Conversation {
         for line in lines {
             match line {
                 Ok(Ok(line)) => self.take(now, line, is_stopped),
-                Ok(Err(_)) if self.is_fresh => {}
+                Ok(Err(error)) if self.is_fresh && error.is_of_nobody() => {}
                 Ok(Err(error)) => self.misread(now, &error),
                 Err(_) => return self.hang_up(now, "its lines cannot be read"),
             }

@@ -193,6 +193,14 @@ fn a_peer_may_not_understand_the_first_line() {
 }
 
 #[test]
+fn a_peers_first_answer_is_told_what_is_wrong_with_it() {
+    let mut robot = Robot::connected(Mode::Autonomous);
+    let said = robot.hears(&["sidelength 0"]);
+    assert!(said[0].starts_with("thought column 12"), "{said:?}");
+    assert_eq!(robot.pass(200), ["sidelength"]);
+}
+
+#[test]
 fn only_the_arm_moves_at_the_goods() {
     let mut robot = idle();
     robot.hears(&["fetchprod 7"]);
