@@ -7,6 +7,7 @@ mod extended;
 mod full;
 mod gag;
 mod lost;
+mod pace;
 mod peers;
 mod scene;
 

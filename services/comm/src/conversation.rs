@@ -34,6 +34,9 @@
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
 //!   commands among these are dropped.
 //! - What cannot be done is told in a `thought`, and asked again a little later.
+//! - A peer that answers at once is not asked without end: commands are asked for at most 1 000
+//!   times a second, anything else at most 5 times. An answer that took longer than that is
+//!   followed by the next question at once.
 //!
 //! A station that has answered the extension's first line is told states, events and lists besides
 //! (`telling.rs`), and its numbered actions are carried out and answered (`conversation/orders.rs`):
@@ -71,8 +74,11 @@ const SIGN: u64 = 1_000_000_000;
 /// How long a peer that answers it may be silent while something is carried out, and else.
 const SILENT_BY_HAND: u64 = 150_000_000;
 const SILENT: u64 = 5_000_000_000;
-/// When a question is asked again after an impossible answer.
+/// When a question is asked again after an impossible answer, and at the earliest at all.
 const AGAIN: u64 = 200_000_000;
+/// When a further command is asked for at the earliest, however fast the peer has answered. One that
+/// takes this long for its answer waits for nothing.
+const PACE: u64 = 1_000_000;
 /// How long after the connection is there a robot in manual mode asks for the warehouse rather than
 /// for commands.
 const DESCRIBED: u64 = 1_000_000_000;
@@ -101,6 +107,10 @@ pub struct Conversation {
     held: Held,
     /// Nothing is asked before.
     ask_from_ns: u64,
+    /// What was asked last of this peer, and when.
+    asked: Option<(Query, u64)>,
+    /// When the next question goes, where one is held back.
+    asks_ns: Option<u64>,
     told: Told,
 
     warehouse: Described,
@@ -138,6 +148,8 @@ impl Conversation {
             signed_ns: 0,
             held: Held::default(),
             ask_from_ns: 0,
+            asked: None,
+            asks_ns: None,
             told: Told::default(),
             warehouse: warehouse.unwrap_or_default(),
             known: Known {
@@ -163,6 +175,12 @@ impl Conversation {
         self.driving.due()
     }
 
+    /// When it wants to be looked after next to ask something, in ns of real time, if a question is
+    /// held back.
+    pub const fn asks_ns(&self) -> Option<u64> {
+        self.asks_ns
+    }
+
     /// A connection is there.
     pub fn connected(&mut self, now: Moment) {
         self.is_up = true;
@@ -172,6 +190,7 @@ impl Conversation {
         self.heard_ns = now.ns;
         self.held.clear();
         self.ask_from_ns = 0;
+        self.asked = None;
         self.told = Told::default();
         self.warehouse.side = None;
         self.warehouse.products = None;
@@ -375,6 +394,7 @@ impl Conversation {
     }
 
     fn ask(&mut self, now: Moment) {
+        self.asks_ns = None;
         if !self.is_up {
             return;
         }
@@ -386,9 +406,26 @@ impl Conversation {
             }
             return;
         };
-        if self.held.get() != Some(query) && now.ns >= self.ask_from_ns {
-            self.held.ask(query);
-            self.say(RobotLine::Request(Request::Query(query)));
+        if self.held.get() == Some(query) {
+            return;
+        }
+        let from_ns = self.ask_from_ns.max(self.paced_ns(query));
+        if now.ns < from_ns {
+            self.asks_ns = Some(from_ns);
+            return;
+        }
+        self.asked = Some((query, now.ns));
+        self.held.ask(query);
+        self.say(RobotLine::Request(Request::Query(query)));
+    }
+
+    /// When `query` may be asked at the earliest, whatever was answered to the question before.
+    fn paced_ns(&self, query: Query) -> u64 {
+        let is_for_command = |query| matches!(query, Query::Wheels | Query::Arm);
+        match self.asked {
+            Some((last, at)) if is_for_command(last) && is_for_command(query) => at + PACE,
+            Some((last, at)) if last == query => at + AGAIN,
+            _ => 0,
         }
     }
 

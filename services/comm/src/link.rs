@@ -184,7 +184,7 @@ struct Thread {
 
 impl Thread {
     fn run(&self) {
-        let mut pause = FIRST_PAUSE;
+        let mut pauses = Pauses::default();
         let mut said = String::new();
         while !self.ends.load(Ordering::SeqCst) {
             let start = Instant::now();
@@ -203,17 +203,15 @@ impl Thread {
                         self.station
                     );
                     // One that has just been started may not listen yet.
-                    if said != why && pause > PATIENCE {
+                    if said != why && pauses.next > PATIENCE {
                         tracing::warn!("{why}; it is tried for ever");
                         said = why;
                     }
                 }
             }
-            if start.elapsed() >= GOOD {
-                pause = FIRST_PAUSE;
-            }
-            self.wait(jittered(pause));
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            // Parts of a second that nobody else has, so that many robots do not come back in step.
+            let chance = Clock::monotonic_ns() / 1_000 % 1_000;
+            self.wait(pauses.after(start.elapsed(), chance));
         }
     }
 
@@ -283,10 +281,29 @@ impl Thread {
     }
 }
 
-/// Three to five quarters of `pause`, so that many robots do not come back in step.
-fn jittered(pause: Duration) -> Duration {
-    let part = Clock::monotonic_ns() / 1_000 % 1_000;
-    pause * 3 / 4 + pause / 2 * u32::try_from(part).unwrap_or(0) / 1_000
+/// How long is waited between two tries.
+#[derive(Debug)]
+struct Pauses {
+    next: Duration,
+}
+
+impl Default for Pauses {
+    fn default() -> Self {
+        Self { next: FIRST_PAUSE }
+    }
+}
+
+impl Pauses {
+    /// The pause after a try that took so long, with its connection if it made one: three to five
+    /// quarters of the one that is next, by `chance` of 0 to 999.
+    fn after(&mut self, lasted: Duration, chance: u64) -> Duration {
+        if lasted >= GOOD {
+            self.next = FIRST_PAUSE;
+        }
+        let pause = self.next;
+        self.next = (pause * 2).min(LONGEST_PAUSE);
+        pause * 3 / 4 + pause / 2 * u32::try_from(chance).unwrap_or(0) / 1_000
+    }
 }
 
 #[cfg(test)]
@@ -344,5 +361,21 @@ mod tests {
         assert!(lines.len() < last, "{} of {last} were told", lines.len());
         assert_eq!(lines[lines.len() - 2], "done 1");
         assert_eq!(lines[lines.len() - 1], line(last + 1).trim_end());
+    }
+
+    #[test]
+    fn pauses_grow_until_a_connection_was_good_and_no_two_are_alike() {
+        let mut pauses = Pauses::default();
+        let brief = Duration::from_millis(1);
+        let mut pass = |lasted, chance| pauses.after(lasted, chance).as_millis();
+        let shortest: Vec<_> = (0..8).map(|_| pass(brief, 0)).collect();
+        assert_eq!(shortest, [75, 150, 300, 600, 1200, 2400, 3750, 3750]);
+        assert_eq!(
+            [0, 500, 999].map(|chance| pass(brief, chance)),
+            [3750, 5000, 6247]
+        );
+        // A station that closes again and again is not good before it has stayed for a while.
+        assert_eq!(pass(GOOD - brief, 0), 3750);
+        assert_eq!([pass(GOOD, 0), pass(brief, 0)], [75, 150]);
     }
 }

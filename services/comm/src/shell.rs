@@ -175,10 +175,7 @@ impl Shell {
 
     fn turn(&mut self) {
         self.watchdog.leave();
-        let due = self.conversation.due();
-        let left = due.map(|due| self.clock.real(due.saturating_sub(self.clock.now())));
-        self.waiter
-            .wait(left.unwrap_or(LONGEST_WAIT).min(LONGEST_WAIT));
+        self.waiter.wait(self.longest_wait());
         self.watchdog.enter("a turn");
         let now = self.now();
         self.conversation.turn(now);
@@ -189,6 +186,16 @@ impl Shell {
         self.take_lines(now);
         self.act();
         self.link.write();
+    }
+
+    /// How long there is nothing to do unless something comes, in real time.
+    fn longest_wait(&self) -> Duration {
+        let due = self.conversation.due();
+        let due = due.map(|due| self.clock.real(due.saturating_sub(self.clock.now())));
+        let asks_ns = self.conversation.asks_ns();
+        let asks = asks_ns.map(|at| Duration::from_nanos(at.saturating_sub(Clock::monotonic_ns())));
+        let waits = [due, asks].into_iter().flatten();
+        waits.fold(LONGEST_WAIT, Duration::min)
     }
 
     fn now(&self) -> Moment {

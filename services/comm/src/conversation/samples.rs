@@ -55,9 +55,10 @@ impl Conversation {
 
     /// Something has happened on a mission.
     pub fn event(&mut self, now: Moment, event: &Event) {
-        let waited = self.tasks.has_order();
+        let waited = (self.tasks.has_order(), self.tasks.has_picked());
         self.tasks.event(event);
-        if waited && !self.tasks.has_order() {
+        if waited != (self.tasks.has_order(), self.tasks.has_picked()) {
+            // It was refused.
             self.ask_from_ns = now.ns + AGAIN;
         }
         if self.is_extended {

@@ -22,7 +22,12 @@ impl Conversation {
         }
         for ended in self.driving.ended() {
             match &ended.result {
-                Err(why) if ended.numbers.is_empty() => self.think(why),
+                Err(why) if ended.numbers.is_empty() => {
+                    self.think(why);
+                    if self.held.get().is_none() {
+                        self.ask_from_ns = self.turned_ns + AGAIN;
+                    }
+                }
                 result => {
                     for number in &ended.numbers {
                         self.reply(*number, result.clone());

@@ -145,7 +145,7 @@ fn a_refusal_and_an_end_say_why() {
     assert!(said[0].contains("`lager resume`"), "{said:?}");
     robot.health.blocked = Refusal::None.into();
     robot.told();
-    robot.pass(200);
+    robot.pass(210);
     robot.hears(&["styrcomm 3"]);
     let report = finished(&robot, Finish::NoTape);
     let said = robot.reports(&report);

@@ -3,4 +3,5 @@
 mod by_hand;
 mod by_itself;
 mod extended;
+mod pace;
 mod robot;

@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use lager_comm::{Action, Conversation, LinkLost, Moment};
+use lager_lines::gag::Query;
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
 use lager_topics::{
@@ -69,9 +70,12 @@ impl Robot {
         robot
     }
 
+    /// Connects. What it asks is not answered at once.
     pub(crate) fn connect(&mut self) -> Vec<String> {
         self.conversation.connected(self.now);
-        self.pass(1)
+        let mut said = self.pass(1);
+        said.extend(self.pass(1));
+        said
     }
 
     pub(crate) fn disconnect(&mut self) -> Vec<String> {
@@ -143,10 +147,45 @@ impl Robot {
 
     /// Milliseconds pass in one turn, as where the process was held up.
     pub(crate) fn leap(&mut self, milliseconds: u64) {
-        self.now.ns += milliseconds * 1_000_000;
-        self.now.robot += Duration::from_millis(milliseconds);
+        self.leap_us(milliseconds * 1_000);
+    }
+
+    pub(crate) fn leap_us(&mut self, microseconds: u64) {
+        self.now.ns += microseconds * 1_000;
+        self.now.robot += Duration::from_micros(microseconds);
         self.conversation.turn(self.now);
         self.conversation.tell(self.now);
+    }
+
+    /// Time passes for a robot whose peer answers each question at once; it has `said` this before.
+    /// `answers` does so, and gives back what the robot has said then. What was asked, and when in ns,
+    /// is given back.
+    pub(crate) fn answered_at_once(
+        &mut self,
+        mut said: Vec<String>,
+        milliseconds: u64,
+        mut answers: impl FnMut(&mut Self, &str) -> Vec<String>,
+    ) -> Vec<(String, u64)> {
+        let questions = Query::ALL.map(Query::as_str);
+        let mut asked = Vec::new();
+        let end = self.now.ns + milliseconds * 1_000_000;
+        loop {
+            while let Some(line) = said.pop() {
+                if questions.contains(&line.as_str()) {
+                    asked.push((line.clone(), self.now.ns));
+                    assert!(asked.len() < 1_000_000, "it asks without end");
+                    said.extend(answers(self, &line));
+                }
+            }
+            if self.now.ns >= end {
+                return asked;
+            }
+            // As its shell: when it wants to be looked after, and every 10 ms.
+            let due = self.conversation.asks_ns().unwrap_or(u64::MAX);
+            let wait = due.saturating_sub(self.now.ns).clamp(1_000, 10_000_000);
+            self.leap_us(wait.div_ceil(1_000));
+            said = self.done();
+        }
     }
 
     /// The peer says lines, which arrive together.
