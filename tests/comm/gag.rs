@@ -1,10 +1,14 @@
-//! `lager gag` at the station that `lager up` starts where it is told to.
+//! `lager gag` at the station that `lager up` starts where it is told to, and a GaG that goes away.
 
-use std::io::Write;
+use std::io::{BufReader, Write};
 use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
 use std::process::Stdio;
 
 use lager_tests::{Domain, wait_for};
+
+use crate::scene::{Peer, Scene, WATCHDOG};
+use crate::station_at;
 
 #[test]
 fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
@@ -67,4 +71,41 @@ fn a_gag_without_a_station_says_what_to_do() {
     let said = String::from_utf8_lossy(&alone.stderr).into_owned();
     assert_eq!(alone.status.code(), Some(1), "{said}");
     assert!(said.contains("`lager up` or `lager station`"), "{said}");
+}
+
+#[test]
+fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
+    let domain = Domain::new();
+    let socket = domain.folder().join("gag");
+    let (_station, address) = station_at(&domain, "127.0.0.1:0", &[]);
+    let mut scene = Scene::at(domain, &address);
+    let gag = || {
+        let stream = UnixStream::connect(&socket).expect("it listens");
+        stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
+        Peer(BufReader::new(stream))
+    };
+    let asks = ["sidelength", "karta", "prodlis", "styrcomm"];
+    let mut driver = gag();
+    while scene.duties().is_none_or(|(left, _)| left == 0) {
+        let answer = match driver.waits_for(&asks).as_str() {
+            "sidelength" => "sidelength 40",
+            "karta" => "karta 2 2 0 0",
+            "prodlis" => "prodlis 3 1 0 0 left 2 1 0 down 3 1 1 right",
+            _ => "styrcomm 2",
+        };
+        driver.says(answer);
+        // The wheels begin to turn in a moment.
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    // The link between station and robot stays as it is.
+    drop(driver);
+    scene.wait_until_it_stands();
+    let place = scene.place();
+    let mut other = gag();
+    assert_eq!(other.waits_for(&["styrcomm"]), "styrcomm");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
+    let after = scene.place();
+    let moved = (after.0 - place.0).hypot(after.1 - place.1);
+    assert!(moved < 10.0, "it has moved by {moved} mm");
 }
