@@ -30,6 +30,11 @@ impl Outcome {
     /// The outcome in words.
     pub fn sentence(&self) -> String {
         match &self.failure {
+            // What it has not seen may be why.
+            Some(why) if self.lost > 0 => format!(
+                "the mission failed: {why} ({} of {} frames were lost)",
+                self.lost, self.frames
+            ),
             Some(why) => format!("the mission failed: {why}"),
             None => format!(
                 "{} delivered in {:.1} s of robot time; {} frames, {} lost",
