@@ -4,6 +4,7 @@ use std::io::{BufReader, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 use lager_tests::{Domain, wait_for};
 
@@ -86,7 +87,9 @@ fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
     };
     let asks = ["sidelength", "karta", "prodlis", "styrcomm"];
     let mut driver = gag();
+    let start = Instant::now();
     while scene.duties().is_none_or(|(left, _)| left == 0) {
+        assert!(start.elapsed() < WATCHDOG, "the robot does not drive");
         let answer = match driver.waits_for(&asks).as_str() {
             "sidelength" => "sidelength 40",
             "karta" => "karta 2 2 0 0",
@@ -95,7 +98,7 @@ fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
         };
         driver.says(answer);
         // The wheels begin to turn in a moment.
-        std::thread::sleep(std::time::Duration::from_millis(50));
+        std::thread::sleep(Duration::from_millis(50));
     }
     // The link between station and robot stays as it is.
     drop(driver);
@@ -103,7 +106,7 @@ fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
     let place = scene.place();
     let mut other = gag();
     assert_eq!(other.waits_for(&["styrcomm"]), "styrcomm");
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    std::thread::sleep(Duration::from_millis(500));
     assert_eq!(scene.duties().unwrap_or_default(), (0, 0));
     let after = scene.place();
     let moved = (after.0 - place.0).hypot(after.1 - place.1);
