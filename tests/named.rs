@@ -6,7 +6,7 @@ use std::process::Output;
 use lager_tests::{Domain, Running, wait_for};
 
 const WAREHOUSE: &str = "size = [2, 2]
-side_length_cm = 40
+side_length_cm = 50
 
 [[product]]
 id = 1

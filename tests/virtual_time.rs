@@ -1,5 +1,7 @@
 //! `lager simulate`: the whole robot in one process, in virtual time.
 
+use std::path::PathBuf;
+
 use lager_tests::Domain;
 use serde_json::Value;
 
@@ -78,6 +80,95 @@ fn the_same_seed_gives_the_same_run() {
     assert_eq!(strip(simulate(&args).0), strip(simulate(&args).0));
 }
 
+/// A warehouse file that is gone when this goes.
+struct File(PathBuf);
+
+impl File {
+    fn new(name: &str, text: &str) -> Self {
+        let name = format!("lager-{name}-{}.toml", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, text).expect("a temporary file");
+        Self(path)
+    }
+
+    fn name(&self) -> &str {
+        self.0.to_str().expect("a name")
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        std::fs::remove_file(&self.0).expect("the file is there");
+    }
+}
+
+/// A warehouse of 3 x 3 squares with goods on edges of all four directions.
+fn squares_of(side_cm: u16) -> File {
+    let mut text = format!("size = [3, 3]\nside_length_cm = {side_cm}\n");
+    for (id, [x, y], side) in [
+        (1, [1, 0], "down"),
+        (2, [0, 2], "left"),
+        (3, [2, 1], "right"),
+        (4, [1, 2], "up"),
+    ] {
+        text += &format!("[[product]]\nid = {id}\nsquare = [{x}, {y}]\nside = \"{side}\"\n");
+    }
+    File::new(&format!("squares-{side_cm}"), &text)
+}
+
+#[test]
+fn squares_of_every_size_are_driven_without_a_collision() {
+    // Where things come and go there must be room to turn beside them. The ranger sees 80 cm.
+    for (side_cm, things) in [
+        (45, "0"),
+        (50, "4"),
+        (60, "4"),
+        (80, "4"),
+        (100, "4"),
+        (150, "4"),
+    ] {
+        let file = squares_of(side_cm);
+        let args = [
+            "--warehouse",
+            file.name(),
+            "--mission",
+            "1,2,3,4",
+            "--battery",
+            "100",
+            "--seeds",
+            "1..4",
+        ];
+        let (runs, text) = simulate(&[&args[..], &["--obstacles", things]].concat());
+        assert_eq!(runs.len(), 4, "{text}");
+        for run in runs {
+            assert_eq!(run["delivered"].as_array().map(Vec::len), Some(4), "{run}");
+            assert_eq!(run["collisions"], 0, "{run}");
+        }
+    }
+}
+
+#[test]
+fn squares_in_which_the_robot_has_no_room_are_refused_and_the_sentence_says_why() {
+    let refused = |file: &File, args: &[&str], why: &str| {
+        let domain = Domain::new();
+        let output = domain.run(&[&["simulate", "--warehouse", file.name()], args].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains(why), "{said}");
+        domain.assert_clean();
+    };
+    let goods = "where goods stand it must be 45 cm or more";
+    refused(&squares_of(40), &["--mission", "1"], goods);
+    let things = "where things stand on the ways it must be 50 cm or more";
+    refused(
+        &squares_of(49),
+        &["--mission", "1", "--obstacles", "4"],
+        things,
+    );
+    let bare = "size = [3, 3]\nside_length_cm = 40\n[[obstacle]]\nbetween = [[1, 0], [2, 0]]\n";
+    refused(&File::new("narrow", bare), &["--mission", "1"], things);
+}
+
 /// As large as a warehouse may be, 100 by 100 crossings and 256 products, with things that stand on
 /// the straight ways to the farthest of them.
 fn largest_warehouse() -> String {
@@ -97,13 +188,11 @@ fn largest_warehouse() -> String {
 
 #[test]
 fn the_largest_warehouse_is_crossed_round_what_stands_in_the_way() {
-    let path = std::env::temp_dir().join(format!("lager-largest-{}.toml", std::process::id()));
-    std::fs::write(&path, largest_warehouse()).expect("a temporary file");
-    let warehouse = path.to_str().expect("a name");
+    let file = File::new("largest", &largest_warehouse());
     // 145 edges each way. For 170 the battery of some robots does not last.
     let args = [
         "--warehouse",
-        warehouse,
+        file.name(),
         "--mission",
         "205",
         "--battery",
@@ -112,7 +201,6 @@ fn the_largest_warehouse_is_crossed_round_what_stands_in_the_way() {
         "1..3",
     ];
     let (runs, text) = simulate(&args);
-    std::fs::remove_file(&path).expect("the file is there");
     assert_eq!(runs.len(), 3, "{text}");
     for run in &runs {
         assert_eq!(run["delivered"], serde_json::json!([205]), "{run}");

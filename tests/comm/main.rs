@@ -85,7 +85,7 @@ fn a_stop_is_confirmed_and_stays() {
 
 /// A warehouse that robot and station read from one file.
 pub(crate) const WAREHOUSE: &str = "size = [2, 2]
-side_length_cm = 40
+side_length_cm = 50
 
 [[product]]
 id = 1

@@ -113,7 +113,8 @@ pub fn run(
 ) -> Result<(), RunError> {
     let mut rig = Rig::new(images, &config.rig)?;
     rig.world_mut()
-        .scatter_obstacles(config.obstacles, config.rig.seed);
+        .scatter_obstacles(config.obstacles, config.rig.seed)
+        .map_err(RigError::from)?;
     if let Some(truth) = &config.resume {
         rig.resume(&truth.world_state());
     }

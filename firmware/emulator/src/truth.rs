@@ -139,6 +139,7 @@ impl Hand {
         let hand = match done {
             Ok(()) => Hands::Done,
             Err(HandsOff::NoEdge) => Hands::NoEdge,
+            Err(HandsOff::NoRoom) => Hands::NoRoom,
             Err(HandsOff::RobotThere) => Hands::RobotThere,
             Err(HandsOff::NothingThere) => Hands::NothingThere,
             Err(HandsOff::Full) => Hands::Full,
@@ -160,6 +161,7 @@ pub struct HandLine {
 pub enum Hands {
     Done,
     NoEdge,
+    NoRoom,
     RobotThere,
     NothingThere,
     Full,

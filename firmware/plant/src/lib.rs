@@ -31,6 +31,7 @@ pub mod make;
 pub mod motor;
 pub mod noise;
 mod obstacles;
+pub mod room;
 pub mod scene;
 pub mod servo;
 pub mod tape;

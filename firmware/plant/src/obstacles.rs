@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use crate::body::Pose;
 use crate::noise::Noise;
+use crate::room;
 use crate::scene::{self, Block};
 use crate::warehouse::{Edge, Warehouse};
 
@@ -42,6 +43,12 @@ pub enum HandsOff {
     /// The warehouse has no such edge.
     #[error("there is no such way in this warehouse")]
     NoEdge,
+    /// The ways are too short.
+    #[error(
+        "the ways are so short that a robot could not turn beside a thing; they must be {} cm or more",
+        room::LEAST_SIDE_WITH_THINGS_CM
+    )]
+    NoRoom,
     /// The robot is there.
     #[error("the robot is there; wait until it has gone on")]
     RobotThere,
@@ -59,6 +66,7 @@ pub enum HandsOff {
 /// All that stands on edges.
 #[derive(Clone, Debug)]
 pub(crate) struct Obstacles {
+    side_cm: u16,
     places: Vec<(Edge, Block)>,
     standing: Vec<Standing>,
     things: Vec<Thing>,
@@ -86,6 +94,7 @@ impl Obstacles {
         let edge = |[a, b]: [[u8; 2]; 2]| Edge::between(a, b);
         let written = warehouse.obstacles.iter();
         Self {
+            side_cm: warehouse.side_length_cm,
             places: edges(warehouse.size)
                 .map(|edge| (edge, scene::obstacle(edge, side)))
                 .collect(),
@@ -111,6 +120,11 @@ impl Obstacles {
         self.things = (0..count).map(thing).collect();
     }
 
+    /// The length of a way in cm.
+    pub(crate) const fn side_cm(&self) -> u16 {
+        self.side_cm
+    }
+
     /// What stands now.
     pub(crate) fn standing(&self) -> &[Standing] {
         &self.standing
@@ -131,6 +145,9 @@ impl Obstacles {
         let block = self.block(edge).ok_or(HandsOff::NoEdge)?;
         if self.standing.iter().any(|stands| stands.edge == edge) {
             return Ok(());
+        }
+        if self.side_cm < room::LEAST_SIDE_WITH_THINGS_CM {
+            return Err(HandsOff::NoRoom);
         }
         if distance(pose, &block) < APART {
             return Err(HandsOff::RobotThere);
@@ -328,6 +345,20 @@ mod tests {
             Err(HandsOff::NoEdge)
         );
         assert_eq!(obstacles.changes(), 2);
+    }
+
+    #[test]
+    fn nothing_is_put_on_ways_so_short_that_a_robot_could_not_turn_beside_it() {
+        let short = Warehouse {
+            side_length_cm: 49,
+            ..Warehouse::builtin("small").expect("built in")
+        };
+        let mut obstacles = Obstacles::new(&short);
+        let [_, far] = first_two();
+        assert_eq!(
+            obstacles.put(far, &Pose::default(), &mut Vec::new()),
+            Err(HandsOff::NoRoom)
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::obstacles::MOST_OBSTACLES;
+use crate::room::{LEAST_SIDE_WITH_GOODS_CM, LEAST_SIDE_WITH_THINGS_CM};
 use crate::warehouse::{
     Edge, Exit, Floor, LEAST_CONTRAST, MAX_EXIT_CM, MAX_PRODUCTS, MAX_SIDE_CM, MAX_SQUARES,
     MIN_RADIUS_CM, MIN_SIDE_CM, Product, Warehouse,
@@ -24,6 +25,16 @@ pub enum WarehouseError {
         "side_length_cm is {0}; a square's side must be from {MIN_SIDE_CM} to {MAX_SIDE_CM} cm"
     )]
     SideLength(u16),
+    /// Squares in which the robot would touch the goods' shelves.
+    #[error(
+        "side_length_cm is {0}; where goods stand it must be {LEAST_SIDE_WITH_GOODS_CM} cm or more, or a robot that turns on the far side of their square touches their shelf"
+    )]
+    NoRoomForGoods(u16),
+    /// Ways so short that the robot would touch a thing on the next one.
+    #[error(
+        "side_length_cm is {0}; where things stand on the ways it must be {LEAST_SIDE_WITH_THINGS_CM} cm or more, or a robot that turns on a crossing touches the thing on the next way before it can see it"
+    )]
+    NoRoomForThings(u16),
     /// Not at a corner (M2).
     #[error(
         "delivery is [{x}, {y}]; it must be a corner of the warehouse: [0, 0], [0, {height}], [{width}, 0] or [{width}, {height}]"
@@ -152,6 +163,12 @@ impl Warehouse {
         }
         self.exit.validate()?;
         self.validate_products()?;
+        if !self.products.is_empty() && self.side_length_cm < LEAST_SIDE_WITH_GOODS_CM {
+            return Err(WarehouseError::NoRoomForGoods(self.side_length_cm));
+        }
+        if !self.obstacles.is_empty() {
+            self.has_room_for_things()?;
+        }
         if self.obstacles.len() > MOST_OBSTACLES {
             return Err(WarehouseError::TooManyObstacles(self.obstacles.len()));
         }
@@ -165,6 +182,14 @@ impl Warehouse {
             }
         }
         Ok(())
+    }
+
+    /// Whether things may come and go on the ways.
+    ///
+    /// # Errors
+    /// The ways are too short for a robot to turn beside a thing.
+    pub fn has_room_for_things(&self) -> Result<(), WarehouseError> {
+        room_for_things(self.side_length_cm)
     }
 
     fn validate_products(&self) -> Result<(), WarehouseError> {
@@ -220,6 +245,14 @@ impl Warehouse {
     }
 }
 
+/// Whether things may stand in the middle of ways of this length in cm.
+pub(crate) fn room_for_things(side_cm: u16) -> Result<(), WarehouseError> {
+    match side_cm < LEAST_SIDE_WITH_THINGS_CM {
+        true => Err(WarehouseError::NoRoomForThings(side_cm)),
+        false => Ok(()),
+    }
+}
+
 impl Exit {
     fn validate(&self) -> Result<(), WarehouseError> {
         if !(MIN_RADIUS_CM..=200).contains(&self.radius_cm) {
@@ -258,10 +291,21 @@ mod tests {
 
     #[test]
     fn what_cannot_be_built_is_refused_with_a_sentence() {
-        let cases: [(WarehouseError, &str); 13] = [
+        let thing = Obstacle {
+            between: [[0, 0], [1, 0]],
+        };
+        let cases: [(WarehouseError, &str); 15] = [
             (error(|w| w.size = [0, 2]), "size is 0 x 2"),
             (error(|w| w.size = [2, 100]), "size is 2 x 100"),
             (error(|w| w.side_length_cm = 39), "side must be from 40"),
+            (
+                error(|w| w.side_length_cm = 44),
+                "where goods stand it must be 45 cm or more",
+            ),
+            (
+                error(|w| (w.side_length_cm, w.obstacles) = (49, vec![thing])),
+                "where things stand on the ways it must be 50 cm or more",
+            ),
             (error(|w| w.delivery = [1, 0]), "corner of the warehouse"),
             (error(|w| w.floor.tape = 50), "floor reads 45"),
             (error(|w| w.exit.radius_cm = 24), "from 25 to 200 cm"),

@@ -242,7 +242,7 @@ mod tests {
     fn a_file_reads_as_documented_and_writes_back() {
         let text = r#"
             size = [2, 1]
-            side_length_cm = 45
+            side_length_cm = 50
             delivery = [2, 1]
             [exit]
             length_cm = 90

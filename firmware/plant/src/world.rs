@@ -20,7 +20,7 @@ use crate::obstacles::{HandsOff, Obstacles, Standing};
 use crate::scene::{self, Block};
 use crate::servo::ServoBus;
 use crate::tape::Tape;
-use crate::validate::WarehouseError;
+use crate::validate::{WarehouseError, room_for_things};
 use crate::warehouse::{Edge, Warehouse};
 use crate::weave::Weave;
 
@@ -181,14 +181,22 @@ impl World {
     }
 
     /// From now on so many things stand on edges of the warehouse, at random, and come and go.
-    pub fn scatter_obstacles(&mut self, count: u32, seed: u64) {
+    ///
+    /// # Errors
+    /// Its ways are too short for a robot to turn beside a thing.
+    pub fn scatter_obstacles(&mut self, count: u32, seed: u64) -> Result<(), WarehouseError> {
+        if count > 0 {
+            room_for_things(self.obstacles.side_cm())?;
+        }
         self.obstacles.scatter(count, seed);
+        Ok(())
     }
 
     /// Puts a thing on an edge; one that stands there already stays.
     ///
     /// # Errors
-    /// The warehouse has no such edge, the robot is there, or too many things stand already.
+    /// The warehouse has no such edge, its ways are too short, the robot is there, or too many
+    /// things stand already.
     pub fn put_obstacle(&mut self, edge: Edge) -> Result<(), HandsOff> {
         self.obstacles.put(edge, &self.pose, &mut self.blocks)
     }
@@ -402,7 +410,7 @@ mod tests {
     #[test]
     fn a_thing_on_an_edge_stops_the_body_and_is_a_collision() {
         let mut world = world(1);
-        world.scatter_obstacles(40, 1);
+        world.scatter_obstacles(40, 1).expect("there is room");
         let pose = drive_on(&mut world);
         assert_eq!(world.state().collisions, 1);
         // On the second edge: before the robot nobody puts anything.
@@ -414,6 +422,18 @@ mod tests {
         world.set_motors(100, 100);
         world.advance_to(Duration::from_secs(10));
         world.pose()
+    }
+
+    #[test]
+    fn nothing_comes_and_goes_on_ways_so_short_that_a_robot_could_not_turn_beside_it() {
+        let short = Warehouse {
+            side_length_cm: 49,
+            ..Warehouse::builtin("small").unwrap()
+        };
+        let mut world = World::new(&short, 1, Make::Nominal, ARM).unwrap();
+        let refused = Err(WarehouseError::NoRoomForThings(49));
+        assert_eq!(world.scatter_obstacles(1, 1), refused);
+        assert_eq!(world.scatter_obstacles(0, 1), Ok(()));
     }
 
     #[test]

@@ -353,7 +353,7 @@ pub struct UpArgs {
     /// Seed of the simulated robot's noise [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::seed, help_heading = "Body")]
     pub seed: Option<u64>,
-    /// So many things come and go on the ways of a simulated floor, at random [default: 0]
+    /// So many things come and go on a simulated floor with squares of 50 cm or more [default: 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::obstacles, help_heading = "Body")]
     pub obstacles: Option<u32>,
     /// Run the clock of a simulated robot this many times as fast, that of an emulated one at most [default: 1]
@@ -472,7 +472,7 @@ pub struct SimulateArgs {
     /// Give up after this much virtual time
     #[arg(long, value_name = "SECONDS", default_value_t = 3600, allow_negative_numbers = true, value_parser = values::limit, help_heading = "Mission")]
     pub limit: u64,
-    /// So many things stand on edges at random, and come and go
+    /// So many things stand on edges at random, and come and go; squares must be 50 cm or more
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = values::obstacles, help_heading = "Body")]
     pub obstacles: u32,
     /// One line of JSON a run

@@ -262,9 +262,16 @@ impl Config {
         })
     }
 
-    /// The warehouse, built in or from its file, checked.
+    /// The warehouse, built in or from its file, checked. It has room for the things that are to come
+    /// and go there, if any are.
     pub fn warehouse(&self) -> Result<Warehouse> {
-        warehouse(&self.warehouse)
+        let warehouse = warehouse(&self.warehouse)?;
+        if self.body != Body::Serial && self.simulator.obstacles > 0 {
+            warehouse
+                .has_room_for_things()
+                .with_context(|| format!("no things can come and go in {}", self.warehouse))?;
+        }
+        Ok(warehouse)
     }
 
     /// Who picks the goods up: as told, or else as it is usual with the body.

@@ -90,6 +90,7 @@ enum Line {
 enum Hands {
     Done,
     NoEdge,
+    NoRoom,
     RobotThere,
     NothingThere,
     Full,
@@ -180,6 +181,7 @@ impl Emulator {
         let tried = match self.answered {
             Some(Hands::Done) => Ok(()),
             Some(Hands::NoEdge) => Err(HandsOff::NoEdge),
+            Some(Hands::NoRoom) => Err(HandsOff::NoRoom),
             Some(Hands::RobotThere) => Err(HandsOff::RobotThere),
             Some(Hands::NothingThere) => Err(HandsOff::NothingThere),
             Some(Hands::Full) => Err(HandsOff::Full),

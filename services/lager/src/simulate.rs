@@ -8,7 +8,7 @@
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use lager_bridge::listener::{Heard, Listener};
 use lager_bridge::machine::{Action, BridgeCore, CoreOptions};
 use lager_bridge::{Counts, Moment, PortEvent};
@@ -17,7 +17,8 @@ use lager_plant::{GoodState, Warehouse};
 use lager_ports::Stop;
 use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire};
 use lager_topics::{
-    Ask, EventKind, FailureKind, Health, Pick, Role, SteeringOrder, SteeringReport, Tag,
+    Ask, EventKind, FailureKind, Health, Hold, NavigatorStatus, Pick, Remedy, Role, SteeringOrder,
+    SteeringReport, Tag,
 };
 use serde::Serialize;
 
@@ -32,6 +33,8 @@ use crate::up::mission;
 const TICK: Duration = Duration::from_millis(1);
 /// How often logic's order is renewed, as its shell does.
 const RENEW: Duration = Duration::from_millis(40);
+/// How long a robot with a low battery stands before the run ends: in virtual time nobody charges it.
+const UNCHARGED: Duration = Duration::from_secs(10);
 /// How often the mission is looked at.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -64,6 +67,9 @@ struct Line<'a> {
     /// What logic calls it that it stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     failure_kind: Option<Tag<FailureKind>>,
+    /// What keeps a robot that would go on by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hold: Option<Tag<Hold>>,
 }
 
 /// Runs every seed in every warehouse; fails when a mission is not delivered.
@@ -87,7 +93,8 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
         let mission = mission(&warehouse, &args.mission)?;
         for seed in args.seeds.clone() {
             let start = Instant::now();
-            let mut whole = Whole::new(config, &warehouse, &mission, seed, args.obstacles)?;
+            let mut whole = Whole::new(config, &warehouse, &mission, seed, args.obstacles)
+                .with_context(|| format!("nothing can be simulated in {name}"))?;
             if let Some(percent) = args.battery {
                 let charge = f64::from(percent) / 100.0;
                 whole.robot.world_mut().set_battery_charge(charge);
@@ -111,6 +118,7 @@ pub fn run(config: &Config, args: &SimulateArgs) -> Result<ExitCode> {
                 lost: whole.lost(),
                 blocked: whole.blocked,
                 failure_kind: whole.failure_kind().filter(|_| failure.is_some()),
+                hold: whole.hold().filter(|_| failure.is_some()),
                 collisions: world.collisions(),
                 slips: world.goods().slips(),
                 lateral_mm: world.worst_lateral_mm(),
@@ -170,6 +178,8 @@ struct Whole {
     seen: Seen,
     renewed: Duration,
     looked: Duration,
+    /// Since when the battery keeps it.
+    uncharged: Option<Duration>,
     frames: u64,
     /// How often logic has found a way blocked.
     blocked: u32,
@@ -217,6 +227,7 @@ impl Whole {
             seen: Seen::default(),
             renewed: Duration::ZERO,
             looked: Duration::ZERO,
+            uncharged: None,
             frames: 0,
             blocked: 0,
             bytes: Vec::new(),
@@ -239,6 +250,9 @@ impl Whole {
         while self.now < limit {
             if let Some(outcome) = self.turn() {
                 return outcome.err();
+            }
+            if let Some(why) = self.waits_for_charge() {
+                return Some(why);
             }
         }
         Some(format!("not delivered within {} s", limit.as_secs()))
@@ -264,6 +278,29 @@ impl Whole {
             Ok(()) => Some(self.not_at_the_bar().map_or(Ok(()), Err)),
             Err(why) => Some(Err(why.to_owned())),
         }
+    }
+
+    /// That the robot stands for want of charge, once it has for a while.
+    fn waits_for_charge(&mut self) -> Option<String> {
+        let status = self
+            .seen
+            .status
+            .filter(|status| status.hold == Hold::Battery);
+        let Some(NavigatorStatus { x, y, remedy, .. }) = status else {
+            self.uncharged = None;
+            return None;
+        };
+        let since = *self.uncharged.get_or_insert(self.now);
+        let remedy = remedy.get().unwrap_or(Remedy::Charge);
+        let why =
+            || format!("the battery is low, and the robot stands at crossing ({x}, {y}): {remedy}");
+        (self.now >= since + UNCHARGED).then(why)
+    }
+
+    /// What keeps it although it would go on by itself.
+    fn hold(&self) -> Option<Tag<Hold>> {
+        let hold = self.navigator.status().hold;
+        (hold != Hold::None).then_some(hold)
     }
 
     /// What logic calls it that it stands.

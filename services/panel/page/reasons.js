@@ -107,6 +107,7 @@ const TABLE = [
   ["the robot is there; wait until it has gone on, or `lager stop` it elsewhere", "roboten är där; vänta tills den har kört vidare, eller stoppa den någon annanstans"],
   ["nothing stands there; `lager obstacle` lists what stands", "där står inget; `lager obstacle` visar vad som står"],
   ["no more things fit into the warehouse; `lager obstacle take` one first", "fler saker får inte plats i lagret; ta bort en först"],
+  ["the ways are so short that the robot could not turn beside a thing", "vägarna är så korta att roboten inte skulle kunna svänga bredvid en sak"],
   // Commands, by their names.
   ["forward", "framåt"], ["follow-forward", "följ linje"], ["backward", "bakåt"], ["follow-backward", "följ linje bakåt"],
   ["left", "vänster"], ["right", "höger"], ["left-diag", "45° vänster"], ["right-diag", "45° höger"], ["stop", "stå"],

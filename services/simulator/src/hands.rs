@@ -46,6 +46,7 @@ pub fn answer(tried: Result<(), HandsOff>) -> WorldAnswer {
             ..WorldAnswer::default()
         },
         Err(HandsOff::NoEdge) => refused(WorldRefusal::NoPlace),
+        Err(HandsOff::NoRoom) => refused(WorldRefusal::NoRoom),
         Err(HandsOff::RobotThere) => refused(WorldRefusal::RobotThere),
         Err(HandsOff::NothingThere) => refused(WorldRefusal::NothingThere),
         Err(HandsOff::Full) => refused(WorldRefusal::Full),

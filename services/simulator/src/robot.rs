@@ -103,13 +103,13 @@ impl Robot {
     /// A robot at the start of a warehouse, its boards about to start.
     ///
     /// # Errors
-    /// The warehouse cannot be built.
+    /// The warehouse cannot be built, or has no room for things on its ways.
     pub fn new(warehouse: &Warehouse, options: RobotOptions) -> Result<Self, WarehouseError> {
         let mut spread = Noise::new(options.seed, START_STREAM);
         let mut starts_ns = || START_UP_NS + spread.bits() % 5_000 * 1_000;
         let pose = resting_arm(&options.steering.arm.profile);
         let mut world = World::new(warehouse, options.seed, options.make, pose)?;
-        world.scatter_obstacles(options.obstacles, options.seed);
+        world.scatter_obstacles(options.obstacles, options.seed)?;
         Ok(Self {
             world,
             sensor: Running::new(options.baud, options.cause, starts_ns()),

@@ -120,6 +120,8 @@ coded! {
         NothingThere = 3,
         /// As many things stand as there is room for.
         Full = 4,
+        /// The ways are too short for a robot to turn beside a thing.
+        NoRoom = 5,
     }
 }
 
@@ -134,6 +136,7 @@ impl fmt::Display for WorldRefusal {
             }
             Self::NothingThere => "nothing stands there; `lager obstacle` lists what stands",
             Self::Full => "no more things fit into the warehouse; `lager obstacle take` one first",
+            Self::NoRoom => "the ways are so short that the robot could not turn beside a thing",
         })
     }
 }

@@ -147,7 +147,8 @@ reach_elbow = {reach_elbow}
 [simulator]
 # Seed of all noise: the same seed is the same robot.
 seed = {seed}
-# So many things come and go on the ways of the simulated floor, at random: 0 to 64.
+# So many things come and go on the ways of the simulated floor, at random: 0 to 64. They need
+# squares of 50 cm or more.
 obstacles = {obstacles}
 
 [chip]

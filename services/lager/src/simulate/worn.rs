@@ -59,3 +59,18 @@ fn a_battery_that_runs_low_is_charged_at_a_crossing_and_the_mission_goes_on() {
         assert_eq!(whole.run(LIMIT), None, "seed {seed}");
     }
 }
+
+#[test]
+fn a_battery_that_nobody_charges_ends_the_run_and_the_reason_says_so() {
+    let mut whole = robot(Floor::default(), 1);
+    whole.robot.world_mut().set_battery_charge(0.04);
+    let why = whole.run(LIMIT).expect("it stands");
+    assert!(why.contains("the battery is low"), "{why}");
+    assert!(why.contains("Charge the battery"), "{why}");
+    assert_eq!(
+        whole.hold().and_then(|hold| hold.get()),
+        Some(Hold::Battery)
+    );
+    assert_eq!(whole.failure_kind(), None, "it would go on by itself");
+    assert!(whole.now < LIMIT);
+}

@@ -34,18 +34,26 @@ impl BackUp {
     }
 
     /// What must come before a turn here: away from what stands so close behind the node that a
-    /// corner of the body would touch it; or, instead of the turn, to the node that the robot has
-    /// just left, as a turn so near to it would end on the tape that crosses there.
+    /// corner of the body would touch it; away from the node ahead, as a turn so near to it would
+    /// end on the tape that crosses there; or, for the same reason, instead of the turn to the node
+    /// that the robot has just left.
     pub(super) fn before(turn: &Turn, helm: &Helm<'_>) -> Option<Self> {
         let travelled_mm = helm.senses.odometer.travelled_mm;
+        let (nearest_mm, coast_mm) = (helm.config.nearest_turn_mm(), helm.config.coast_mm);
         let most_mm = match helm.senses.free_behind {
             true => helm.config.turn_room_mm,
             false => helm.config.turn_back_mm,
         };
         let room_at_mm = (travelled_mm - missing_room_mm(helm)).max(-most_mm);
         match turn.spot {
-            Spot::Along(_) if travelled_mm < helm.config.nearest_turn_mm() => {
-                Some(Self::to(helm.config.coast_mm))
+            Spot::Along(_) if travelled_mm < nearest_mm => Some(Self::to(coast_mm)),
+            Spot::Along(length_mm) => {
+                // A way out may be so short that there is no place between both.
+                let farthest_mm = (length_mm - nearest_mm).max(nearest_mm + 2.0 * coast_mm);
+                (travelled_mm > farthest_mm).then_some(Self {
+                    to_mm: farthest_mm - coast_mm,
+                    then: Outcome::Ready,
+                })
             }
             Spot::Node if travelled_mm > room_at_mm => Some(Self {
                 to_mm: room_at_mm,
@@ -62,13 +70,14 @@ impl BackUp {
         ordered: Command,
         config: &LogicConfig,
     ) -> Option<Self> {
+        let at_mm = status.travelled_mm as f32;
         (ordered == BACKWARD).then(|| match turn.spot {
+            Spot::Along(_) if at_mm < config.nearest_turn_mm() => Self::to(config.coast_mm),
             // It ends here, and what room there is now is looked at anew.
-            Spot::Node => Self {
-                to_mm: status.travelled_mm as f32,
+            _ => Self {
+                to_mm: at_mm,
                 then: Outcome::Ready,
             },
-            Spot::Edge(_) | Spot::Along(_) => Self::to(config.coast_mm),
         })
     }
 }

@@ -36,6 +36,12 @@ use crate::outcome::Outcome;
 /// cross one.
 const LONGEST_GAP: Duration = Duration::from_millis(100);
 
+/// How near the axle is to its node when a thing behind that is looked at once more, in mm: from
+/// farther away the ranger does not tell it from one that stands where there is room.
+const CLOSE_MM: f32 = 60.0;
+/// The front of the body, 170 mm ahead of the axle, comes to rest so far behind the node, in mm.
+const FRONT_MM: f32 = 175.0;
+
 /// Frames in a row without the line after which it has ended behind the cross bar.
 const ENDED: u8 = 3;
 
@@ -301,16 +307,22 @@ impl Behaviour for Follow {
         outcome.or_else(|| self.watch_line(state, helm))
     }
 
-    /// Takes a distance: what stands before the next node, or on it, blocks the way; what stands
-    /// behind it is looked at from there. The way out is not looked at: there is no other one, and
-    /// delivered goods lie at its end.
+    /// Takes a distance: what stands before the next node, or on it, or so close behind it that the
+    /// body would touch it there, blocks the way; what stands farther behind it is looked at from
+    /// there. The way out is not looked at: there is no other one, and delivered goods lie at its
+    /// end.
     fn range(&mut self, centimetres: u8, helm: &mut Helm<'_>) -> Option<Outcome> {
         let between_nodes = matches!(self.until, Until::Node | Until::Station);
         let edge = self.ahead.edge.filter(|_| between_nodes)?;
         let (config, senses) = (helm.config, &helm.senses);
         let ranger_at = senses.odometer.travelled_mm + config.ranger_ahead_mm;
         let at_mm = ranger_at + f32::from(centimetres) * 10.0;
-        let is_ahead = at_mm < edge.length_mm + config.beyond_node_mm;
+        let is_close = edge.length_mm - senses.odometer.travelled_mm <= CLOSE_MM;
+        let beyond_mm = match self.step {
+            Step::ToNode | Step::NearNode if is_close => FRONT_MM,
+            _ => config.beyond_node_mm,
+        };
+        let is_ahead = at_mm < edge.length_mm + beyond_mm;
         if config.ranger_cm == 0 || centimetres >= config.halt_cm || !is_ahead || !helm.active {
             return None;
         }

@@ -94,6 +94,23 @@ fn a_turn_before_what_stands_close_behind_its_node_has_room() {
 }
 
 #[test]
+fn who_would_touch_a_thing_behind_the_next_node_turns_back_before_it_and_goes_another_way() {
+    // The body reaches 170 mm ahead of the axle. In squares of 40 cm what stands in the middle of a
+    // way begins 160 mm behind its node; in larger ones it may stand anywhere.
+    for (side_cm, behind) in [(40, 160.0), (50, 165.0), (60, 120.0), (100, 140.0)] {
+        let mut trial = example(side_cm);
+        let at = f64::from(side_cm) * 10.0 + behind;
+        trial.body.obstacles.push(((at, -80.0), (at + 80.0, 80.0)));
+        trial.order(1, 1);
+        let halted = trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Halted);
+        assert!(halted, "{}", trial.story());
+        trial.deliver(1);
+        assert!(!trial.body.touched, "{}", trial.story());
+        assert_eq!(nodes(&trial)[..2], [(0, 0), (0, 1)], "{}", trial.story());
+    }
+}
+
+#[test]
 fn what_is_seen_from_a_node_is_driven_round_without_going_near_it() {
     let mut trial = example(50);
     put(&mut trial, ((1, 0), (2, 0)));
@@ -242,6 +259,23 @@ fn killed_on_the_way_back(far: f64) {
         false => ((0, 0), (1, 0)),
     };
     put(&mut trial, edge);
+    turns_back_however_it_is_killed(trial);
+}
+
+#[test]
+fn a_navigator_killed_while_it_backs_up_from_a_node_to_turn_round_does_so_all_the_same() {
+    for side_cm in [50, 60] {
+        let mut trial = example(side_cm);
+        // 120 mm behind the node.
+        let at = f64::from(side_cm) * 10.0 + 120.0;
+        trial.body.obstacles.push(((at, -80.0), (at + 80.0, 80.0)));
+        trial.order(1, 1);
+        turns_back_however_it_is_killed(trial);
+    }
+}
+
+/// Kills it again and again from where it halts until it has turned round.
+fn turns_back_however_it_is_killed(mut trial: Trial) {
     assert!(trial.run_until(SECOND * 60, |trial| trial.phase() == Phase::Halted));
     let outages = [20, 90, 130, 250, 700].map(Duration::from_millis);
     let mut kills = 0;
