@@ -48,6 +48,8 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
         .write_all(b"fetchprod two\nfetchprod 2\n")
         .expect("a pipe");
     drop(person);
+    // It waits for as long as its robot does not ask.
+    wait_for("the GaG to end", || gag.try_wait().expect("a child"));
     let ended = gag.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stdout).into_owned();
     assert!(ended.status.success(), "{said}");

@@ -67,7 +67,9 @@ impl SensorConfig {
         loop_period_us: 5_000,
         ir_model: IrModel::Gp2y0a21,
         thresholds: [128; CHANNELS],
-        status_period_us: 500_000,
+        // Twice a second. It is due a little before the pass that tells it, so that a few
+        // microseconds more or less do not decide which one that is.
+        status_period_us: 499_750,
         calibration_us: 5_000_000,
         gap_us: PACKET_GAP_US,
     };
