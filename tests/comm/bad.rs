@@ -62,7 +62,7 @@ fn the_memory_of_a_station_is_bounded_whatever_its_peers_do() {
         good.says(question);
         assert_eq!(good.hears().as_deref(), Some(answer));
     };
-    asks("sidelength", "sidelength 40");
+    asks("sidelength", "sidelength 50");
     let before = peak_kib(station.pid());
 
     let attacks = attacks();
@@ -94,7 +94,7 @@ fn the_memory_of_a_station_is_bounded_whatever_its_peers_do() {
     println!("{connected} connections, {closed} closed; {more} KiB more at the most");
     assert!(more <= MOST_KIB, "{more} KiB more than {before} KiB");
     drop(peers);
-    asks("sidelength", "sidelength 40");
+    asks("sidelength", "sidelength 50");
     assert!(station.is_running());
 }
 

@@ -124,7 +124,7 @@ fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
     let questions = ["sidelength", "karta", "prodlis", "fetchprod", "styrcomm"];
     loop {
         let answer = match asking.robot.waits_for(&questions).as_str() {
-            "sidelength" => "sidelength 40",
+            "sidelength" => "sidelength 50",
             "karta" => "karta 2 2 0 0",
             "prodlis" => "prodlis 3 1 0 0 left 2 1 0 down 3 1 1 right",
             "fetchprod" => break,

@@ -93,7 +93,7 @@ fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
     while scene.duties().is_none_or(|(left, _)| left == 0) {
         assert!(start.elapsed() < WATCHDOG, "the robot does not drive");
         let answer = match driver.waits_for(&asks).as_str() {
-            "sidelength" => "sidelength 40",
+            "sidelength" => "sidelength 50",
             "karta" => "karta 2 2 0 0",
             "prodlis" => "prodlis 3 1 0 0 left 2 1 0 down 3 1 1 right",
             _ => "styrcomm 2",

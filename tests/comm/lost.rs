@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use crate::station_at;
 
 /// The side of a square of the warehouse, in mm.
-const SIDE_MM: f64 = 400.0;
+const SIDE_MM: f64 = 500.0;
 /// How far from a crossing the middle of the axle may stand, in mm.
 const AT_CROSSING_MM: f64 = 30.0;
 

@@ -154,7 +154,7 @@ fn a_gag_at_a_station_has_goods_fetched() {
     let mut fetches = |product| loop {
         let questions = ["sidelength", "karta", "prodlis", "armcomm", "fetchprod"];
         let answer = match gag.waits_for(&questions).as_str() {
-            "sidelength" => "sidelength 40",
+            "sidelength" => "sidelength 50",
             "karta" => "karta 2 2 0 0",
             "prodlis" => "prodlis 3 1 0 0 left 2 1 0 down 3 1 1 right",
             // A simulated robot picks by itself.
