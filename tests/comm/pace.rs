@@ -1,5 +1,5 @@
-//! External computers that answer at once, and one that closes every connection at once: neither makes
-//! the robot ask or connect without end.
+//! External computers that answer at once, and one that closes every connection at once: neither
+//! makes the robot ask or connect without end.
 
 use std::net::TcpListener;
 use std::time::{Duration, Instant};

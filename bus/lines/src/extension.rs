@@ -79,10 +79,10 @@
 //!                                      them took at most so many microseconds to logic's decision
 //! truth <int> <int> <int> <prodid>     of a simulated robot: x and y in mm, heading in degrees,
 //!                                      what it holds or `-`
-//! sensors {<int> <int> <int> <int>}    while the line sensors are calibrated, of each of the eleven,
-//!                                      the leftmost first: what it reads, the least and the most that
-//!                                      it has read, 0 to 255 and higher over tape, and 1 once that is
-//!                                      both floor and tape
+//! sensors {<int> <int> <int> <int>}    while the line sensors are calibrated, of each of the
+//!                                      eleven, the leftmost first: what it reads, the least and
+//!                                      the most that it has read, 0 to 255 and higher over tape,
+//!                                      and 1 once that is both floor and tape
 //! thinks {<key>=<value>}               the `thought` that follows, in values; see `Thinks`
 //! thought <text>                       as in the document
 //!
@@ -91,7 +91,8 @@
 //! ```
 //!
 //! Here a list may be empty, and `route`, `blocked`, `queue` and `sensors` are sent when they have
-//! changed. A line that cannot be read changes nothing; if it has a number the robot answers `refused`.
+//! changed. A line that cannot be read changes nothing; if it has a number the robot answers
+//! `refused`.
 //!
 //! ```
 //! use lager_lines::conversation::{RobotLine, StationLine};

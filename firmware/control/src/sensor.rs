@@ -8,13 +8,14 @@
 //!                          --> FlipFlop --.-- line packet (raw line packet before it, if set)
 //!                                         '-- read IR --> distance packet
 //!                                             or, when due, an answer to a setting, board status;
-//!                                             every other time of a calibration one sensor's reading
+//!                                             in a calibration, every other time, what one line
+//!                                             sensor reads
 //! ```
 //!
 //! The rarer things take the place of a distance, twice a second for the board status. That departs
 //! from the document's FlipFlop, which takes strict turns. But a pass that sends two things is
-//! longer, and delays the next word to the wheels by 0.3 ms. While the line sensors are calibrated every
-//! other distance gives way to what one of them has read, each in its turn.
+//! longer, and delays the next word to the wheels by 0.3 ms. While the line sensors are calibrated
+//! every other distance gives way to what one of them has read, each in its turn.
 //!
 //! The two handshakes do not wait for each other: without the steering board the Pi is served,
 //! without the Pi the steering board is. Packets and words leave by interrupt beside everything

@@ -76,12 +76,12 @@ const SILENT_BY_HAND: u64 = 150_000_000;
 const SILENT: u64 = 5_000_000_000;
 /// When a question is asked again after an impossible answer, and at the earliest at all.
 const AGAIN: u64 = 200_000_000;
-/// When a further command is asked for at the earliest, however fast the peer has answered. One that
-/// takes this long for its answer waits for nothing.
+/// When a further command is asked for at the earliest, however fast the peer has answered. One
+/// that takes this long for its answer waits for nothing.
 ///
 /// On a busy machine with two cores comm took 54 % of one for a peer that answered 36 000 times a
-/// second. With this pace it takes 5.6 %, with one of 2 ms 3.8 %, and while nothing is answered 0.7 %
-/// (2026-11-24).
+/// second. With this pace it takes 5.6 %, with one of 2 ms 3.8 %, and while nothing is answered
+/// 0.7 % (2026-11-24).
 const PACE: u64 = 1_000_000;
 /// How long after the connection is there a robot in manual mode asks for the warehouse rather than
 /// for commands.

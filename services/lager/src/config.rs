@@ -262,8 +262,8 @@ impl Config {
         })
     }
 
-    /// The warehouse, built in or from its file, checked. It has room for the things that are to come
-    /// and go there, if any are.
+    /// The warehouse, built in or from its file, checked. It has room for the things that are to
+    /// come and go there, if any are.
     pub fn warehouse(&self) -> Result<Warehouse> {
         let warehouse = warehouse(&self.warehouse)?;
         if self.body != Body::Serial && self.simulator.obstacles > 0 {

@@ -33,7 +33,8 @@ use crate::up::mission;
 const TICK: Duration = Duration::from_millis(1);
 /// How often logic's order is renewed, as its shell does.
 const RENEW: Duration = Duration::from_millis(40);
-/// How long a robot with a low battery stands before the run ends: in virtual time nobody charges it.
+/// How long a robot with a low battery stands before the run ends: in virtual time nobody charges
+/// it.
 const UNCHARGED: Duration = Duration::from_secs(10);
 /// How often the mission is looked at.
 const LOOK: Duration = Duration::from_millis(10);

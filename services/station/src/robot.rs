@@ -12,16 +12,16 @@
 //!
 //! - One question is held. A new question takes its place, and the old one is never answered.
 //! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
-//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. A robot that speaks the
-//!   extension is told it at once, though it asks nothing while it turns. When the robot asks for
-//!   something else, its connection ends or somebody takes its wheel, they are dropped: nobody's
-//!   old command moves it later.
+//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. A robot that speaks
+//!   the extension is told it at once, though it asks nothing while it turns. When the robot asks
+//!   for something else, its connection ends or somebody takes its wheel, they are dropped:
+//!   nobody's old command moves it later.
 //! - A product leaves the queue when the robot is told it. If the connection ends before the robot
 //!   has said another word, it is put back, since it may not have arrived.
 //! - The queue outlives connections.
 //! - While a GaG speaks for the robot only commands are answered from here: those that it gave
-//!   before it was asked, and those that were given besides, a stop above all. The robot stands when
-//!   a GaG that drives it leaves, or somebody takes the wheel from it.
+//!   before it was asked, and those that were given besides, a stop above all. The robot stands
+//!   when a GaG that drives it leaves, or somebody takes the wheel from it.
 //!
 //! - A robot that speaks the extension is given numbered actions besides, and answers each. What it
 //!   shows of itself is kept with the time when it came ([`Shown`]). Who drives it by actions holds
@@ -204,8 +204,8 @@ impl Robot {
         Ok(self.answer())
     }
 
-    /// Stops the robot: in the extension's lane of its own if it speaks that, else by a command. The
-    /// number is that of the confirmation, which only the extension has.
+    /// Stops the robot: in the extension's lane of its own if it speaks that, else by a command.
+    /// The number is that of the confirmation, which only the extension has.
     ///
     /// # Errors
     ///
@@ -374,8 +374,8 @@ impl Robot {
         self.doing = Doing::Fetching;
     }
 
-    /// Whoever gave commands gives no more: none of them waits any longer, and the robot stands where
-    /// one of them turns its wheels.
+    /// Whoever gave commands gives no more: none of them waits any longer, and the robot stands
+    /// where one of them turns its wheels.
     pub(crate) fn end_commands(&mut self) -> Option<StationLine> {
         self.drop_commands();
         let turns = core::mem::take(&mut self.turns_wheels);

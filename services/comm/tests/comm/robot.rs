@@ -158,8 +158,8 @@ impl Robot {
     }
 
     /// Time passes for a robot whose peer answers each question at once; it has `said` this before.
-    /// `answers` does so, and gives back what the robot has said then. What was asked, and when in ns,
-    /// is given back.
+    /// `answers` does so, and gives back what the robot has said then. What was asked, and when in
+    /// ns, is given back.
     pub(crate) fn answered_at_once(
         &mut self,
         mut said: Vec<String>,
