@@ -91,7 +91,9 @@ pub use error::{
 };
 pub use fault::{Difference, TransportFault};
 pub use found::{Found, FoundSample};
-pub use introspect::{Layout, NodeInfo, NodeState, Peer, TopicInfo, nodes, remove_stale_nodes};
+pub use introspect::{
+    Layout, NodeInfo, NodeState, Peer, ServiceWatch, TopicInfo, nodes, remove_stale_nodes,
+};
 pub use inventory::Inventory;
 pub use keeper::{Keeper, KeeperError};
 pub use kept::KeptError;

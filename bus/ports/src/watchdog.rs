@@ -22,8 +22,10 @@ use std::time::{Duration, Instant};
 
 use crate::shutdown::Shutdown;
 
-/// How often the watch looks: seldom, because sixty tools may look on beside a robot.
+/// How often the watch looks while something may hang.
 const TICK: Duration = Duration::from_millis(50);
+/// How often it looks otherwise: seldom, because sixty tools may look on beside a robot.
+const QUIET_TICK: Duration = Duration::from_millis(250);
 /// A longer pause between two looks counts only as this long: the whole process did not run
 /// meanwhile, because it was frozen or kept from its core, and so the watched call did not run
 /// either.
@@ -129,7 +131,7 @@ impl Watchdog {
     fn watch(&self, mut watch: Watch, shutdown: &Shutdown) -> GivenUp {
         let mut looked = Instant::now();
         loop {
-            std::thread::sleep(TICK);
+            std::thread::sleep(watch.tick());
             let tick = looked.elapsed();
             looked = Instant::now();
             let now = *self.now();
@@ -155,6 +157,7 @@ struct Watch {
     /// Whether the wish to end cuts nothing short but a call.
     only_calls: bool,
     call: u64,
+    /// How long the call has lasted that was under way at the last look.
     lasted: Duration,
     wished_for: Duration,
 }
@@ -170,6 +173,12 @@ impl Watch {
         }
     }
 
+    /// How long to wait until the next look.
+    fn tick(&self) -> Duration {
+        let is_quiet = self.lasted.is_zero() && self.wished_for.is_zero();
+        if is_quiet { QUIET_TICK } else { TICK }
+    }
+
     /// One look, `tick` after the one before; whether to give up.
     fn look(&mut self, tick: Duration, now: Now, shutdown: bool) -> Option<GivenUp> {
         let tick = tick.min(LONGEST_TICK);
@@ -181,14 +190,13 @@ impl Watch {
                 return Some(GivenUp::Interrupted);
             }
         }
-        if now.calls != self.call {
+        let Some(what) = now.what.filter(|_| now.calls == self.call) else {
             self.call = now.calls;
             self.lasted = Duration::ZERO;
             return None;
-        }
+        };
         self.lasted += tick;
-        let what = now.what.filter(|_| self.lasted >= self.limit)?;
-        Some(GivenUp::Hung { what })
+        (self.lasted >= self.limit).then_some(GivenUp::Hung { what })
     }
 }
 
@@ -216,6 +224,26 @@ mod tests {
             watch.look(TICK, call(1), false),
             Some(GivenUp::Hung { what })
         );
+    }
+
+    #[test]
+    fn it_looks_seldom_until_a_call_lasts_or_the_end_is_wished_for() {
+        let mut watch = Watch::new(LIMIT);
+        let resting = Now {
+            calls: 2,
+            what: None,
+        };
+        for now in [call(1), call(2), resting, resting] {
+            watch.look(QUIET_TICK, now, false);
+            assert_eq!(watch.tick(), QUIET_TICK);
+        }
+        watch.look(QUIET_TICK, call(3), false);
+        watch.look(QUIET_TICK, call(3), false);
+        assert_eq!(watch.tick(), TICK);
+        watch.look(TICK, resting, false);
+        assert_eq!(watch.tick(), QUIET_TICK);
+        watch.look(QUIET_TICK, resting, true);
+        assert_eq!(watch.tick(), TICK);
     }
 
     #[test]

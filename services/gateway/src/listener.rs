@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, Clock, Found, Layout, Look, PortError, ReceiveError, Shutdown, Source, Subscriber,
-    Watchdog,
+    Bus, Clock, Found, Layout, Look, PortError, ReceiveError, ServiceWatch, Shutdown, Source,
+    Subscriber, Watchdog,
 };
 use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
 use serde::Serialize;
@@ -15,11 +15,16 @@ use serde::Serialize;
 use crate::figures::Figures;
 use crate::{GatewayError, Shared};
 
-/// The pace at which it polls. A state's queue holds one sample, so the pace decides how many
-/// states are missed; `lager_recorder` has measured it.
-const POLL: Duration = Duration::from_millis(2);
-/// How often it looks for topics that have come, and at the ends of all.
+/// The pace at which it polls for a viewer. A state's queue holds one sample, so the pace decides how
+/// many states are missed; `lager_recorder` has measured it.
+const VIEWED: Duration = Duration::from_millis(2);
+/// The pace at which it polls for its figures alone. They are made from stamps, so it is enough that
+/// no stream's queue runs over, and the robot keeps its cores.
+const COUNTED: Duration = Duration::from_millis(5);
+/// How often it looks whether topics have come.
 const LOOK: Duration = Duration::from_secs(1);
+/// How often it looks at the ends of all, which opens every topic.
+const ENDS: Duration = Duration::from_secs(5);
 /// So many samples of one topic are taken before the next topic has its turn.
 const TURN: usize = 1_024;
 
@@ -44,6 +49,7 @@ pub(crate) fn listen(
     viewer: Option<Box<dyn Viewer>>,
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
+    let pace = if viewer.is_some() { VIEWED } else { COUNTED };
     let mut listener = Listener {
         bus,
         watchdog,
@@ -52,6 +58,8 @@ pub(crate) fn listen(
         feeds: Vec::new(),
         opened: BTreeSet::new(),
         refused: BTreeSet::new(),
+        services: ServiceWatch::default(),
+        ends_looked_at: None,
     };
     let mut looked: Option<Instant> = None;
     while !shutdown.is_requested() && !is_over() {
@@ -63,7 +71,7 @@ pub(crate) fn listen(
             listener.look(shared)?;
         }
         listener.drain(shared)?;
-        std::thread::sleep(POLL);
+        std::thread::sleep(pace);
     }
     Ok(())
 }
@@ -78,6 +86,8 @@ struct Listener<'a> {
     opened: BTreeSet<String>,
     /// Topics that could not be opened, which was said.
     refused: BTreeSet<String>,
+    services: ServiceWatch,
+    ends_looked_at: Option<Instant>,
 }
 
 /// A topic that is listened to.
@@ -116,7 +126,8 @@ impl Takers<'_> {
 
 impl Listener<'_> {
     /// Opens topics that are not listened to yet, of the table and of other people's, and looks at
-    /// the ends of all. One that cannot be opened is tried again at the next look.
+    /// the ends of all, where services have come or gone or it is time. A topic that cannot be opened
+    /// is tried again.
     fn look(&mut self, shared: &Shared) -> Result<(), GatewayError> {
         for entry in TOPICS {
             if !self.opened.contains(entry.name) {
@@ -125,6 +136,11 @@ impl Listener<'_> {
                 self.keep(entry.name, opened.expect("a topic of the table").map(Some));
             }
         }
+        let is_due = |looked: Instant| looked.elapsed() >= ENDS;
+        if !self.services.has_changed(self.bus) && !self.ends_looked_at.is_none_or(is_due) {
+            return Ok(());
+        }
+        self.ends_looked_at = Some(Instant::now());
         let look = || self.bus.topics();
         let mut topics = self.watchdog.over("listing the topics", look)?;
         topics.retain(|topic| topic.robot == *self.bus.robot());

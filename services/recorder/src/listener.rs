@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lager_journal::{Envelope, EnvelopeSchema, Times};
-use lager_ports::{Bus, Clock, Layout, Look, PortError, ReceiveError, Source, Watchdog};
+use lager_ports::{
+    Bus, Clock, Layout, Look, PortError, ReceiveError, ServiceWatch, Source, Watchdog,
+};
 use lager_topics::{Description, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, visit};
 use serde::Serialize;
 
@@ -26,6 +28,7 @@ pub(crate) struct Listener<'a> {
     pub(crate) feeds: Vec<Box<dyn Feed>>,
     /// Topics that are listened to, or cannot be.
     pub(crate) known: BTreeSet<String>,
+    pub(crate) services: ServiceWatch,
 }
 
 /// How stamps become times of the file.
@@ -89,6 +92,9 @@ impl Listener<'_> {
     /// Opens topics of other people's that have come. Returns why some cannot be recorded.
     pub(crate) fn look_for_more(&mut self) -> Result<Vec<String>, RecordError> {
         let mut refused = Vec::new();
+        if !self.services.has_changed(self.bus) {
+            return Ok(refused);
+        }
         let look = || self.bus.topics();
         for topic in self.watchdog.over("listing the topics", look)? {
             let is_new = topic.robot == *self.bus.robot()

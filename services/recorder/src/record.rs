@@ -9,7 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use lager_journal::{Count, Start};
-use lager_ports::{Bus, Clock, Shutdown, Watchdog};
+use lager_ports::{Bus, Clock, ServiceWatch, Shutdown, Watchdog};
 
 use crate::config::RecordConfig;
 use crate::error::RecordError;
@@ -129,6 +129,7 @@ pub fn record(
         queue: to,
         feeds: Vec::new(),
         known: BTreeSet::new(),
+        services: ServiceWatch::default(),
     };
     let mut stands = |refused| {
         let progress = Progress {

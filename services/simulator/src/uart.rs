@@ -4,8 +4,9 @@
 //!   Pi --write--> [byte, arrives at t] [..] --> board     every byte takes 10 bits (8N1)
 //!   Pi <--read--- [byte, arrives at t] [..] <-- board     queued whole or not at all
 //! ```
-//! A byte exists for its reader from the moment its last bit is over. Nothing waits for a reader:
-//! what the Pi does not fetch in time is lost, as on a real port nobody has open.
+//! A byte exists for a board from the moment its last bit is over. The Pi's UART hands on what it has
+//! when the line falls idle, so the Pi gets what was queued in one piece in one piece. Nothing waits
+//! for a reader: what the Pi does not fetch in time is lost, as on a real port nobody has open.
 
 use std::collections::VecDeque;
 
@@ -22,10 +23,17 @@ pub(crate) struct Uart {
     to_board_free_ns: u64,
     to_pi: VecDeque<(u64, u8)>,
     to_pi_free_ns: u64,
-    /// Ends of what was queued in one piece and has not wholly arrived.
-    ends: VecDeque<u64>,
+    /// What was queued in one piece and has not wholly arrived.
+    pieces: VecDeque<Piece>,
     cut: bool,
     dropped: u64,
+}
+
+/// When the bits of what a board queued at once go over the line.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    begin_ns: u64,
+    end_ns: u64,
 }
 
 impl Uart {
@@ -36,7 +44,7 @@ impl Uart {
             to_board_free_ns: 0,
             to_pi: VecDeque::new(),
             to_pi_free_ns: 0,
-            ends: VecDeque::new(),
+            pieces: VecDeque::new(),
             cut: false,
             dropped: 0,
         }
@@ -54,10 +62,13 @@ impl Uart {
         }
     }
 
-    /// The Pi fetches what has arrived.
+    /// The Pi fetches what has arrived, but nothing yet of a piece that is still arriving.
     pub(crate) fn read(&mut self, now: u64, into: &mut Vec<u8>) {
+        let until = self
+            .next_piece(now)
+            .map_or(now, |piece| now.min(piece.begin_ns));
         while let Some(&(at, byte)) = self.to_pi.front()
-            && at <= now
+            && at <= until
         {
             into.push(byte);
             self.to_pi.pop_front();
@@ -73,11 +84,14 @@ impl Uart {
         if waiting + bytes.len() as u64 > BOARD_QUEUE {
             return false;
         }
+        let begin_ns = self.to_pi_free_ns.max(now);
+        self.to_pi_free_ns = begin_ns;
         for &byte in bytes {
-            self.to_pi_free_ns = self.to_pi_free_ns.max(now) + self.byte_ns;
+            self.to_pi_free_ns += self.byte_ns;
             self.deliver(self.to_pi_free_ns, byte);
         }
-        self.ends.push_back(self.to_pi_free_ns);
+        let end_ns = self.to_pi_free_ns;
+        self.pieces.push_back(Piece { begin_ns, end_ns });
         true
     }
 
@@ -113,12 +127,17 @@ impl Uart {
         byte.unwrap_or(u64::MAX).min(sent.unwrap_or(u64::MAX))
     }
 
-    /// When the next piece will have wholly arrived at the Pi; pieces that have are forgotten.
+    /// When the next piece will have wholly arrived at the Pi.
     pub(crate) fn next_end(&mut self, now: u64) -> Option<u64> {
-        while self.ends.front().is_some_and(|end| *end <= now) {
-            self.ends.pop_front();
+        self.next_piece(now).map(|piece| piece.end_ns)
+    }
+
+    /// The next piece that has not wholly arrived at the Pi; those that have are forgotten.
+    fn next_piece(&mut self, now: u64) -> Option<Piece> {
+        while self.pieces.front().is_some_and(|piece| piece.end_ns <= now) {
+            self.pieces.pop_front();
         }
-        self.ends.front().copied()
+        self.pieces.front().copied()
     }
 
     /// The board starts anew: what it had queued and what was sent to it until now is gone.
@@ -128,7 +147,7 @@ impl Uart {
         // The byte in the shift register is lost with the rest.
         self.to_pi.retain(|(at, _)| *at <= now);
         self.to_pi_free_ns = self.to_pi_free_ns.min(now + byte_ns);
-        self.ends.clear();
+        self.pieces.clear();
     }
 
     /// Cuts the cable or mends it; what is under way when it is cut is lost.
@@ -176,11 +195,18 @@ mod tests {
         assert_eq!(uart.receive(1_000 + BYTE), Some(1));
         assert_eq!(uart.receive(1_000 + BYTE), None);
         assert_eq!(uart.receive(1_000 + 2 * BYTE), Some(2));
+    }
+
+    #[test]
+    fn the_pi_gets_a_piece_when_all_of_it_has_arrived() {
+        let mut uart = Uart::new(500_000);
         assert!(uart.queue(0, &[7, 8, 9]));
-        assert!(!uart.is_idle(3 * BYTE - 1));
-        assert_eq!(read(&mut uart, 2 * BYTE), [7, 8]);
-        assert!(uart.is_idle(3 * BYTE));
-        assert_eq!(read(&mut uart, 3 * BYTE), [9]);
+        assert!(uart.queue(0, &[1, 2]));
+        assert!(!uart.is_idle(5 * BYTE - 1) && uart.is_idle(5 * BYTE));
+        assert!(read(&mut uart, 3 * BYTE - 1).is_empty());
+        assert_eq!(read(&mut uart, 5 * BYTE - 1), [7, 8, 9]);
+        assert_eq!(read(&mut uart, 5 * BYTE), [1, 2]);
+        assert!(uart.pieces.is_empty(), "a robot may stand for days");
     }
 
     #[test]

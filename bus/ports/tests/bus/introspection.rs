@@ -4,7 +4,7 @@ use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
-use lager_ports::{Layout, NodeState, Peer, Policy, nodes, remove_stale_nodes};
+use lager_ports::{Layout, NodeState, Peer, Policy, ServiceWatch, nodes, remove_stale_nodes};
 use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
 
 use crate::domain::{Domain, send};
@@ -89,6 +89,24 @@ fn looking_does_not_create_topics() {
     assert_eq!(all.len(), TOPICS.len());
     assert!(all.iter().all(|topic| topic.layout == Layout::Unused));
     assert!(observer.topics().unwrap().is_empty());
+}
+
+#[test]
+fn a_watch_tells_when_services_come_and_go() {
+    let domain = Domain::new();
+    let observer = domain.open(Role::Observer);
+    let mut watch = ServiceWatch::default();
+    assert!(watch.has_changed(&observer), "it was not known");
+    assert!(!watch.has_changed(&observer));
+    let bridge = domain.open(Role::Bridge);
+    let writer = bridge.publisher::<SensorLine>().unwrap();
+    assert!(watch.has_changed(&observer), "it has come");
+    // A reader of a topic that is there changes no service.
+    let reader = observer.subscriber::<SensorLine>().unwrap();
+    assert!(!watch.has_changed(&observer));
+    drop((writer, reader));
+    assert!(watch.has_changed(&observer), "it has gone");
+    assert!(!watch.has_changed(&observer));
 }
 
 #[test]
