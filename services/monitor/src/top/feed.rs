@@ -4,11 +4,12 @@
 //! its ends. The head takes four states of the robot and the stop word.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::Instant;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 use lager_ports::{
-    Bus, Clock, NodeState, PortError, ReceiveError, Source, StopPage, StopWord, Subscriber,
-    Watchdog,
+    Bus, Clock, NodeInfo, NodeState, PortError, ReceiveError, ServiceWatch, Source, StopPage,
+    StopWord, Subscriber, TopicInfo, Watchdog,
 };
 use lager_topics::{
     LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit,
@@ -22,6 +23,9 @@ use crate::source::Stamped;
 
 /// Samples that are taken of one topic in one look.
 const TURN: u64 = 1_024;
+/// How often it looks who is on the topics where nobody is known to have come or gone. It takes a
+/// core for tens of milliseconds, which the robot's path would feel.
+const ENDS: Duration = Duration::from_secs(5);
 
 /// What reads a robot's bus.
 pub(crate) struct Feed<'a> {
@@ -30,6 +34,8 @@ pub(crate) struct Feed<'a> {
     open: BTreeMap<String, Box<dyn Pull>>,
     /// Topics that cannot be read, such as one of another build.
     refused: BTreeSet<String>,
+    services: ServiceWatch,
+    ends: Option<Ends>,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
     queue: Subscriber<MissionQueue>,
@@ -37,7 +43,7 @@ pub(crate) struct Feed<'a> {
     command: Subscriber<LatencyCommand>,
     /// Real and robot time at the last look at the clock.
     clock: Clock,
-    clocked: (Instant, std::time::Duration),
+    clocked: (Instant, Duration),
 }
 
 impl<'a> Feed<'a> {
@@ -53,6 +59,8 @@ impl<'a> Feed<'a> {
                 watchdog,
                 open: BTreeMap::new(),
                 refused: BTreeSet::new(),
+                services: ServiceWatch::default(),
+                ends: None,
                 health: bus.subscriber()?,
                 status: bus.subscriber()?,
                 queue: bus.subscriber()?,
@@ -68,20 +76,13 @@ impl<'a> Feed<'a> {
     /// Looks who is on the topics, and reads those that the model wants.
     pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
         let bus = self.bus;
-        let look = || bus.topics();
-        let mut topics = self.watchdog.over("looking at the topics", look)?;
-        topics.retain(|topic| topic.robot == *bus.robot());
-        let nodes = self
-            .watchdog
-            .over("looking at the processes", || bus.nodes());
-        let nodes = nodes?;
-        model.take_ends(&topics, |pid| {
-            let node = nodes.iter().find(|node| node.pid == pid);
-            match node.map(|node| node.state) {
-                Some(NodeState::Stale) => Life::Dead,
-                _ => life(pid),
-            }
-        });
+        let known = self.ends.take().filter(Ends::are_likely);
+        let ends = match known {
+            Some(ends) if !self.services.has_changed(bus) => ends,
+            _ => Ends::look(bus, self.watchdog)?,
+        };
+        model.take_ends(&ends.topics, |pid| ends.life(pid));
+        self.ends = Some(ends);
         let word = bus.place().robot(bus.robot()).join(StopPage::FILE);
         let told = StopWord::read(&word).ok().flatten();
         model.head.stop = told.and_then(|told| told.stop());
@@ -201,6 +202,40 @@ impl TopicVisitor for Open<'_> {
 
     fn visit<T: Topic>(self) -> Self::Output {
         Ok(Box::new(Pulled::new(self.bus.subscriber::<T>()?)))
+    }
+}
+
+/// Who is on the topics, as it was at one look.
+struct Ends {
+    topics: Vec<TopicInfo>,
+    nodes: Vec<NodeInfo>,
+    looked: Instant,
+}
+
+impl Ends {
+    fn look(bus: &Bus, watchdog: &Watchdog) -> Result<Self, ToolError> {
+        let mut topics = watchdog.over("looking at the topics", || bus.topics())?;
+        topics.retain(|topic| topic.robot == *bus.robot());
+        Ok(Self {
+            topics,
+            nodes: watchdog.over("looking at the processes", || bus.nodes())?,
+            looked: Instant::now(),
+        })
+    }
+
+    /// Whether the look was not long ago, and no writer has gone since.
+    fn are_likely(&self) -> bool {
+        let mut writers = self.topics.iter().flat_map(|topic| &topic.writers);
+        let is_there = |pid: u32| pid == 0 || Path::new("/proc").join(pid.to_string()).exists();
+        self.looked.elapsed() < ENDS && writers.all(|writer| is_there(writer.pid))
+    }
+
+    fn life(&self, pid: u32) -> Life {
+        let node = self.nodes.iter().find(|node| node.pid == pid);
+        match node.map(|node| node.state) {
+            Some(NodeState::Stale) => Life::Dead,
+            _ => life(pid),
+        }
     }
 }
 
