@@ -135,6 +135,35 @@ fn goods_that_cannot_be_reached_end_the_mission_with_what_logic_calls_it() {
 }
 
 #[test]
+fn a_battery_that_nobody_charges_ends_the_mission_and_is_told() {
+    let domain = Domain::new();
+    // No battery is charged so far.
+    let config = domain.folder().join("lager.toml");
+    std::fs::write(&config, "[logic]\nlow_battery_decivolts = 255\n").expect("a file");
+    let mut up = domain.start(&[
+        "--config",
+        config.to_str().expect("UTF-8"),
+        "up",
+        "--headless",
+        "--mission",
+        "1",
+        "--speed",
+        "3",
+        "--exit-when-done",
+        "--json",
+    ]);
+    assert_eq!(up.wait(), Some(3), "{}", up.log());
+    let told = up.json();
+    assert_eq!(told["delivered"], serde_json::json!([]), "{told}");
+    assert_eq!(told["hold"], "Battery", "{told}");
+    assert_eq!(told["failure_kind"], serde_json::Value::Null, "{told}");
+    let why = told["failure"].as_str().expect("a sentence");
+    assert!(why.contains("the battery is low"), "{why}");
+    assert!(why.contains("Charge the battery"), "{why}");
+    domain.assert_clean();
+}
+
+#[test]
 fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     let domain = Domain::new();
     let mut up = robot(&domain);

@@ -85,8 +85,11 @@ fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
     assert_eq!(saved(), WAREHOUSE);
 
     fs::remove_file(disk.join("in-the-way")).expect("a file");
-    describes("sidelength 36");
     wait_for("the warehouse to be saved", || {
+        saved().contains("side_length_cm = 35").then_some(())
+    });
+    describes("sidelength 36");
+    wait_for("the next one to be saved", || {
         saved().contains("side_length_cm = 36").then_some(())
     });
     let left: Vec<_> = fs::read_dir(disk).expect("a folder").flatten().collect();

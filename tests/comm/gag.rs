@@ -3,6 +3,7 @@
 use std::io::{BufReader, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -74,6 +75,40 @@ fn a_gag_without_a_station_says_what_to_do() {
     let said = String::from_utf8_lossy(&alone.stderr).into_owned();
     assert_eq!(alone.status.code(), Some(1), "{said}");
     assert!(said.contains("`lager up` or `lager station`"), "{said}");
+}
+
+#[test]
+fn a_gag_finds_the_station_of_its_robot_and_else_the_one_that_runs_alone() {
+    let domain = Domain::new();
+    let finds = |folder: &Path| {
+        let gag = domain.lager(&["gag"]).stdin(Stdio::null()).output();
+        let said = gag.expect("lager starts").stdout;
+        let at = format!("you are the GaG at {};", folder.join("gag").display());
+        String::from_utf8_lossy(&said)
+            .starts_with(&at)
+            .then_some(())
+    };
+    let bus = domain.bus_folder();
+    let places = ["--listen", "127.0.0.1:0"];
+    let _station = domain.start(&[&["station", "--no-panel"][..], &places].concat());
+    wait_for("the station alone", || finds(bus));
+    let _up = domain.start(&[&["up", "--headless"][..], &places].concat());
+    wait_for("the robot's own", || finds(&bus.join("r1")));
+}
+
+#[test]
+fn a_path_that_no_socket_can_have_is_refused_before_anything_runs() {
+    let domain = Domain::new();
+    let long = domain.folder().join("g".repeat(108));
+    let long = long.to_str().expect("UTF-8");
+    for command in [&["up", "--headless"][..], &["station", "--no-panel"]] {
+        let listen = ["--listen", "127.0.0.1:0", "--gag", long];
+        let refused = domain.run(&[command, &listen[..]].concat());
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(1), "{said}");
+        assert!(said.contains("--gag takes another path"), "{said}");
+    }
+    domain.assert_clean();
 }
 
 #[test]

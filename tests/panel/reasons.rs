@@ -4,7 +4,7 @@
 use std::fmt::Display;
 
 use lager_lines::{Coord, Map, MapError, Name, Products, ProductsError, check_names};
-use lager_station::{ActRefused, CommandRefused, WarehouseError, WishRefused};
+use lager_station::{ActRefused, CommandRefused, SaveError, WarehouseError, WishRefused};
 use lager_topics::{
     Calibration, Coded, Failure, FailureKind, Finish, Health, OrderQueue, Outcome, Refusal,
     WorldRefusal,
@@ -107,7 +107,11 @@ fn typed() -> Vec<String> {
         side: lager_lines::Direction::Up,
     };
     let twice: ProductsError = Products::new(vec![product, product]).expect_err("it is twice");
-    let refused: [&dyn Display; 15] = [
+    let unsaved = SaveError::Write {
+        path: "warehouse.toml".into(),
+        error: std::io::ErrorKind::StorageFull.into(),
+    };
+    let refused: [&dyn Display; 16] = [
         &ActRefused::Plain,
         &ActRefused::Full,
         &ActRefused::Driven { by },
@@ -116,6 +120,7 @@ fn typed() -> Vec<String> {
         &CommandRefused::Full,
         &CommandRefused::NotPicking,
         &WishRefused::NoRobot(robot),
+        &unsaved,
         &corner,
         &empty,
         &twice,

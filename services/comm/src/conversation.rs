@@ -32,7 +32,8 @@
 //!   ([`LinkLost`]): the order is carried out all the same, or logic is told to stand at the next node
 //!   until the link is there again.
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
-//!   commands among these are dropped.
+//!   commands among these are dropped. It is carried out even where comm was held up and has given
+//!   the link up before it was read.
 //! - What cannot be done is told in a `thought`, and asked again a little later.
 //! - A peer that answers at once is not asked without end: commands are asked for at most 1 000
 //!   times a second, anything else at most 5 times. An answer that took longer than that is
@@ -238,11 +239,9 @@ impl Conversation {
         self.ask(now);
     }
 
-    /// Lines have come, all that had arrived.
+    /// Lines have come, all that had arrived. Of those that are read after the link was given up
+    /// only a stop counts.
     pub fn heard(&mut self, now: Moment, lines: &[Result<String, LineError>]) {
-        if !self.is_up {
-            return;
-        }
         self.heard_ns = now.ns;
         let read = |line: &Result<String, LineError>| match line {
             Ok(line) => Ok(StationLine::read(line)),
@@ -255,6 +254,9 @@ impl Conversation {
                 self.stop(now, *number);
                 is_stopped = true;
             }
+        }
+        if !self.is_up {
+            return;
         }
         for line in lines {
             match line {

@@ -19,11 +19,11 @@ use lager_ports::{Bus, BusConfig, Cause, Clock, Inventory, OpenError, Publisher,
 use lager_topics::{NavMap, Role};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use crate::config::Config;
+use crate::config::{Body, Config};
 use crate::hands::Hands;
 use crate::keepers::Keepers;
 use crate::map::bus_map;
-use crate::mission::{Mission, Watch};
+use crate::mission::{Charger, Mission, Watch};
 use crate::report::Narrator;
 use crate::supervisor;
 use crate::words::{Begin, Line, Pulse, Request, Sweep, Word};
@@ -113,6 +113,13 @@ fn tell_warehouse(config: &Config, bus: &Bus) -> Result<Publisher<NavMap>> {
     Ok(map)
 }
 
+fn charger(body: Body) -> Charger {
+    match body {
+        Body::Serial => Charger::Person,
+        Body::Sim | Body::Chip => Charger::Nobody,
+    }
+}
+
 /// Everything it does, once it has joined the bus.
 struct Attendant {
     line: Line,
@@ -158,7 +165,9 @@ impl Attendant {
             narrator,
             hands,
             map,
-            watch: begin.mission.map(Watch::new),
+            watch: begin
+                .mission
+                .map(|mission| Watch::new(mission, charger(config.body))),
             told: None,
             ears: Ears::default(),
             inventory: Inventory::default(),

@@ -263,7 +263,8 @@ others than this machine can reach asks for a token, which is printed once.")]
 
 It shows what the station asks and what the robot says, in the document's language. Answer with the
 whole line or with what stands behind the word: to `fetchprod` with 3 or with `fetchprod 3`. What is
-typed before it is asked for waits; `styrcomm 1` stops and goes first. One GaG is connected at a time.")]
+typed before it is asked for waits, but `styrcomm 1` stops at once and drops the commands that wait.
+One GaG is connected at a time.")]
     Gag {
         /// The station's unix socket [default: that of the robot's own station, else gag in the folder
         /// of the bus]
@@ -537,11 +538,46 @@ pub enum Scenario {
 
 #[cfg(test)]
 mod tests {
+    use std::net::SocketAddr;
+
     use super::*;
+    use crate::config::StationSection;
 
     #[test]
     fn the_command_line_is_consistent() {
         use clap::CommandFactory;
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_station_alone_and_one_of_a_robot_take_the_same_places() {
+        type Places = (Option<SocketAddr>, Option<PathBuf>, Option<SocketAddr>);
+        let of = |words: &[&str]| -> Places {
+            let cli = Cli::try_parse_from(["lager"].iter().chain(words)).expect("right usage");
+            match cli.command {
+                Command::Station(args) => (Some(args.listen), args.gag, args.panel),
+                Command::Up(args) => (args.listen, args.gag, args.panel),
+                _ => panic!("{words:?}"),
+            }
+        };
+        let usual = StationSection::USUAL.parse().ok();
+        assert_eq!(of(&["station"]), (usual, None, None));
+        assert_eq!(of(&["up"]), (None, None, None));
+        let places = [
+            "--listen",
+            "127.0.0.1:1",
+            "--gag",
+            "g",
+            "--panel",
+            "[::1]:2",
+        ];
+        let wanted = (
+            "127.0.0.1:1".parse().ok(),
+            Some("g".into()),
+            "[::1]:2".parse().ok(),
+        );
+        for command in ["station", "up"] {
+            assert_eq!(of(&[&[command][..], &places].concat()), wanted);
+        }
     }
 }

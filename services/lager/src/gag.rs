@@ -5,9 +5,12 @@
 //!   the person types        3                or `fetchprod 3`
 //!   the station is told     fetchprod 3
 //! ```
-//! What is typed waits until it is asked for, so a whole session may come from a pipe. A stop goes
-//! before all commands that wait and drops them (C5). What is no answer is refused here, with the
-//! column, and not sent.
+//! What is typed waits until it is asked for, so a whole session may come from a pipe. What is no
+//! answer is refused here, with the column, and not sent.
+//!
+//! A stop drops all commands that wait and a `pickup_done` behind them (C5). It is said at once, as
+//! nobody asks for commands while a robot turns or moves its arm. It is the next answer as well, for a
+//! station that passes over what it has not asked for.
 //!
 //! [`Desk`] is pure: lines in, lines out. The shell around it waits for the terminal and the socket.
 
@@ -20,7 +23,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use lager_lines::conversation::Held;
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::splitter::LineSplitter;
+use lager_lines::splitter::{LineError, LineSplitter};
 use lager_lines::to_line;
 use lager_ports::Shutdown;
 use lager_wire::OperatorCommand;
@@ -59,7 +62,7 @@ impl Desk {
                 }
             }
             Ok(Request::Telemetry(telemetry)) => self.told.push(match telemetry {
-                Telemetry::Thought(thought) => format!("\"{thought}\""),
+                Telemetry::Thought(thought) => format!("\"{}\"", shown(thought.as_str())),
                 Telemetry::Robot(node) => format!("the robot is at {node}"),
                 Telemetry::Heading(heading) => format!("the robot looks {heading}"),
             }),
@@ -79,9 +82,14 @@ impl Desk {
         };
         if answer == Answer::Command(OperatorCommand::Stop) {
             self.answers
-                .retain(|waits| !matches!(waits, Answer::Command(_)));
-            self.answers.push_front(answer);
-        } else if self.answers.len() < MOST {
+                .retain(|waits| !matches!(waits, Answer::Command(_) | Answer::PickupDone));
+            self.answers.push_front(answer.clone());
+            if !self.answer() {
+                self.say(&answer);
+            }
+            return;
+        }
+        if self.answers.len() < MOST {
             self.answers.push_back(answer);
         } else {
             let why = format!("{MOST} answers wait already; wait until some are asked for");
@@ -117,12 +125,28 @@ impl Desk {
             return false;
         };
         self.held.clear();
-        match to_line(&answer.spelled_as(query)) {
+        self.say(&answer.spelled_as(query));
+        true
+    }
+
+    fn say(&mut self, answer: &Answer) {
+        match to_line(answer) {
             Ok(line) => self.said.push(line),
             Err(error) => self.told.push(error.to_string()),
         }
-        true
     }
+}
+
+/// A peer's text, without what would steer the terminal.
+fn shown(text: &str) -> String {
+    let mut shown = String::new();
+    for character in text.chars() {
+        match character.is_control() {
+            true => shown.extend(character.escape_default()),
+            false => shown.push(character),
+        }
+    }
+    shown
 }
 
 /// What a person may answer.
@@ -183,7 +207,10 @@ fn converse(path: &Path, mut stream: UnixStream, shutdown: &Shutdown) -> Result<
             .map(|source| !source.revents().is_empty())
             .collect();
         if ready[0] {
-            let heard = |line: &str| desk.heard(line);
+            let heard = |line: Result<&str, LineError>| {
+                desk.heard(line?);
+                Ok(())
+            };
             if !take(&mut stream, &mut from_station, heard)? {
                 bail!(
                     "the station at {} has closed the connection; it has a GaG already, or has ended",
@@ -192,7 +219,14 @@ fn converse(path: &Path, mut stream: UnixStream, shutdown: &Shutdown) -> Result<
             }
         }
         if ready.get(1) == Some(&true) {
-            let typed = |line: &str| desk.typed(line);
+            // Whoever has typed too much, or no text, goes on driving.
+            let typed = |line: Result<&str, LineError>| {
+                match line {
+                    Ok(line) => desk.typed(line),
+                    Err(error) => desk.told.push(error.to_string()),
+                }
+                Ok(())
+            };
             // Past the buffer of `Stdin`, which `poll` does not see.
             let mut stdin = std::fs::File::from(stdin.as_fd().try_clone_to_owned()?);
             is_listening = take(&mut stdin, &mut from_person, typed)?;
@@ -214,13 +248,13 @@ fn converse(path: &Path, mut stream: UnixStream, shutdown: &Shutdown) -> Result<
 fn take(
     from: &mut impl Read,
     splitter: &mut LineSplitter,
-    mut each: impl FnMut(&str),
+    mut each: impl FnMut(Result<&str, LineError>) -> Result<()>,
 ) -> Result<bool> {
     let mut buffer = [0; 4096];
     let count = from.read(&mut buffer)?;
     let mut bytes = &buffer[..count];
     while let Some(line) = splitter.next(&mut bytes) {
-        each(line?);
+        each(line)?;
     }
     Ok(count > 0)
 }
@@ -257,15 +291,29 @@ mod tests {
     #[test]
     fn what_is_typed_before_it_is_asked_for_waits_and_a_stop_goes_first() {
         let mut desk = Desk::default();
-        for typed in ["styrcomm 2", "fetchprod 7", "styrcomm 4", "styrcomm 1"] {
+        for typed in ["armcomm F9", "fetchprod 7", "pickup_done", "styrcomm 4"] {
             desk.typed(typed);
         }
+        assert_eq!(said(&mut desk), [""; 0]);
+        desk.typed("styrcomm 1");
+        let stop = ["styrcomm 00000001\n"];
+        assert_eq!(said(&mut desk), stop, "though nobody asks");
         desk.heard("styrcomm");
-        assert_eq!(said(&mut desk), ["styrcomm 00000001\n"]);
+        assert_eq!(said(&mut desk), stop, "it may have been passed over");
+        desk.heard("armcomm");
+        assert_eq!(said(&mut desk), [""; 0], "nothing old moves the robot");
         desk.heard("styrcomm");
         assert_eq!(said(&mut desk), [""; 0], "nothing old moves the robot");
         desk.heard("fetchprod");
         assert_eq!(said(&mut desk), ["fetchprod 7\n"]);
+    }
+
+    #[test]
+    fn what_a_robot_thinks_does_not_steer_the_terminal() {
+        let mut desk = Desk::default();
+        desk.heard("thought jag \u{1b}[2Jväntar\u{9b}1m \t\u{7}");
+        let told = "\"jag \\u{1b}[2Jväntar\\u{9b}1m \\t\\u{7}\"";
+        assert_eq!(desk.told, [told]);
     }
 
     #[test]

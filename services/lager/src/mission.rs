@@ -18,8 +18,8 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use lager_topics::{
-    Ask, AskKind, Failure, FailureKind, Health, Mode, NavigatorStatus, Order, OrderQueue, Phase,
-    Remedy, Tag,
+    Ask, AskKind, Failure, FailureKind, Health, Hold, Mode, NavigatorStatus, Order, OrderQueue,
+    Phase, Remedy, Tag,
 };
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +50,15 @@ pub struct Seen {
     pub refused: Option<(u32, i32, Failure)>,
 }
 
+/// Who charges a robot whose battery is low.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Charger {
+    /// A person, some time.
+    Person,
+    /// Nobody: the battery is simulated.
+    Nobody,
+}
+
 /// One thing that is done for a mission.
 #[derive(Clone, Copy, Debug)]
 pub enum Act {
@@ -76,6 +85,8 @@ pub struct Mission {
     failure: Option<String>,
     /// What logic calls that, where it is logic that gives up.
     failure_kind: Option<Tag<FailureKind>>,
+    /// What logic calls it where it would go on by itself.
+    hold: Option<Tag<Hold>>,
 }
 
 impl Mission {
@@ -114,6 +125,11 @@ impl Mission {
         self.failure_kind
     }
 
+    /// What logic stands for, where the mission was given up for that.
+    pub fn hold(&self) -> Option<Tag<Hold>> {
+        self.hold
+    }
+
     /// Gives the mission up, unless it has ended already.
     pub fn give_up(&mut self, why: &str) {
         if self.outcome().is_none() {
@@ -145,20 +161,48 @@ impl Mission {
 #[derive(Debug)]
 pub struct Watch {
     mission: Mission,
+    charger: Charger,
     acted: Option<Duration>,
     stuck_since: Option<Duration>,
+    uncharged_since: Option<Duration>,
     idle_since: Option<Duration>,
     /// The number of the refused order that has been judged.
     judged: Option<u32>,
 }
 
+/// Why a mission will not be delivered, and what logic calls that.
+#[derive(Debug, Default)]
+struct Hopeless {
+    why: String,
+    kind: Option<Tag<FailureKind>>,
+    hold: Option<Tag<Hold>>,
+}
+
+impl Hopeless {
+    fn new(why: String) -> Self {
+        Self {
+            why,
+            ..Self::default()
+        }
+    }
+
+    fn of_logic(why: &str, failure: &Failure) -> Self {
+        Self {
+            kind: Some(failure.kind),
+            ..Self::new(format!("{why}: {failure}"))
+        }
+    }
+}
+
 impl Watch {
     /// Sees to what is left of `mission`.
-    pub fn new(mission: Mission) -> Self {
+    pub fn new(mission: Mission, charger: Charger) -> Self {
         Self {
             mission,
+            charger,
             acted: None,
             stuck_since: None,
+            uncharged_since: None,
             idle_since: None,
             judged: None,
         }
@@ -182,10 +226,10 @@ impl Watch {
         if self.mission.outcome().is_some() {
             return None;
         }
-        if let Some(why) = self.hopeless(now, &health, &status, &queue, seen) {
-            let (why, kind) = why;
-            self.mission.give_up(&why);
-            self.mission.failure_kind = kind;
+        if let Some(hopeless) = self.hopeless(now, &health, &status, &queue, seen) {
+            self.mission.give_up(&hopeless.why);
+            self.mission.failure_kind = hopeless.kind;
+            self.mission.hold = hopeless.hold;
             return None;
         }
         if !self.mission.begun && is_whole(&health) && health.mode_chosen != 0 {
@@ -214,7 +258,7 @@ impl Watch {
         (has_room && knows_goods).then_some(Act::Order(Order { id, product }))
     }
 
-    /// Why the mission will not be delivered, if that is so, and what logic calls it.
+    /// Why the mission will not be delivered, if that is so.
     fn hopeless(
         &mut self,
         now: Duration,
@@ -222,10 +266,20 @@ impl Watch {
         status: &NavigatorStatus,
         queue: &OrderQueue,
         seen: &Seen,
-    ) -> Option<(String, Option<Tag<FailureKind>>)> {
+    ) -> Option<Hopeless> {
         if self.is_stuck(now, status) {
-            let why = &status.failure;
-            return Some((format!("logic waits for a person: {why}"), Some(why.kind)));
+            let why = "logic waits for a person";
+            return Some(Hopeless::of_logic(why, &status.failure));
+        }
+        if self.is_uncharged(now, status) {
+            let (x, y, remedy) = (status.x, status.y, Hold::Battery.remedy());
+            let why = format!(
+                "the battery is low, and the robot stands at crossing ({x}, {y}): {remedy}"
+            );
+            return Some(Hopeless {
+                hold: Some(status.hold),
+                ..Hopeless::new(why)
+            });
         }
         let phase = status.phase.get()?;
         let is_idle = matches!(phase, Phase::WaitingForMap | Phase::WaitingForOrder)
@@ -236,10 +290,7 @@ impl Watch {
             && is_idle
             && self.is_own(id, product)
         {
-            return Some((
-                format!("logic has given the order up: {why}"),
-                Some(why.kind),
-            ));
+            return Some(Hopeless::of_logic("logic has given the order up", &why));
         }
         let is_forgotten = is_idle && self.mission.begun && takes_orders(health);
         if !is_forgotten || health.stopped != 0 {
@@ -249,8 +300,8 @@ impl Watch {
         let since = *self.idle_since.get_or_insert(now);
         let open = &self.mission.open;
         (now - since >= IDLE).then(|| match phase {
-            Phase::WaitingForMap => ("nobody tells the robot its warehouse".into(), None),
-            _ => (format!("nobody orders {open:?} any more"), None),
+            Phase::WaitingForMap => Hopeless::new("nobody tells the robot its warehouse".into()),
+            _ => Hopeless::new(format!("nobody orders {open:?} any more")),
         })
     }
 
@@ -279,6 +330,15 @@ impl Watch {
         }
         now - *self.stuck_since.get_or_insert(now) >= patience
     }
+
+    /// Whether the robot has stood for too long with a battery that nobody charges.
+    fn is_uncharged(&mut self, now: Duration, status: &NavigatorStatus) -> bool {
+        if self.charger == Charger::Person || status.hold != Hold::Battery {
+            self.uncharged_since = None;
+            return false;
+        }
+        now - *self.uncharged_since.get_or_insert(now) >= STUCK
+    }
 }
 
 /// Whether logic steers and both boards are there.
@@ -292,137 +352,4 @@ fn is_whole(health: &Health) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A robot that is ready and does this.
-    fn seen(phase: Phase, status: NavigatorStatus) -> Seen {
-        let mut health = Health {
-            mode: Mode::Autonomous.into(),
-            mode_chosen: 1,
-            ..Health::default()
-        };
-        (health.sensor.up, health.steering.up) = (1, 1);
-        Seen {
-            health: Some(health),
-            status: Some(NavigatorStatus {
-                phase: phase.into(),
-                ..status
-            }),
-            queue: Some(OrderQueue::default()),
-            refused: None,
-        }
-    }
-
-    fn delivered(count: u32, product: i32) -> NavigatorStatus {
-        NavigatorStatus {
-            delivered: count,
-            product,
-            ..NavigatorStatus::default()
-        }
-    }
-
-    fn seconds(count: u64) -> Duration {
-        Duration::from_secs(count)
-    }
-
-    #[test]
-    fn what_a_station_orders_is_counted_in_any_order_and_what_others_order_is_not() {
-        let mut watch = Watch::new(Mission::of_station(&[3, 1, 3]));
-        for (count, product) in [(0, 0), (1, 1), (2, 7), (3, 3)] {
-            let seen = seen(Phase::BackingOff, delivered(count, product));
-            assert!(watch.step(seconds(1), &seen).is_none());
-        }
-        assert_eq!(watch.mission().delivered(), [1, 3]);
-        // A successor goes on from there; one more look at the same is no delivery.
-        let mut heir = Watch::new(watch.mission().clone());
-        heir.step(seconds(2), &seen(Phase::BackingOff, delivered(3, 3)));
-        assert_eq!(heir.mission().outcome(), None);
-        heir.step(seconds(3), &seen(Phase::BackingOff, delivered(4, 3)));
-        assert_eq!(heir.mission().outcome(), Some(Ok(())));
-        assert_eq!(heir.mission().delivered(), [1, 3, 3]);
-    }
-
-    #[test]
-    fn a_person_who_has_set_the_mode_before_the_mission_began_keeps_it() {
-        let mut ready = seen(Phase::WaitingForOrder, delivered(0, 0));
-        let health = ready.health.as_mut().expect("health");
-        (health.mode, health.mode_chosen) = (Mode::Manual.into(), 0);
-        let mut watch = Watch::new(Mission::of_robot(&[5], 40));
-        let begins = |act: Option<Act>| match act {
-            Some(Act::Ask(ask)) => ask.kind == AskKind::Begin,
-            _ => false,
-        };
-        assert!(begins(watch.step(seconds(1), &ready)));
-        ready.health.as_mut().expect("health").mode_chosen = 1;
-        for second in 2..100 {
-            assert!(!begins(watch.step(seconds(second), &ready)));
-        }
-        assert_eq!(watch.mission().outcome(), None);
-    }
-
-    #[test]
-    fn an_order_of_the_robots_own_is_repeated_under_its_number_until_it_is_seen() {
-        let mut watch = Watch::new(Mission::of_robot(&[5, 6], 40));
-        let idle = seen(Phase::WaitingForOrder, delivered(0, 0));
-        let ordered = |act| match act {
-            Some(Act::Order(order)) => (order.id, order.product),
-            other => panic!("{other:?}"),
-        };
-        assert_eq!(ordered(watch.step(seconds(1), &idle)), (40, 5));
-        assert!(watch.step(seconds(1), &idle).is_none());
-        assert_eq!(ordered(watch.step(seconds(2), &idle)), (40, 5));
-        let mut heir = Watch::new(watch.mission().clone());
-        assert_eq!(ordered(heir.step(seconds(2), &idle)), (40, 5));
-        let mut taken = seen(Phase::Driving, delivered(0, 5));
-        taken.status = taken.status.map(|status| NavigatorStatus {
-            order_id: 40,
-            ..status
-        });
-        assert_eq!(ordered(heir.step(seconds(2), &taken)), (41, 6));
-    }
-
-    #[test]
-    fn a_refusal_ends_the_mission_and_only_its_own_does() {
-        let why = Failure::new(FailureKind::UnknownProduct, (0, 0), 0, 0);
-        let refused = |product| Seen {
-            refused: Some((9, product, why)),
-            ..seen(Phase::WaitingForOrder, delivered(0, 0))
-        };
-        let mut watch = Watch::new(Mission::of_station(&[5]));
-        watch.step(seconds(1), &refused(4));
-        assert_eq!(watch.mission().outcome(), None);
-        // What was refused while it was at work was another one's.
-        let busy = Seen {
-            refused: Some((10, 5, why)),
-            ..seen(Phase::Driving, delivered(0, 5))
-        };
-        watch.step(seconds(2), &busy);
-        assert_eq!(watch.mission().outcome(), None);
-        let mut watch = Watch::new(Mission::of_station(&[5]));
-        watch.step(seconds(1), &refused(5));
-        let outcome = watch.mission().outcome();
-        assert!(outcome.is_some_and(|outcome| outcome.is_err()));
-    }
-
-    #[test]
-    fn a_mission_that_nobody_orders_any_more_has_failed_but_one_that_is_stopped_waits() {
-        let idle = seen(Phase::WaitingForOrder, delivered(0, 0));
-        let stopped = Seen {
-            health: idle.health.map(|health| Health {
-                stopped: 1,
-                ..health
-            }),
-            ..idle.clone()
-        };
-        let mut watch = Watch::new(Mission::of_station(&[5]));
-        watch.step(seconds(1), &idle);
-        watch.step(seconds(50), &stopped);
-        watch.step(seconds(51), &idle);
-        watch.step(seconds(110), &idle);
-        assert_eq!(watch.mission().outcome(), None);
-        watch.step(seconds(111), &idle);
-        let told = watch.mission().outcome();
-        assert_eq!(told, Some(Err("nobody orders [5] any more")));
-    }
-}
+mod tests;

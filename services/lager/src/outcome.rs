@@ -1,6 +1,6 @@
 //! How a mission ended: the one JSON line, or the sentence, at the end of `lager up`.
 
-use lager_topics::{FailureKind, Tag};
+use lager_topics::{FailureKind, Hold, Tag};
 use serde::Serialize;
 
 /// How a mission ended.
@@ -24,6 +24,9 @@ pub struct Outcome {
     /// What logic calls that, where it is logic that gave up.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure_kind: Option<Tag<FailureKind>>,
+    /// What keeps a robot that would go on by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hold: Option<Tag<Hold>>,
 }
 
 impl Outcome {

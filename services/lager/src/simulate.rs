@@ -17,8 +17,7 @@ use lager_plant::{GoodState, Warehouse};
 use lager_ports::Stop;
 use lager_simulator::{CalibrateError, Robot, RobotOptions, Wire};
 use lager_topics::{
-    Ask, EventKind, FailureKind, Health, Hold, NavigatorStatus, Pick, Remedy, Role, SteeringOrder,
-    SteeringReport, Tag,
+    Ask, EventKind, FailureKind, Health, Hold, Pick, Role, SteeringOrder, SteeringReport, Tag,
 };
 use serde::Serialize;
 
@@ -26,16 +25,13 @@ use crate::cli::SimulateArgs;
 use crate::config::{self, Config, PickBy};
 use crate::exit;
 use crate::map::bus_map;
-use crate::mission::{Act, Mission, Seen, Watch};
+use crate::mission::{Act, Charger, Mission, Seen, Watch};
 use crate::up::mission;
 
 /// How far time moves at each turn of the loop.
 const TICK: Duration = Duration::from_millis(1);
 /// How often logic's order is renewed, as its shell does.
 const RENEW: Duration = Duration::from_millis(40);
-/// How long a robot with a low battery stands before the run ends: in virtual time nobody charges
-/// it.
-const UNCHARGED: Duration = Duration::from_secs(10);
 /// How often the mission is looked at.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -179,8 +175,6 @@ struct Whole {
     seen: Seen,
     renewed: Duration,
     looked: Duration,
-    /// Since when the battery keeps it.
-    uncharged: Option<Duration>,
     frames: u64,
     /// How often logic has found a way blocked.
     blocked: u32,
@@ -224,11 +218,10 @@ impl Whole {
                 pick: Pick::Auto,
                 ..config.navigator()
             }),
-            watch: Watch::new(Mission::of_robot(mission, 1)),
+            watch: Watch::new(Mission::of_robot(mission, 1), Charger::Nobody),
             seen: Seen::default(),
             renewed: Duration::ZERO,
             looked: Duration::ZERO,
-            uncharged: None,
             frames: 0,
             blocked: 0,
             bytes: Vec::new(),
@@ -251,9 +244,6 @@ impl Whole {
         while self.now < limit {
             if let Some(outcome) = self.turn() {
                 return outcome.err();
-            }
-            if let Some(why) = self.waits_for_charge() {
-                return Some(why);
             }
         }
         Some(format!("not delivered within {} s", limit.as_secs()))
@@ -279,23 +269,6 @@ impl Whole {
             Ok(()) => Some(self.not_at_the_bar().map_or(Ok(()), Err)),
             Err(why) => Some(Err(why.to_owned())),
         }
-    }
-
-    /// That the robot stands for want of charge, once it has for a while.
-    fn waits_for_charge(&mut self) -> Option<String> {
-        let status = self
-            .seen
-            .status
-            .filter(|status| status.hold == Hold::Battery);
-        let Some(NavigatorStatus { x, y, remedy, .. }) = status else {
-            self.uncharged = None;
-            return None;
-        };
-        let since = *self.uncharged.get_or_insert(self.now);
-        let remedy = remedy.get().unwrap_or(Remedy::Charge);
-        let why =
-            || format!("the battery is low, and the robot stands at crossing ({x}, {y}): {remedy}");
-        (self.now >= since + UNCHARGED).then(why)
     }
 
     /// What keeps it although it would go on by itself.
@@ -544,7 +517,7 @@ mod tests {
                 let failure = whole.run(due);
                 due += every;
                 assert!(due < Duration::from_secs(600), "{failure:?}");
-                whole.watch = Watch::new(whole.watch.mission().clone());
+                whole.watch = Watch::new(whole.watch.mission().clone(), Charger::Nobody);
             }
             let taken_over = whole.watch.mission();
             assert_eq!(taken_over.outcome(), Some(Ok(())), "every {every:?}");

@@ -8,7 +8,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use lager_lines::Name;
 use lager_panel::{Panel, Tokens};
 use lager_ports::Shutdown;
@@ -153,16 +153,32 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
         Some(gag) => gag.clone(),
         None => RuntimeFolder::gag(config)?,
     };
-    if gag.as_os_str().len() > LONGEST_SOCKET {
-        tracing::warn!("no GaG can connect: {} is too long a path", gag.display());
+    let fits = fits(&gag);
+    if let Err(why) = &fits {
+        tracing::warn!("no GaG can connect: {why}");
     }
     Ok(ServerConfig {
         name: name()?,
         listen: Listen::On(TcpListener::from(robots)),
-        gag: (gag.as_os_str().len() <= LONGEST_SOCKET).then_some(gag),
+        gag: fits.is_ok().then_some(gag),
         warehouse: Some(kept),
         fetch: Vec::new(),
     })
+}
+
+/// Refuses a path that no socket can have.
+///
+/// # Errors
+/// It is too long.
+pub fn fits(gag: &Path) -> Result<()> {
+    let length = gag.as_os_str().len();
+    if length > LONGEST_SOCKET {
+        bail!(
+            "{} has {length} bytes, and the path of a socket has {LONGEST_SOCKET} at most",
+            gag.display()
+        );
+    }
+    Ok(())
 }
 
 fn name() -> Result<Name> {

@@ -10,6 +10,8 @@
 //!   no line frame for 120 ms --> Blind ------ a line frame ----------------------------------->
 //! ```
 //!
+//! At home battery and link keep it once an order waits.
+//!
 //! It is apart from the phases because any of them can be held, and goes on where it was. Without
 //! reports the robot stands because every limit counts the odometer's millimetres. A hold never
 //! begins in the middle of anything but a lost report or frame: the others wait until the robot

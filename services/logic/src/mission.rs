@@ -409,6 +409,13 @@ impl Mission {
         self.battery.forbids() || self.link_lost
     }
 
+    /// Whether it stands where it is because no new way may be begun: at a node, or before an order
+    /// that waits.
+    pub(crate) fn is_kept(&self) -> bool {
+        let has_order = self.phase == Phase::WaitingForOrder && !self.queue.waiting().is_empty();
+        self.parked || has_order && self.must_park()
+    }
+
     /// Stands at the node just reached if no new way may be begun; whether it does.
     fn parks(&mut self, out: &mut Output) -> bool {
         if self.must_park() {

@@ -17,6 +17,7 @@ const TABLE = [
   ["{who} drives the robot; ask him", "{who} kör roboten; fråga först"],
   ["{who} drives the robot; wait until he has left, or stop it", "{who} kör roboten; vänta tills ratten är ledig, eller stoppa den"],
   ["the robot does not answer", "roboten svarar inte"],
+  ["{file} is not saved: {error}", "{file} är inte sparad: {error}"],
   ["the robot is moved by its driver alone; take the wheel first", "bara föraren rör roboten; ta ratten först"],
   ["the robot speaks only the document's language, or is away; it takes no actions", "roboten talar bara dokumentets språk, eller är borta; den kan inte styras härifrån"],
   ["{count} actions are unanswered already; wait for the robot, or stop it", "{count} åtgärder väntar redan på svar; vänta på roboten, eller stoppa den"],

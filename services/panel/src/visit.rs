@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::extension::{Action, Report};
-use lager_station::{Awaited, Doing, Driver, Reply, Subscription, Told, View, Warehouse};
+use lager_station::{Awaited, Doing, Driver, Reply, Saving, Subscription, Told, View, Warehouse};
 use tokio::sync::watch;
 
 use crate::Place;
@@ -44,6 +44,8 @@ pub(crate) struct Visit {
     late: Late,
     /// What robots have not answered yet, with the page's number.
     asked: Vec<(u32, Awaited)>,
+    /// Warehouses that are being saved, likewise.
+    saving: Vec<(u32, Saving)>,
     subscription: Subscription,
     /// When it began, by the station's clock.
     began: Duration,
@@ -79,6 +81,7 @@ impl Visit {
             asks: BTreeMap::new(),
             late: Late::default(),
             asked: Vec::new(),
+            saving: Vec::new(),
             robots: BTreeMap::new(),
             warehouse: None,
             revision: None,
@@ -164,7 +167,7 @@ impl Visit {
             }
             Said::Keep { .. } => self.refuse(number, NOT_DRIVER),
             Said::Warehouse { warehouse, .. } => match handle.set_warehouse(*warehouse) {
-                Ok(()) => self.answer(number, "done"),
+                Ok(saving) => self.saving.push((number, saving)),
                 Err(why) => self.refuse(number, &why.to_string()),
             },
             Said::Stop { .. } | Said::Here { .. } => {}
@@ -301,6 +304,13 @@ impl Visit {
                 }
                 Some(Reply::Refused(why)) => self.refuse(number, why.as_str()),
                 Some(Reply::Lost) => self.refuse(number, "the robot does not answer"),
+            }
+        }
+        for (number, saving) in std::mem::take(&mut self.saving) {
+            match saving.wait(Duration::ZERO) {
+                None => self.saving.push((number, saving)),
+                Some(Ok(())) => self.answer(number, "done"),
+                Some(Err(why)) => self.refuse(number, &why),
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -26,12 +27,12 @@ struct Running {
     threads: Vec<JoinHandle<()>>,
 }
 
-fn server() -> Server {
+fn server(warehouse: Option<PathBuf>) -> Server {
     Server::open(ServerConfig {
         name: Name::new("station").unwrap(),
         listen: Listen::At(SocketAddr::from(([127, 0, 0, 1], 0))),
         gag: None,
-        warehouse: None,
+        warehouse,
         fetch: Vec::new(),
     })
     .unwrap()
@@ -39,7 +40,10 @@ fn server() -> Server {
 
 impl Running {
     fn new(tokens: Option<Tokens>) -> Self {
-        let server = server();
+        Self::of(server(None), tokens)
+    }
+
+    fn of(server: Server, tokens: Option<Tokens>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let (handle, station) = (server.handle(), server.address().unwrap());
         let panel = Panel::on(listener, tokens, handle.clone()).unwrap();
@@ -219,7 +223,7 @@ fn the_page_of_somebody_else_opens_no_socket() {
 #[test]
 fn beyond_this_machine_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
     let everywhere = SocketAddr::from(([0, 0, 0, 0], 0));
-    let refused = Panel::open(everywhere, None, server().handle());
+    let refused = Panel::open(everywhere, None, server(None).handle());
     assert!(matches!(refused, Err(PanelError::NoTokens(_))));
 
     let tokens = Tokens::random().unwrap();
@@ -419,6 +423,31 @@ fn the_wheel_is_handed_over_when_its_driver_says_so() {
     drop(anna);
     let alone = |line: &str| line.contains("driver=panel-3") && !line.contains("asks=");
     while !alone(&cy.line("about r1").unwrap()) {}
+}
+
+#[test]
+fn a_page_is_told_that_the_disk_does_not_take_its_warehouse() {
+    let folder = std::env::temp_dir().join(format!("lager-panel-{}", std::process::id()));
+    let file = folder.join("warehouse.toml");
+    // Nothing can be written under the name of a folder, whoever asks.
+    let in_the_way = folder.join("warehouse.toml.new");
+    std::fs::create_dir_all(&in_the_way).unwrap();
+    let panel = Running::of(server(Some(file.clone())), None);
+    let mut page = panel.own_page();
+    page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":40}"#);
+    let answer = page.line("answer 1").unwrap();
+    let why = format!("answer 1 refused {} is not saved: ", file.display());
+    assert!(answer.starts_with(&why), "{answer}");
+    assert!(
+        panel.handle.look(|station| station.warehouse().is_some()),
+        "it is in force"
+    );
+    std::fs::remove_dir(&in_the_way).unwrap();
+    page.say(r#"warehouse 2 {"size":[2,3],"side_length_cm":45}"#);
+    assert_eq!(page.line("answer 2").unwrap(), "answer 2 done");
+    assert!(file.is_file());
+    drop(panel);
+    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]

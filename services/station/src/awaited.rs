@@ -1,4 +1,4 @@
-//! What other threads wait for: answers of robots, and what robots say unasked.
+//! What other threads wait for: answers of robots, what robots say unasked, and what the disk takes.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -21,6 +21,23 @@ impl Awaited {
     /// The answer, once; `None` if it does not come in this time, or has been taken.
     pub fn wait(&self, timeout: Duration) -> Option<Reply> {
         self.reply.recv_timeout(timeout).ok()
+    }
+}
+
+/// Whether a warehouse has been saved, which comes later.
+#[derive(Debug)]
+pub struct Saving {
+    saved: Receiver<Result<(), String>>,
+}
+
+/// The other end.
+pub(crate) type Saved = SyncSender<Result<(), String>>;
+
+impl Saving {
+    /// That it is saved, or why not, once; `None` if that is not known in this time, or has been
+    /// taken. A station without a file has nothing to save, and is done.
+    pub fn wait(&self, timeout: Duration) -> Option<Result<(), String>> {
+        self.saved.recv_timeout(timeout).ok()
     }
 }
 
@@ -54,6 +71,7 @@ impl Subscription {
 pub(crate) struct Outlets {
     replies: BTreeMap<(Name, u32), SyncSender<Reply>>,
     subscribers: Vec<(SyncSender<News>, Arc<AtomicU64>)>,
+    savings: Vec<Saved>,
     /// What was said last.
     kept: VecDeque<News>,
 }
@@ -64,6 +82,18 @@ impl Outlets {
         let (to, reply) = sync_channel(1);
         self.replies.insert((robot.clone(), number), to);
         Awaited { reply }
+    }
+
+    /// Waits until the warehouse of this moment is saved.
+    pub(crate) fn save(&mut self) -> Saving {
+        let (to, saved) = sync_channel(1);
+        self.savings.push(to);
+        Saving { saved }
+    }
+
+    /// Who waits for that; it is then no longer here.
+    pub(crate) fn savings(&mut self) -> Vec<Saved> {
+        core::mem::take(&mut self.savings)
     }
 
     /// What is said from now on, and before it what is kept, if `recalls`.

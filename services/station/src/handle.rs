@@ -31,7 +31,7 @@ use lager_lines::command::Wheels;
 use lager_lines::extension::Action;
 use lager_wire::OperatorArm;
 
-use crate::awaited::{Awaited, Outlets, Subscription};
+use crate::awaited::{Awaited, Outlets, Saved, Saving, Subscription};
 use crate::robot::Doing;
 use crate::shown::Shown;
 use crate::station::{Station, Wish, WishRefused};
@@ -159,13 +159,17 @@ impl Handle {
         result
     }
 
-    /// Gives the station another warehouse, which is then saved.
+    /// Gives the station another warehouse, which is then saved. It is in force even if the disk
+    /// does not take it.
     ///
     /// # Errors
     ///
     /// When there can be no such warehouse.
-    pub fn set_warehouse(&self, warehouse: Warehouse) -> Result<(), WarehouseError> {
-        let result = self.change(|station| station.set_warehouse(warehouse));
+    pub fn set_warehouse(&self, warehouse: Warehouse) -> Result<Saving, WarehouseError> {
+        let result = self.work(|state| {
+            state.station.set_warehouse(warehouse)?;
+            Ok(state.outlets.save())
+        });
         self.wake();
         result
     }
@@ -273,6 +277,12 @@ impl Handle {
     /// Takes from the station what nobody sees.
     pub(crate) fn take<R>(&self, take: impl FnOnce(&mut Station) -> R) -> R {
         take(&mut self.lock().station)
+    }
+
+    /// Takes the warehouse that is to be saved, and who waits for that.
+    pub(crate) fn unsaved(&self) -> (Option<Warehouse>, Vec<Saved>) {
+        let mut state = self.lock();
+        (state.station.unsaved(), state.outlets.savings())
     }
 
     /// Time has passed.

@@ -35,7 +35,7 @@ mod station;
 mod warehouse;
 mod wheel;
 
-pub use awaited::{Awaited, Subscription};
+pub use awaited::{Awaited, Saving, Subscription};
 pub use handle::{Driver, Handle, View};
 pub use queues::Queues;
 pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};

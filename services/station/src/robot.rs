@@ -12,10 +12,11 @@
 //!
 //! - One question is held. A new question takes its place, and the old one is never answered.
 //! - Commands are taken while the robot asks for them, by hand or at a pick station, and at most
-//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait. A robot that speaks
-//!   the extension is told it at once, though it asks nothing while it turns. When the robot asks
-//!   for something else, its connection ends or somebody takes its wheel, they are dropped:
-//!   nobody's old command moves it later.
+//!   [`Robot::MOST_COMMANDS`] wait. A stop takes the place of all that wait, and of a pickup_done
+//!   behind them, after which the robot would drive off. A robot that speaks the extension is told
+//!   it at once, though it asks nothing while it turns. When the robot asks for something else, its
+//!   connection ends or somebody takes its wheel, they are dropped: nobody's old command moves it
+//!   later.
 //! - A product leaves the queue when the robot is told it. If the connection ends before the robot
 //!   has said another word, it is put back, since it may not have arrived.
 //! - The queue outlives connections.
@@ -178,7 +179,7 @@ impl Robot {
         Ok(self.answer())
     }
 
-    /// Gives a command. A stop takes the place of all that wait.
+    /// Gives a command. A stop takes the place of all that wait, and of a pickup_done.
     ///
     /// # Errors
     ///
@@ -191,7 +192,7 @@ impl Robot {
             return Err(CommandRefused::NotAsked);
         }
         if command == OperatorCommand::Stop {
-            self.commands.clear();
+            self.drop_commands();
             if self.hello.is_some() && self.held.get().is_none() {
                 self.told_command(command);
                 return Ok(Some(StationLine::Answer(Answer::Command(command))));
@@ -214,7 +215,7 @@ impl Robot {
         if self.hello.is_none() {
             return Ok((None, self.command(OperatorCommand::Stop)?));
         }
-        self.commands.clear();
+        self.drop_commands();
         let (number, dropped) = self.asked.open_always(self.now);
         self.lose(dropped);
         let number = Some(number);
@@ -285,7 +286,7 @@ impl Robot {
             Answer::Command(command) => {
                 self.told_command(command);
                 if command == OperatorCommand::Stop {
-                    self.commands.clear();
+                    self.drop_commands();
                 }
             }
             _ => {}

@@ -1,19 +1,26 @@
 //! Saves warehouse and queues in its own thread, because a disk may take seconds and a robot's stop
-//! must not wait for it.
+//! must not wait for it. What the disk does not take is tried again until it does.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{JoinHandle, spawn};
+use std::time::Duration;
 
+use crate::awaited::Saved;
 use crate::handle::Handle;
 use crate::queues::Queues;
 use crate::warehouse::{SaveError, Warehouse, save};
+
+/// When what could not be saved is tried again.
+const AGAIN: Duration = Duration::from_secs(2);
 
 /// What has changed.
 #[derive(Debug, Default)]
 pub(crate) struct Changes {
     pub(crate) warehouse: Option<Warehouse>,
     pub(crate) queues: Option<Queues>,
+    /// Who waits for the warehouse.
+    pub(crate) waits: Vec<Saved>,
 }
 
 impl Changes {
@@ -25,16 +32,63 @@ impl Changes {
     fn add(&mut self, newer: Self) {
         self.warehouse = newer.warehouse.or(self.warehouse.take());
         self.queues = newer.queues.or(self.queues.take());
+        self.waits.extend(newer.waits);
     }
 
-    fn save(self, path: &Path) -> [Result<(), SaveError>; 2] {
-        let warehouse = self.warehouse.map(|warehouse| save(path, &warehouse));
-        let queues = (self.queues).map(|queues| queues.save(&Queues::beside(path)));
-        [warehouse, queues].map(|saved| saved.unwrap_or(Ok(())))
+    /// Saves it and tells who waits; where there is no `path` nothing is saved. What the disk has not
+    /// taken stays, and why is returned.
+    fn save(&mut self, path: Option<&Path>) -> Vec<SaveError> {
+        let mut errors = Vec::new();
+        let saved = path.zip(self.warehouse.as_ref());
+        let saved = saved.map(|(path, warehouse)| save(path, warehouse));
+        let told = match saved {
+            Some(Err(error)) => {
+                let why = error.to_string();
+                errors.push(error);
+                Err(why)
+            }
+            _ => {
+                self.warehouse = None;
+                Ok(())
+            }
+        };
+        for to in self.waits.drain(..) {
+            // Whoever has asked may have given up.
+            let _ = to.try_send(told.clone());
+        }
+        let saved = path.zip(self.queues.as_ref());
+        match saved.map(|(path, queues)| queues.save(&Queues::beside(path))) {
+            Some(Err(error)) => errors.push(error),
+            _ => self.queues = None,
+        }
+        errors
     }
 }
 
-/// The thread. When it is dropped everything has been saved.
+/// Saves what changes, until nothing more can.
+fn work(path: Option<&Path>, changes: &Receiver<Changes>, handle: &Handle) {
+    let mut open = Changes::default();
+    let mut has_ended = false;
+    while !has_ended {
+        let received = match open.is_nothing() {
+            true => changes.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            false => changes.recv_timeout(AGAIN),
+        };
+        let is_new = received.is_ok();
+        has_ended = matches!(received, Err(RecvTimeoutError::Disconnected));
+        received.into_iter().for_each(|newer| open.add(newer));
+        changes.try_iter().for_each(|newer| open.add(newer));
+        for error in open.save(path) {
+            // Who was told of it once knows.
+            if is_new {
+                tracing::error!("{error}; it is tried again");
+                handle.change(|station| station.not_saved(&error.to_string()));
+            }
+        }
+    }
+}
+
+/// The thread. When it is dropped everything has been saved, as far as the disk takes it.
 #[derive(Debug)]
 pub(crate) struct Saver {
     changes: Option<Sender<Changes>>,
@@ -44,22 +98,10 @@ pub(crate) struct Saver {
 impl Saver {
     /// Saves to `path`, and beside it, from now on; nothing where there is none.
     pub(crate) fn new(path: Option<PathBuf>, handle: Handle) -> Self {
-        let (sender, changes) = channel::<Changes>();
-        let work = move || {
-            while let Ok(mut change) = changes.recv() {
-                while let Ok(newer) = changes.try_recv() {
-                    change.add(newer);
-                }
-                let Some(path) = &path else { continue };
-                for error in change.save(path).into_iter().filter_map(Result::err) {
-                    tracing::error!("{error}");
-                    handle.change(|station| station.not_saved(&error.to_string()));
-                }
-            }
-        };
+        let (sender, changes) = channel();
         Self {
             changes: Some(sender),
-            thread: Some(spawn(work)),
+            thread: Some(spawn(move || work(path.as_deref(), &changes, &handle))),
         }
     }
 

@@ -237,13 +237,17 @@ impl Server {
 
     /// Has what has changed saved.
     fn save(&mut self) {
-        let warehouse = self.handle.take(Station::unsaved);
+        let (warehouse, waits) = self.handle.unsaved();
         let queues = self.handle.look(Station::queues);
         let queues = (queues != self.saved).then_some(queues);
         if let Some(queues) = &queues {
             self.saved.clone_from(queues);
         }
-        self.saver.save(Changes { warehouse, queues });
+        self.saver.save(Changes {
+            warehouse,
+            queues,
+            waits,
+        });
     }
 
     /// Waits until there is something to do.

@@ -69,7 +69,7 @@ impl Conversation {
         self.driving.let_go(STOPPED);
         self.actions.push(Action::Stop);
         self.stops_again = self.tasks.resumes();
-        if let Some(number) = number.filter(|_| self.is_extended)
+        if let Some(number) = number.filter(|_| self.is_up && self.is_extended)
             && self.stops.len() < MOST_STOPS
         {
             self.stops.push((number, now.ns));

@@ -108,6 +108,31 @@ fn what_was_read_late_moves_nothing() {
 }
 
 #[test]
+fn a_stop_that_is_read_after_the_link_was_given_up_stops_all_the_same() {
+    // A pause by hand, and one that is as long as the silence of a station may be.
+    for (mode, pause) in [(Mode::Manual, 201), (Mode::Autonomous, 5_000)] {
+        let mut robot = Robot::connected(mode);
+        robot.hears(&["lager 1 station"]);
+        robot.leap(pause);
+        let given_up = robot.done();
+        assert_eq!(given_up.last().map(String::as_str), Some("[hangs up]"));
+        let said = robot.hears(&["styrcomm 2", "do 4 mode autonomous", "stop 5"]);
+        assert_eq!(said, ["[stops]"], "{mode:?}");
+        // Nobody is there who waits for its confirmation.
+        robot.health.stopped = 1;
+        robot.health.steering.version = 1;
+        robot.told();
+        robot.connect();
+        robot.hears(&["lager 1 station"]);
+        let standing = SteeringReport {
+            age_ms: 0,
+            ..SteeringReport::default()
+        };
+        assert_eq!(robot.reports(&standing), [""; 0]);
+    }
+}
+
+#[test]
 fn a_pause_as_long_as_the_lease_ends_the_command() {
     let mut robot = driven();
     robot.leap(120);

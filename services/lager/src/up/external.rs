@@ -95,6 +95,9 @@ fn station_for(config: &mut Config) -> Result<External> {
             told: format!("the external computer is the one at {address}"),
         });
     }
+    if let Some(gag) = &config.station.gag {
+        station::fits(gag).context("no GaG can connect; --gag takes another path")?;
+    }
     if let Err(error) = goods::configured(config) {
         if config.station.listen.is_some() || config.station.gag.is_some() {
             return Err(error);

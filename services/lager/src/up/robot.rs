@@ -192,6 +192,7 @@ impl Robot {
             restarts: self.supervisor.restarts(),
             failure,
             failure_kind: mission.failure_kind(),
+            hold: mission.hold(),
         };
         if json {
             self.terminal.finish();

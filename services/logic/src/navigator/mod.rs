@@ -366,9 +366,9 @@ impl Navigator {
     fn hold(&self) -> Hold {
         if self.holding.unheard {
             Hold::Unheard
-        } else if self.mission.parked && self.mission.battery.forbids() {
+        } else if self.mission.is_kept() && self.mission.battery.forbids() {
             Hold::Battery
-        } else if self.mission.parked {
+        } else if self.mission.is_kept() {
             Hold::Link
         } else if self.holding.joint_off.is_some() {
             Hold::Arm

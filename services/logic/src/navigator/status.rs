@@ -116,12 +116,11 @@ impl Navigator {
         mission.failure = status.failure;
         mission.pick = status.pick.get()?;
         if status.hold == Hold::Battery {
-            mission.parked = true;
             mission.battery = Battery::LOW;
         }
-        if status.hold == Hold::Link {
-            (mission.parked, mission.link_lost) = (true, true);
-        }
+        mission.link_lost = status.hold == Hold::Link;
+        // At home it waits for its order as before.
+        mission.parked = mission.must_park() && mission.phase != Phase::WaitingForOrder;
         if status.hold == Hold::Arm {
             // The next report tells which joint it is, if it is one still.
             navigator.holding.joint_off = Some(Joint::Base);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lager_logic::node::Node;
 use lager_logic::{Input, LogicConfig, Navigator};
-use lager_topics::{EventKind, Heading, Hold, Phase, Side};
+use lager_topics::{EventKind, Heading, Hold, Phase, Remedy, Side};
 
 use crate::double::{CARRYING, Trouble};
 use crate::floor::Exit;
@@ -299,12 +299,20 @@ fn without_its_link_no_order_is_begun_and_a_robot_that_stands_for_two_reasons_wa
     trial.order(2, 2);
     trial.run_for(SECOND * 5);
     let waits = (Phase::WaitingForOrder, 1);
-    assert_eq!((trial.phase(), trial.status.waiting), waits);
+    let for_what = |trial: &Trial| {
+        assert_eq!((trial.phase(), trial.status.waiting), waits);
+        assert_eq!(Some(trial.status.hold), hold(trial).map(Into::into));
+        hold(trial)
+    };
+    assert_eq!(for_what(&trial), Some(Hold::Link));
+    trial.kill(Duration::from_millis(200));
+    trial.run_for(SECOND);
+    assert_eq!(for_what(&trial), Some(Hold::Link), "nobody has told it");
     trial.body.battery = 90;
     trial.run_for(SECOND * 5);
     trial.tell(Input::Link { lost: false });
     trial.run_for(SECOND * 5);
-    assert_eq!((trial.phase(), trial.status.waiting), waits);
+    assert_eq!(for_what(&trial), Some(Hold::Battery));
     trial.body.battery = 111;
     trial.deliver(2);
 }
@@ -331,10 +339,15 @@ fn with_a_low_battery_no_order_is_begun_until_a_person_wants_it() {
     trial.run_for(SECOND * 5);
     trial.order(2, 2);
     trial.run_for(SECOND * 5);
-    assert_eq!(
-        (trial.phase(), trial.status.waiting),
-        (Phase::WaitingForOrder, 1)
-    );
+    let told = |trial: &Trial| {
+        let status = trial.navigator.status();
+        (status.phase.get(), status.waiting, status.remedy.get())
+    };
+    let waits = (Some(Phase::WaitingForOrder), 1, Some(Remedy::Charge));
+    assert_eq!(told(&trial), waits);
+    trial.kill(Duration::from_millis(200));
+    trial.run_for(SECOND);
+    assert_eq!(told(&trial), waits);
     put(&mut trial, (0, 0), 0.0);
     trial.tell(Input::Reset);
     trial.deliver(2);

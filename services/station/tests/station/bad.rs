@@ -199,6 +199,11 @@ fn what_cannot_be_saved_is_told_and_everybody_is_served_all_the_same() {
         why.starts_with("thought ") && why.contains("warehouse.toml"),
         "{why}"
     );
+    let described = station.handle.look(|station| station.warehouse().cloned());
+    let described = described.expect("what GaG has said");
+    let saving = station.handle.set_warehouse(described).expect("it can be");
+    let why = saving.wait(WATCHDOG).expect("an end").expect_err("no disk");
+    assert!(why.contains("warehouse.toml is not saved"), "{why}");
     let saved = load(&station.folder().join("warehouse.toml")).expect("the file");
     assert_eq!(saved.size, [4, 3], "what was there before");
     drop(gag);

@@ -186,6 +186,25 @@ fn what_was_picked_is_forgotten_with_the_pick() {
 }
 
 #[test]
+fn a_stop_forgets_that_the_goods_were_picked_up() {
+    for hello in [None, Some("lager 1 r1")] {
+        let mut robot = connected();
+        hello.map(|hello| say(&mut robot, hello));
+        assert_eq!(say(&mut robot, "armcomm"), "");
+        assert_eq!(give(&mut robot, 0xF1), Ok("armcomm 11110001".into()));
+        assert_eq!(give(&mut robot, 0xF9), Ok(String::new()));
+        assert_eq!(robot.picked_up().map(written), Ok(String::new()));
+        let stopped = robot.stop().map(|(_, line)| written(line));
+        let next = say(&mut robot, "armcomm");
+        match hello {
+            None => assert_eq!(next, "styrcomm 00000001"),
+            Some(_) => assert_eq!((stopped, next), (Ok("stop 1".into()), String::new())),
+        }
+        assert_eq!(say(&mut robot, "armcomm"), "", "it does not drive off");
+    }
+}
+
+#[test]
 fn a_new_question_takes_the_place_of_the_one_that_was_held() {
     let mut robot = idle();
     assert_eq!(say(&mut robot, "styrcomm"), "", "it was switched to manual");

@@ -226,6 +226,23 @@ fn a_stop_takes_the_place_of_a_gags_commands_that_wait() {
 }
 
 #[test]
+fn a_stop_takes_the_place_of_a_gags_pickup_done_that_waits() {
+    let mut station = between_a_gag_and_a_robot();
+    play(
+        &mut station,
+        &[
+            (R1, "armcomm", &["gag: armcomm"]),
+            (Peer::Gag, "armcomm F3", &["r1: armcomm 11110011"]),
+            (Peer::Gag, "armcomm F9", &[]),
+            (Peer::Gag, "pickup_done", &[]),
+            (Peer::Gag, "styrcomm 1", &[]),
+            (R1, "armcomm", &["r1: styrcomm 00000001"]),
+            (R1, "armcomm", &["gag: armcomm"]),
+        ],
+    );
+}
+
+#[test]
 fn a_robot_stands_when_the_gag_that_drives_it_leaves() {
     let mut station = between_a_gag_and_a_robot();
     let drives: &[(Peer, &str, &[&str])] = &[

@@ -2,8 +2,9 @@
 
 use lager_comm::Senses;
 use lager_topics::{
-    BlockedWay, BlockedWays, DistanceFrame, Event, EventKind, Failure, FailureKind, Heading,
-    LineFrame, Mode, NavigatorStatus, Phase, Remedy, Role, StopCause, Thought, ThoughtKind, Truth,
+    BlockedWay, BlockedWays, DistanceFrame, Durations, Event, EventKind, Failure, FailureKind,
+    Heading, LineFrame, Mode, NavigatorStatus, Phase, Remedy, Role, Route, RouteNode,
+    SERVO_UNKNOWN, SteeringReport, StopCause, Thought, ThoughtKind, Truth,
 };
 
 use super::{extended, pass, queue};
@@ -59,6 +60,78 @@ fn a_station_is_told_the_state_twenty_times_a_second() {
     let truths = robot.shown.iter().filter(|line| line.starts_with("truth"));
     let truths: Vec<_> = truths.collect();
     assert_eq!(truths, ["truth 550 0 90 -"], "it is told once");
+}
+
+#[test]
+fn what_the_boards_do_what_is_lost_and_where_it_goes_are_told() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.health.sensor.up = 1;
+    robot.health.steering.up = 1;
+    (robot.health.sensor.lost_total, robot.health.bus_lost) = (3, 5);
+    robot.health.steering.lost_total = 4;
+    robot.told();
+    robot.queue(&queue(&[]));
+    robot.status(&NavigatorStatus {
+        phase: Phase::Driving.into(),
+        frames_lost: 6,
+        delivered: 2,
+        ..NavigatorStatus::default()
+    });
+    let mut route = Route {
+        length: 2,
+        ..Route::default()
+    };
+    route.nodes[..2].copy_from_slice(&[RouteNode { x: 1, y: 0 }, RouteNode { x: 1, y: 1 }]);
+    robot.conversation.route(&route);
+    let mut counted = Durations::default();
+    for ns in [20_000, 20_000, 20_000, 900_000] {
+        counted.record(ns);
+    }
+    robot.conversation.senses(Senses {
+        latency: Some(Box::new(counted)),
+        ..Senses::default()
+    });
+    robot.reports(&SteeringReport {
+        code: 3,
+        left_duty: 104,
+        right_duty: 96,
+        line_error: -2,
+        servo_errors: 0b0010_0000,
+        battery_decivolts: 118,
+        servo_position: [512, 300, 301, 488, 512, 512, 200, SERVO_UNKNOWN],
+        servo_load: [0, -40, 40, 0, 0, 0, 900, 0],
+        age_ms: 0,
+        ..SteeringReport::default()
+    });
+    robot.shown.clear();
+    pass(&mut robot, 100);
+    let told = |kind: &str| {
+        let line = robot.shown.iter().find(|line| line.starts_with(kind));
+        line.unwrap_or_else(|| panic!("no {kind}: {:?}", robot.shown))
+    };
+    let state = told("state ");
+    for field in [
+        " next=1,0 phase=driving ",
+        " order=1 product=7 delivered=2 ",
+        " line_error=-2 left_duty=104 right_duty=96 code=00000011 ",
+        " servos=512,300,301,488,512,512,200,- loads=0,-40,40,0,0,0,900,0 ",
+        " servo_errors=00100000 battery_dv=118 ",
+        " sensor_up=1 steering_up=1 sensor_lost=3 steering_lost=4 bus_lost=11",
+    ] {
+        assert!(state.contains(field), "{field}: {state}");
+    }
+    assert_eq!(told("route "), "route 2 1 0 1 1");
+    // Half of them took some 20 us, and one 900.
+    assert_eq!(told("latency "), "latency 4 20 900 900 900 900");
+    // What is old is told no more.
+    robot.reports(&SteeringReport {
+        left_duty: 104,
+        age_ms: 501,
+        ..SteeringReport::default()
+    });
+    robot.shown.clear();
+    pass(&mut robot, 100);
+    assert!(!robot.shown[0].contains("duty"), "{:?}", robot.shown);
 }
 
 #[test]
