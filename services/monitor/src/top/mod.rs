@@ -60,6 +60,7 @@ impl<W: Write> Tools<'_, W> {
         model.view.filter.clone_from(&config.filter);
         let mut feed = Feed::new(self.bus, self.watchdog)?;
         feed.look(&mut model)?;
+        model.end_window(Clock::monotonic_ns());
         let Some(long) = config.once else {
             let mut screen = Screen::enter()?;
             return self.watch(&mut model, &mut feed, &mut screen);
@@ -139,7 +140,7 @@ impl Recorded {
     /// Takes a sample: its stamp, how many of its topic were missed up to it, and its payload.
     pub fn take(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: Value) {
         let published = stamp.publish_time_ns;
-        self.begun_ns.get_or_insert(published);
+        let begun_ns = *self.begun_ns.get_or_insert(published);
         let model = &mut self.model;
         model.now_ns = model.now_ns.max(published);
         model.hear(topic, stamp);
@@ -159,12 +160,12 @@ impl Recorded {
             MissionQueue::NAME => head.queue = of(payload).or(head.queue),
             LatencyPath::NAME => {
                 if let Some(path) = of(payload) {
-                    head.path.take(path);
+                    head.path.take_recorded(path, stamp, begun_ns);
                 }
             }
             LatencyCommand::NAME => {
                 if let Some(command) = of(payload) {
-                    head.command.take(command);
+                    head.command.take_recorded(command, stamp, begun_ns);
                 }
             }
             _ => {}
@@ -182,7 +183,7 @@ impl Recorded {
         shutdown: &Shutdown,
         out: &mut impl Write,
     ) -> io::Result<()> {
-        self.model.end_window(self.model.now_ns);
+        self.model.end_recording();
         if once {
             return print(&self.model, as_json, out);
         }
@@ -283,6 +284,8 @@ fn stroke(key: KeyEvent) -> Option<Stroke> {
         KeyCode::Char(letter) => Key::Char(letter),
         KeyCode::Up => Key::Up,
         KeyCode::Down => Key::Down,
+        KeyCode::Left => Key::Left,
+        KeyCode::Right => Key::Right,
         KeyCode::PageUp => Key::PageUp,
         KeyCode::PageDown => Key::PageDown,
         KeyCode::Home => Key::Home,
