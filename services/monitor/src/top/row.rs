@@ -233,6 +233,17 @@ impl Row {
         }
     }
 
+    /// Takes what a recording lacks before a sample: what was lost before its recorder, which of a
+    /// state is usual, and what that had no time for.
+    pub(crate) fn lack(&mut self, lost: u64, dropped: u64, now_ns: u64) {
+        let is_state = self.buffer <= 1;
+        self.overrun += if is_state { lost } else { 0 };
+        let lost = if is_state { dropped } else { lost + dropped };
+        if lost > 0 {
+            self.lose(lost, now_ns);
+        }
+    }
+
     /// Counts losses that are nobody's but the topic's.
     pub(crate) fn lose(&mut self, lost: u64, now_ns: u64) {
         self.lost += lost;

@@ -13,11 +13,11 @@ use lager_topics::{
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
-use super::Recorded;
 use super::head::Load;
 use super::model::{Key, Model, Pressed};
 use super::render;
 use super::row::Life;
+use super::{Lacking, Recorded};
 
 const MS: u64 = 1_000_000;
 const S: u64 = 1_000 * MS;
@@ -345,25 +345,46 @@ fn a_recording_shows_who_wrote_it_and_what_it_lacks_and_claims_no_readers() {
             writer: 4_711,
             ..Stamp::default()
         };
-        // Three are lacking from early on.
-        let lacking = if number > 5 { 3 } else { 0 };
-        recorded.take("link/health", &stamp, lacking, serde_json::Value::Null);
-        recorded.take("weather/now", &stamp, 0, serde_json::Value::Null);
+        // From early on three are lacking, which is usual for a state.
+        let lost = if number > 5 { 3 } else { 0 };
+        let lacking = Lacking { lost, dropped: 0 };
+        for topic in ["link/health", "sensor/line", "weather/now"] {
+            recorded.take(topic, &stamp, lacking, serde_json::Value::Null);
+        }
+        let dropped = Lacking {
+            lost: 0,
+            dropped: lost,
+        };
+        recorded.take("nav/status", &stamp, dropped, serde_json::Value::Null);
     }
     recorded.model.end_recording();
     let text = picture(&recorded.model, 200, 60);
     let row = |topic: &str| -> Vec<String> {
-        let line = text
-            .lines()
-            .find(|line| line.contains(topic))
-            .expect("a row");
-        line.split_whitespace().map(str::to_owned).collect()
+        let line = text.lines().find(|line| line.contains(topic));
+        let words = line.expect("a row").split_whitespace();
+        words.map(str::to_owned).collect()
     };
+    // Topic, writer, its process and state, readers, two rates, age, lost, skipped.
     let health = row("link/health");
-    assert_eq!(health[..5], ["!link/health", "process", "4711", "-", "-"]);
+    assert_eq!(health[..5], ["link/health", "process", "4711", "-", "-"]);
     assert_eq!(health[5..7], ["10.0", "10.0"], "{text}");
+    assert_eq!(health[8..10], ["0", "3"], "{text}");
+    let line = row("sensor/line");
+    assert_eq!(
+        (line[0].as_str(), &line[8..10]),
+        ("!sensor/line", &["3", "0"].map(str::to_owned)[..])
+    );
+    let status = row("nav/status");
+    assert_eq!(
+        (status[0].as_str(), status[8].as_str()),
+        ("!nav/status", "3")
+    );
     // How long its samples are is in no table and not in the recording.
-    assert_eq!(row("weather/now")[12], "-", "{text}");
+    let weather = row("weather/now");
+    assert_eq!(
+        (weather[0].as_str(), weather[12].as_str()),
+        ("!weather/now", "-")
+    );
     let rows = recorded.model.as_json()["topics"].clone();
     assert_eq!(rows[0]["writers"][0]["pid"], 4_711, "{rows}");
     assert!(rows[0]["writers"][0]["state"].is_null(), "{rows}");
