@@ -8,11 +8,48 @@ use std::time::{Duration, Instant};
 use lager_ports::{BUS_VERSION, Bus, BusConfig, Cause, Publisher, Subscriber};
 use lager_tests::Domain;
 use lager_topics::{
-    LineFrame, Make, NavMap, OBSERVERS, Role, SensorDistance, SensorLine, Stamp, StructInfo,
-    TOPICS, WarehouseMap,
+    LineFrame, Make, NavMap, OBSERVERS, Qos, Role, SensorDistance, SensorLine, Stamp, StructInfo,
+    TOPICS, Tag, Topic, WarehouseMap, coded, payload,
 };
 use lager_wire::LineState;
 use serde_json::{Value, json};
+
+coded! {
+    /// What the sky looks like.
+    pub enum Sky {
+        /// Nothing is in it.
+        Clear = 0,
+        /// It is not seen.
+        Fog = 7,
+    }
+}
+
+payload! {
+    /// What a weather station sees.
+    pub struct Weather: 24 bytes {
+        /// Wind in mm/s.
+        pub wind: u32,
+        /// From where it blows, in degrees.
+        pub from: u16,
+        /// The sky.
+        pub sky: Tag<Sky>,
+        /// Always 0.
+        pub reserved: u8,
+        /// The last gusts in mm/s.
+        pub gusts: [u32; 4],
+    }
+}
+
+/// A topic that is in no table.
+#[derive(Clone, Copy, Debug)]
+struct WeatherNow;
+
+impl Topic for WeatherNow {
+    const NAME: &'static str = "weather/now";
+    type Payload = Weather;
+    const QOS: Qos = Qos::stream(64);
+    const SUMMARY: &'static str = "The weather.";
+}
 
 const PACKAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../bus/python");
 
@@ -217,6 +254,31 @@ fn python_reads_what_rust_reads_and_counts_what_it_missed() {
     assert_eq!(reader.says()["done"], true);
     assert!(reader.child.wait().expect("a child").success());
     drop((publisher, distances, maps, beside, bus));
+    domain.assert_clean();
+}
+
+#[test]
+#[ignore = "needs LAGER_PYTHON, a Python with the package bus/python; tests/run makes one"]
+fn python_reads_a_topic_that_is_in_no_table() {
+    let domain = Domain::new();
+    let bus = Bus::open(&domain.bus("r1", 1.0), Role::Guest).expect("the bus opens");
+    let publisher = bus.publisher::<WeatherNow>().expect("a publisher");
+    let mut reader = Led::start(&domain, "own.py", 0);
+    assert_eq!(reader.says()["ready"], true);
+    for number in 0..10 {
+        let wind = number * 100;
+        let weather = Weather {
+            wind,
+            from: 90,
+            sky: Sky::Fog.into(),
+            gusts: [0, wind + 1, 0, 0],
+            ..Weather::default()
+        };
+        publisher.send(Cause::OWN, weather).expect("it is sent");
+    }
+    assert_eq!(reader.says(), json!({"received": 10, "lost": 0}));
+    assert!(reader.child.wait().expect("a child").success());
+    drop((publisher, bus));
     domain.assert_clean();
 }
 

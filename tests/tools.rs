@@ -578,6 +578,9 @@ fn every_shell_is_told_how_to_complete() {
             told.contains("obstacle") && told.contains("delay"),
             "{shell}"
         );
+        if matches!(shell, "bash" | "zsh" | "fish") {
+            assert!(told.contains("sensor/line"), "{shell}");
+        }
     }
     let wrong = domain.run(&["completions", "cmd"]);
     assert_eq!(wrong.status.code(), Some(2));

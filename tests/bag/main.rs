@@ -281,7 +281,18 @@ fn a_bag_of_a_mission_has_what_the_bus_has_numbered() {
         .messages
         .iter()
         .filter(|(topic, ..)| topic == MissionEvent::NAME);
-    assert_eq!(table.lines().count(), events.count() + 1);
+    let events = events.count();
+    assert_eq!(table.lines().count(), events + 1);
+    let export = ["bag", "export", "tour.mcap", "--json", "--csv", "tables"];
+    let told = done(
+        &domain,
+        &[&export[..], &["--topic", MissionEvent::NAME]].concat(),
+    );
+    let told: Value = serde_json::from_str(&told).expect("one line of JSON");
+    assert_eq!(
+        (&told["topic"], &told["rows"]),
+        (&MissionEvent::NAME.into(), &events.into())
+    );
     drop((line, command, event, status, observer));
     domain.assert_clean();
 }
@@ -318,6 +329,22 @@ fn what_a_killed_recorder_had_flushed_is_recovered() {
     );
     let told = done(&domain, &["bag", "recover", "noise.mcap"]);
     assert!(told.contains("were read again"), "{told}");
+    let other = ["--json", "--output", "other.mcap"];
+    let told = done(
+        &domain,
+        &[&["bag", "recover", "noise.mcap"], &other[..]].concat(),
+    );
+    let told: Value = serde_json::from_str(&told).expect("one line of JSON");
+    assert_eq!(
+        (&told["copy"], &told["whole"]),
+        (&"other.mcap".into(), &false.into())
+    );
+    assert!(
+        told["faults"][0]
+            .as_str()
+            .is_some_and(|fault| fault.contains("cut off")),
+        "{told}"
+    );
     must_be_right(&domain, "noise.recovered.mcap");
     let recovered = noise_numbers(&domain.folder().join("noise.recovered.mcap"));
     assert!(recovered.starts_with(&flushed));

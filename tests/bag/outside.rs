@@ -6,7 +6,7 @@ use std::process::Command;
 use lager_tests::{Domain, wait_for};
 use serde_json::Value;
 
-use crate::{end, recorder, said};
+use crate::{Noisy, end, guest, recorder, said};
 
 #[test]
 #[ignore = "needs LAGER_PYTHON, a Python with mcap and jsonschema; tests/run makes one"]
@@ -14,7 +14,11 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
     let domain = Domain::new();
     let recorder = recorder(&domain, &["tour.mcap"]);
     let up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "4"]);
+    // Beside the robot's topics one that is in no table.
+    let bus = guest(&domain);
+    let mut noisy = Noisy::new(&bus);
     wait_for("a thousand lines", || {
+        noisy.send();
         let said = recorder.output();
         let progress: Value = serde_json::from_str(said.lines().last()?).ok()?;
         let topics = progress["topics"].as_array()?;
@@ -25,6 +29,7 @@ fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
     });
     drop(up);
     let told = end(recorder);
+    drop((noisy, bus));
     let python = std::env::var_os("LAGER_PYTHON").expect("LAGER_PYTHON names a Python");
     let read = Command::new(python)
         .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/bag/read.py"))

@@ -4,7 +4,7 @@ use std::fs;
 
 use lager_ports::{Bus, Cause};
 use lager_tests::{Domain, wait_for};
-use lager_topics::{LineFrame, Role, SensorLine, Topic};
+use lager_topics::{DistanceFrame, LineFrame, Role, SensorDistance, SensorLine, Topic};
 use rustix::process::Signal;
 
 use crate::{NoiseNow, Noisy, Seen, done, end, guest, read, recorder, said};
@@ -169,6 +169,45 @@ fn a_rate_stretches_a_recording_or_presses_it() {
         let wrong = domain.run(&["bag", "play", "lines.mcap", "--rate", rate]);
         assert_eq!(wrong.status.code(), Some(2), "{rate}: {}", said(&wrong));
     }
+    domain.assert_clean();
+}
+
+#[test]
+fn only_the_topics_that_are_asked_for_are_played() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let lines = bus.publisher::<SensorLine>().expect("a topic");
+    let distances = bus.publisher::<SensorDistance>().expect("a topic");
+    let both = recorder(&domain, &["both.mcap"]);
+    // The recorder finds these writers when it next looks.
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    for _ in 0..50 {
+        let sent = lines.send(Cause::OWN, LineFrame::default());
+        sent.expect("a sample");
+        let sent = distances.send(Cause::OWN, DistanceFrame::default());
+        sent.expect("a sample");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    end(both);
+    drop((lines, distances, bus));
+    assert_eq!(read(&domain.folder().join("both.mcap")).messages.len(), 100);
+    let listener = recorder(&domain, &["--name", "r2", "lines.mcap"]);
+    let play = [
+        "--name",
+        "r2",
+        "bag",
+        "play",
+        "both.mcap",
+        "--topic",
+        "sensor/line",
+    ];
+    let told = done(&domain, &play);
+    assert!(told.contains("50 samples played"), "{told}");
+    end(listener);
+    let heard = read(&domain.folder().join("lines.mcap"));
+    assert_eq!(heard.messages.len(), 50);
+    let is_line = |topic: &str| topic == SensorLine::NAME;
+    assert!(heard.messages.iter().all(|(topic, ..)| is_line(topic)));
     domain.assert_clean();
 }
 

@@ -29,7 +29,8 @@ pub struct EnvelopeSchema {
 }
 
 impl EnvelopeSchema {
-    /// Of a topic whose payload is laid out like this.
+    /// Of a topic whose payload is laid out like this. The layout itself stands in its comment, by
+    /// which a program makes payloads of a topic that it was not built with.
     ///
     /// # Panics
     /// Never: a schema is always JSON.
@@ -38,6 +39,7 @@ impl EnvelopeSchema {
         let count = json!({"type": "integer", "minimum": 0});
         let schema = json!({
             "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "$comment": payload.text(),
             "title": payload.name(),
             "type": "object",
             "properties": {
@@ -56,8 +58,12 @@ impl EnvelopeSchema {
 impl EnvelopeSchema {
     /// Whether messages of a topic with the schema `text` are read and written as these are.
     pub fn fits(&self, text: &[u8]) -> bool {
-        let parsed = |text| serde_json::from_slice::<serde_json::Value>(text).ok();
-        // Two builds may write the same members in another order.
+        let parsed = |text| {
+            let mut schema: serde_json::Value = serde_json::from_slice(text).ok()?;
+            schema.as_object_mut()?.remove("$comment");
+            Some(schema)
+        };
+        // Two builds may write the same members in another order, and older ones no comment.
         parsed(text).is_some_and(|other| parsed(&self.text) == Some(other))
     }
 }
@@ -86,4 +92,25 @@ pub(crate) fn channel_notes(derived_from: Option<&str>) -> BTreeMap<String, Stri
 /// Of what a channel with such metadata is derived.
 pub(crate) fn derived_from(notes: &BTreeMap<String, String>) -> Option<&str> {
     notes.get(DERIVED).map(String::as_str)
+}
+
+#[cfg(test)]
+mod tests {
+    use lager_topics::LineFrame;
+
+    use super::*;
+
+    #[test]
+    fn a_schema_has_the_layout_in_its_comment_and_fits_one_without() {
+        let schema = EnvelopeSchema::of(&Description::of::<LineFrame>());
+        let mut value: serde_json::Value = serde_json::from_slice(&schema.text).expect("JSON");
+        let layout = value["$comment"].as_str().expect("a text");
+        let layout = Description::parse(layout).expect("a layout");
+        assert_eq!(layout.name(), "LineFrame");
+        assert_eq!(layout.size(), size_of::<LineFrame>());
+        value.as_object_mut().expect("an object").remove("$comment");
+        assert!(schema.fits(value.to_string().as_bytes()));
+        value["title"] = "Other".into();
+        assert!(!schema.fits(value.to_string().as_bytes()));
+    }
 }

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import enum
 import json
 import keyword
+import math
 import os
-from typing import Any, AsyncIterator, Dict, Generic, Iterator, Optional, TypeVar, Union
+from typing import Any, AsyncIterator, Dict, Generic, Iterator, Optional, Type, TypeVar, Union
 
+from . import _described
 from ._errors import NoRecording, OtherLayout, Unread
 from ._layout import Layout, TopicEntry
 from ._open import Open
@@ -20,8 +23,8 @@ P = TypeVar("P", bound=Layout)
 class Bag(Open):
     """The recording in `path`, which `lager bag record` has made.
 
-    `bag.topic("sensor/line")` reads a topic from its first sample to its last. Use it as a context
-    manager, or `close` it. Needs the package `mcap`: `pip install './bus/python[bag]'`.
+    `bag.topic("sensor/line")` reads a topic from its first sample to its last, also one that is in no
+    table. Use it as a context manager, or `close` it. Needs the package `mcap`: `pip install './bus/python[bag]'`.
     """
 
     def __init__(self, path: Union[str, "os.PathLike[str]"]) -> None:
@@ -62,6 +65,11 @@ class Bag(Open):
             if "lager.derived" not in channel.metadata
         }
         """The samples of each topic that is in it."""
+        self._schemas = {
+            channel.topic: summary.schemas[channel.schema_id].data
+            for channel in summary.channels.values()
+            if channel.schema_id in summary.schemas
+        }
         counted = notes.get("lager.counts", {})
         self._counts = {name: json.loads(text) for name, text in counted.items()}
 
@@ -75,6 +83,19 @@ class Bag(Open):
         """Closes the file. What was not copied is gone."""
         super().close()
         self._file.close()
+
+    def _described(self, name: str) -> TopicEntry:
+        if name not in self.topics:
+            raise Unread(
+                f"there is no topic `{name}` in {self.path}; it has {' '.join(self.topics)}"
+            )
+        said = json.loads(self._schemas.get(name, b"{}")).get("$comment", "")
+        try:
+            return TopicEntry(name, _described.layout(said))
+        except _described.NotReadable as error:
+            raise OtherLayout(
+                f"{self.path} does not say how samples of `{name}` are laid out: {error}"
+            ) from error
 
     def _read(self, entry: TopicEntry) -> Reader[Any]:
         if self._file.closed:
@@ -193,7 +214,8 @@ class _Port:
 
 def fill(into: Layout, values: Any, topic: str) -> None:
     """Puts a sample's JSON into a payload. Fields that one of both lacks are another build's."""
-    names = {_of_file(field[0]): field[0] for field in into._fields_ if field[0] != "reserved"}
+    fields = [field[0] for field in into._fields_ if not field[0].startswith("reserved")]
+    names = {_of_file(name): name for name in fields}
     if not isinstance(values, dict) or set(names) != set(values):
         there = sorted(values) if isinstance(values, dict) else values
         raise OtherLayout(
@@ -203,22 +225,30 @@ def fill(into: Layout, values: Any, topic: str) -> None:
         )
     for in_file, name in names.items():
         value = values[in_file]
-        if isinstance(value, str):
-            named = f"{value}_" if keyword.iskeyword(value) else value
-            variants = into._enums_[name]
-            if named not in variants.__members__:
-                raise OtherLayout(
-                    f"`{topic}` was recorded by another build: {variants.__name__} has no {value} "
-                    "in this package; install the package of that version"
-                )
-            value = variants[named]
+        variants = into._enums_.get(name)
         inner = getattr(into, name)
         if isinstance(inner, Layout):
             fill(inner, value, topic)
         elif isinstance(inner, ctypes.Array):
-            _fill_list(inner, value, topic)
+            _fill_list(inner, value, variants, topic)
         else:
-            setattr(into, name, value)
+            setattr(into, name, _number(value, variants, topic))
+
+
+def _number(value: Any, variants: Optional[Type[enum.IntEnum]], topic: str) -> Any:
+    """A value that is made of no others: a variant has its name there, and what is no number null."""
+    if value is None:
+        return math.nan
+    if not isinstance(value, str):
+        return value
+    named = f"{value}_" if keyword.iskeyword(value) else value
+    if variants is None or named not in variants.__members__:
+        name = "this field" if variants is None else variants.__name__
+        raise OtherLayout(
+            f"`{topic}` was recorded by another build: {name} has no {value} in this package; install "
+            "the package of that version"
+        )
+    return variants[named]
 
 
 def _of_file(name: str) -> str:
@@ -226,12 +256,14 @@ def _of_file(name: str) -> str:
     return name[:-1] if name.endswith("_") and keyword.iskeyword(name[:-1]) else name
 
 
-def _fill_list(into: Any, values: Any, topic: str) -> None:
+def _fill_list(
+    into: Any, values: Any, variants: Optional[Type[enum.IntEnum]], topic: str
+) -> None:
     # What is blank at the end is left out.
     for index, value in enumerate(values):
         if isinstance(into[index], Layout):
             fill(into[index], value, topic)
         elif isinstance(into[index], ctypes.Array):
-            _fill_list(into[index], value, topic)
+            _fill_list(into[index], value, variants, topic)
         else:
-            into[index] = value
+            into[index] = _number(value, variants, topic)

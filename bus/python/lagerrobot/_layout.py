@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import ctypes
 import enum
-from typing import TYPE_CHECKING, Any, ClassVar, Dict, NamedTuple, Sequence, Tuple, Type, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Dict,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    Type,
+    TypeVar,
+)
 
 L = TypeVar("L", bound="Layout")
 S = TypeVar("S", bound="_Structure")
@@ -62,7 +73,7 @@ class Layout(_Structure):
 
     def _shown(self, name: str) -> str:
         value = getattr(self, name)
-        if name in self._enums_:
+        if name in self._enums_ and isinstance(value, int):
             known = [variant.name for variant in self._enums_[name] if variant == value]
             return known[0] if known else str(value)
         return repr(list(value)) if isinstance(value, ctypes.Array) else repr(value)
@@ -79,9 +90,9 @@ class Qos(NamedTuple):
 
 
 class TopicEntry(NamedTuple):
-    """One line of the table of topics."""
+    """One line of the table of topics; without limits a topic that is in no table."""
 
     name: str
     payload: Type[Layout]
-    qos: Qos
-    summary: str
+    qos: Optional[Qos] = None
+    summary: str = ""

@@ -37,12 +37,13 @@ class Open(ByName):
         self.close()
 
     def _open(self, name: str) -> Reader[Any]:
-        entry = TOPICS.get(name)
-        if entry is None:
-            raise Unread(f"there is no topic `{name}`; the topics are {' '.join(TOPICS)}")
-        reader = self._read(entry)
+        reader = self._read(TOPICS.get(name) or self._described(name))
         self._readers.append(reader)
         return reader
+
+    def _described(self, name: str) -> TopicEntry:
+        """A topic that is in no table, as it describes itself."""
+        raise Unread(f"there is no topic `{name}`; the topics are {' '.join(TOPICS)}")
 
     def _read(self, entry: TopicEntry) -> Reader[Any]:
         raise NotImplementedError

@@ -12,12 +12,12 @@ from typing import Any, Literal, Optional, Union
 
 import iceoryx2 as iox2
 
-from . import _orders, _place
+from . import _described, _orders, _place
 from ._errors import NoBus, NotOperator, OtherLayout, OtherVersion, Unread
 from ._layout import TopicEntry
 from ._open import Open
 from ._reader import Reader
-from .layouts import Stamp
+from .layouts import TOPICS, Stamp
 
 # All processes on one bus need this one.
 ICEORYX2 = "0.10.0"
@@ -28,6 +28,9 @@ _OBSERVERS = 64
 _GONE = 16
 
 _SCHEMA_KEY = "lager.schema"
+# The description of a topic, in pieces.
+_FIELDS_KEY = "lager.fields."
+_PIECES = 7
 _NAME = re.compile(r"[a-z0-9-]{1,24}")
 # What the transport says of a service that another build has made.
 _OTHER = ("Incompatible", "DoesNotSupportRequested")
@@ -36,7 +39,8 @@ _OTHER = ("Incompatible", "DoesNotSupportRequested")
 class Robot(Open):
     """The robot called `name`, on this user's bus or on the one that lives in the folder `bus`.
 
-    `robot.topic("sensor/line")` reads a topic. Use it as a context manager, or `close` it; it stays
+    `robot.topic("sensor/line")` reads a topic; one that is in no table is read as it describes itself,
+    while somebody has it open. Use it as a context manager, or `close` it; it stays
     in the thread that made it.
 
     With `role="operator"` it may also give commands, by the program `lager`.
@@ -100,13 +104,16 @@ class Robot(Open):
         qos = entry.qos
         builder = node.service_builder(iox2.ServiceName.new(f"lager/{self.name}/{entry.name}"))
         builder = builder.publish_subscribe(entry.payload).user_header(Stamp)
-        builder = builder.max_publishers(qos.max_publishers).max_subscribers(qos.max_subscribers)
-        builder = builder.max_nodes(qos.max_nodes).subscriber_max_buffer_size(qos.buffer)
-        builder = builder.subscriber_max_borrowed_samples(_MAX_HELD).history_size(qos.history)
         layout = iox2.AttributeVerifier.new().require(
             iox2.AttributeKey.new(_SCHEMA_KEY), iox2.AttributeValue.new(_layout(entry))
         )
         try:
+            if qos is None:
+                return builder.open_with_attributes(layout)
+            builder = builder.max_publishers(qos.max_publishers)
+            builder = builder.max_subscribers(qos.max_subscribers).max_nodes(qos.max_nodes)
+            builder = builder.subscriber_max_buffer_size(qos.buffer).history_size(qos.history)
+            builder = builder.subscriber_max_borrowed_samples(_MAX_HELD)
             return builder.enable_safe_overflow(True).open_or_create_with_attributes(layout)
         except Exception as error:
             if any(word in str(error) for word in _OTHER):
@@ -116,18 +123,48 @@ class Robot(Open):
     def _subscriber(self, service: Any, entry: TopicEntry) -> Any:
         builder = service.subscriber_builder().name(iox2.PortName.new(self._port_name))
         try:
-            return builder.buffer_size(entry.qos.buffer).create()
+            queue = service.static_config.subscriber_max_buffer_size
+            return builder.buffer_size(queue).create()
         except Exception as error:
             raise Unread(f"`{entry.name}` cannot be read: {error}") from error
 
+    def _described(self, name: str) -> TopicEntry:
+        if self._node is None:
+            raise Unread("this robot is closed")
+        try:
+            found = iox2.Service.details(
+                iox2.ServiceName.new(f"lager/{self.name}/{name}"),
+                self._node.config,
+                iox2.MessagingPattern.PublishSubscribe,
+                iox2.ServiceType.Ipc,
+            )
+        except Exception as error:
+            raise Unread(f"`{name}` cannot be looked at: {error}") from error
+        if found is None:
+            raise Unread(
+                f"there is no topic `{name}` in the table, and nobody has one open; the topics are "
+                f"{' '.join(TOPICS)}"
+            )
+        said = [_said(found, _SCHEMA_KEY)]
+        said += [_said(found, f"{_FIELDS_KEY}{piece}") for piece in range(_PIECES)]
+        if not said[0].endswith(f".{Stamp._hash_:016x}") or not said[1]:
+            raise OtherLayout(
+                f"`{name}` does not say how its samples are laid out, or has the stamps of another "
+                "version"
+            )
+        try:
+            payload = _described.layout("".join(said[1:]))
+        except _described.NotReadable as error:
+            raise OtherLayout(f"the description of `{name}` is not readable: {error}") from error
+        payload._hash_ = int(said[0].split(".")[0], 16)
+        return TopicEntry(name, payload)
+
     def _other_layout(self, node: Any, entry: TopicEntry, detail: str) -> OtherLayout:
-        key = iox2.AttributeKey.new(_SCHEMA_KEY)
         full = f"lager/{self.name}/{entry.name}"
         there = "none"
         for service in iox2.Service.list(node.config, iox2.ServiceType.Ipc):
             if service.name().to_string() == full:
-                values = service.attributes().key_values(key)
-                there = values[0].to_string() if values else there
+                there = _said(service, _SCHEMA_KEY) or there
         ours = _layout(entry)
         return OtherLayout(
             f"`{entry.name}` has the layout {there} on the bus of `{self.name}` and {ours} in this "
@@ -147,6 +184,12 @@ class Robot(Open):
     def _check_there(self) -> None:
         if _place.generation_in(self._place.folder) != self._place.generation:
             raise NoBus("the bus was damaged and has been cleared; open the robot again")
+
+
+def _said(service: Any, key: str) -> str:
+    """What a service says of itself; empty if nothing."""
+    values = service.attributes().key_values(iox2.AttributeKey.new(key))
+    return str(values[0].to_string()) if values else ""
 
 
 def _layout(entry: TopicEntry) -> str:

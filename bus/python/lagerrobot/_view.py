@@ -21,7 +21,7 @@ class View:
         self._alive()
         value = getattr(self._value, name)
         if callable(value):
-            return value
+            return self._while_alive(value)
         return self._inner(value)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -47,6 +47,15 @@ class View:
     def __repr__(self) -> str:
         self._alive()
         return repr(self._value)
+
+    def _while_alive(self, method: Callable[..., Any]) -> Callable[..., Any]:
+        """A method that is no more when the sample is given back, whoever has kept it."""
+
+        def called(*args: Any) -> Any:
+            self._alive()
+            return method(*args)
+
+        return called
 
     def _inner(self, value: Any) -> Any:
         if isinstance(value, (ctypes.Structure, ctypes.Array)):

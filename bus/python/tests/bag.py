@@ -21,6 +21,10 @@ async def count(reader):
     return [(sample.stamp.epoch, sample.stamp.sequence) async for sample in reader]
 
 
+def newest_words(bag):
+    return bag.topic("noise/now").latest().copy().words
+
+
 path = sys.argv[1]
 read = {}
 with Bag(path) as bag:
@@ -45,6 +49,10 @@ with Bag(path) as bag:
     newest = bag.topic("truth/pose").latest()
     assert len(newest.data.goods) == 256 and newest.data.goods[0].id > 0
     assert ctypes.sizeof(newest.copy()) == len(bytes(newest.data))
+    # One that is in no table has its layout in the file.
+    for noise in bag.topic("noise/now"):
+        assert noise.data.number == noise.stamp.sequence
+    assert [len(noise) for noise in newest_words(bag)] == [32] * 4
     # Two at once, and as they come.
     both = zip(bag.topic("sensor/line"), bag.topic("steering/state"))
     assert all(line.stamp.writer == state.stamp.writer for line, state in both)
@@ -54,7 +62,8 @@ with Bag(path) as bag:
     stamp, odd = layouts.Stamp(), {"new": 1}
     said = refused(lagerrobot.OtherLayout, lambda: lagerrobot._bag.fill(stamp, odd, "sensor/line"))
     assert "another build" in said and "sequence" in said
-    refused(lagerrobot.Unread, lambda: bag.topic("sensor/lime"))
+    said = refused(lagerrobot.Unread, lambda: bag.topic("sensor/lime"))
+    assert "it has " in said and "noise/now" in said, said
 refused(lagerrobot.Unread, lines.receive)
 refused(lagerrobot.Unread, lambda: bag.topic("sensor/line"))
 refused(lagerrobot.NoRecording, lambda: Bag(path + ".none"))

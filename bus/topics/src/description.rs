@@ -93,6 +93,7 @@ fn write_variants(text: &mut String, variants: &[(u8, &str)]) {
 pub struct Description {
     name: String,
     record: Arc<Record>,
+    text: Arc<str>,
 }
 
 #[derive(Debug)]
@@ -217,7 +218,8 @@ impl Description {
         if parser.at < text.len() {
             return Err(parser.error("the end"));
         }
-        Ok(Self { name, record })
+        let text = text.into();
+        Ok(Self { name, record, text })
     }
 
     /// Of a payload that this build has.
@@ -231,6 +233,11 @@ impl Description {
     /// The payload's name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The text that it was read from.
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// The fields that a sample shows, in memory order.

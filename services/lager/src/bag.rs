@@ -36,10 +36,10 @@ pub fn run(config: &Config, args: BagArgs, shutdown: &Shutdown) -> Result<ExitCo
             Ok(lager_recorder::check(file, args.json, out)? && whole)
         }),
         BagCommand::Recover { file, output } => {
-            lager_recorder::recover(&file, output.as_deref(), out).map(|()| true)
+            lager_recorder::recover(&file, output.as_deref(), args.json, out).map(|()| true)
         }
         BagCommand::Export { file, csv, topic } => {
-            lager_recorder::export_csv(&file, &topic, &csv, out).map(|()| true)
+            lager_recorder::export_csv(&file, &topic, &csv, args.json, out).map(|()| true)
         }
     };
     match done.and_then(|is_whole| Ok((out.flush()?, is_whole).1)) {

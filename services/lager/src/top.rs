@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use lager_monitor::{Recorded, ToolError, Tools, TopConfig};
+use lager_monitor::{Lacking, Recorded, ToolError, Tools, TopConfig};
 use lager_topics::Role;
 
 use crate::cli::TopArgs;
@@ -52,7 +52,10 @@ fn over(file: &Path, args: &TopArgs, patience: &Patience) -> Result<()> {
     let mut recorded = None;
     lager_recorder::samples(file, &mut |robot, topic, envelope| {
         let recorded = recorded.get_or_insert_with(|| Recorded::new(&name, robot, &args.filter));
-        let lacking = envelope.lost + envelope.dropped;
+        let lacking = Lacking {
+            lost: envelope.lost,
+            dropped: envelope.dropped,
+        };
         recorded.take(topic, &envelope.stamp, lacking, envelope.payload);
     })?;
     let recorded = recorded.with_context(|| format!("{name} has no samples"))?;

@@ -113,6 +113,10 @@ impl Gauge for Delays {
         );
     }
 
+    fn next(&self) -> Self {
+        Self::default()
+    }
+
     fn as_json(&self) -> Value {
         json!({
             "source_to_publish": self.written.as_json(),

@@ -36,7 +36,7 @@ pub use echo::EchoConfig;
 pub use measure::Limits;
 pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
-pub use top::{Recorded, TopConfig, leave_screen};
+pub use top::{Lacking, Recorded, TopConfig, leave_screen};
 
 /// The pace at which an observer polls.
 const POLL: Duration = Duration::from_millis(5);

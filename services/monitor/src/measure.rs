@@ -50,6 +50,9 @@ pub(crate) struct Seen {
 pub(crate) trait Gauge {
     fn add(&mut self, seen: &Seen);
 
+    /// The gauge of the window that follows.
+    fn next(&self) -> Self;
+
     /// For programs, an object.
     fn as_json(&self) -> Value;
 
@@ -130,8 +133,8 @@ impl<W: Write> Tools<'_, W> {
         if !self.as_json && !plan.head.is_empty() {
             writeln!(self.out, "{}", plan.head)?;
         }
+        let mut gauge = (plan.gauge)(size);
         while !is_over {
-            let mut gauge = (plan.gauge)(size);
             let before = total;
             let end = Instant::now() + WINDOW;
             while !is_over && Instant::now() < end {
@@ -170,6 +173,7 @@ impl<W: Write> Tools<'_, W> {
             } else {
                 writeln!(self.out, "{}   lost {newly_lost}", gauge.as_text())?;
             }
+            gauge = gauge.next();
             self.out.flush()?;
         }
         Ok(())

@@ -47,6 +47,8 @@ impl<W: Write> Tools<'_, W> {
 #[derive(Debug, Default)]
 struct Rate {
     samples: u64,
+    /// The last sample before the window.
+    before_ns: Option<u64>,
     first_ns: u64,
     last_ns: u64,
     longest_gap_ns: u64,
@@ -54,29 +56,51 @@ struct Rate {
 }
 
 impl Rate {
-    /// Samples a second between the first and the last of the window.
+    /// Samples a second since the last one before the window, or in the first window since its first
+    /// one, up to the last. A topic that comes once a second has a rate, too.
     fn hz(&self) -> f64 {
-        let span = self.last_ns.saturating_sub(self.first_ns);
-        if self.samples < 2 || span == 0 {
+        if self.samples == 0 {
             return 0.0;
         }
-        (self.samples - 1) as f64 * 1e9 / span as f64
+        let (samples, from_ns) = match self.before_ns {
+            Some(before_ns) => (self.samples, before_ns),
+            None => (self.samples - 1, self.first_ns),
+        };
+        match self.last_ns.saturating_sub(from_ns) {
+            0 => 0.0,
+            span => samples as f64 * 1e9 / span as f64,
+        }
+    }
+
+    /// The last sample so far.
+    fn latest_ns(&self) -> Option<u64> {
+        (self.samples > 0)
+            .then_some(self.last_ns)
+            .or(self.before_ns)
     }
 }
 
 impl Gauge for Rate {
     fn add(&mut self, seen: &Seen) {
         let stamp = &seen.stamp;
+        if let Some(latest_ns) = self.latest_ns() {
+            let gap = stamp.publish_time_ns.saturating_sub(latest_ns);
+            self.longest_gap_ns = self.longest_gap_ns.max(gap);
+        }
         if self.samples == 0 {
             self.first_ns = stamp.publish_time_ns;
-        } else {
-            let gap = stamp.publish_time_ns.saturating_sub(self.last_ns);
-            self.longest_gap_ns = self.longest_gap_ns.max(gap);
         }
         self.last_ns = stamp.publish_time_ns;
         let age = stamp.publish_time_ns.saturating_sub(stamp.source_time_ns);
         self.oldest_source_ns = self.oldest_source_ns.max(age);
         self.samples += 1;
+    }
+
+    fn next(&self) -> Self {
+        Self {
+            before_ns: self.latest_ns(),
+            ..Self::default()
+        }
     }
 
     fn as_json(&self) -> Value {
@@ -113,6 +137,13 @@ impl Bandwidth {
 impl Gauge for Bandwidth {
     fn add(&mut self, seen: &Seen) {
         self.rate.add(seen);
+    }
+
+    fn next(&self) -> Self {
+        Self {
+            payload: self.payload,
+            rate: self.rate.next(),
+        }
     }
 
     fn as_json(&self) -> Value {
@@ -170,5 +201,21 @@ mod tests {
         let mut rate = Rate::default();
         rate.add(&seen(1_000, 1_000));
         assert!(rate.hz() < f64::EPSILON);
+    }
+
+    #[test]
+    fn what_comes_less_often_than_a_line_is_printed_has_its_rate_and_its_gap() {
+        const S: u64 = 1_000_000_000;
+        let mut rate = Rate::default();
+        rate.add(&seen(S, S));
+        // Nothing in the window between.
+        rate = rate.next().next();
+        rate.add(&seen(3 * S, 3 * S));
+        assert!((rate.hz() - 0.5).abs() < 1e-9, "{rate:?}");
+        assert_eq!(rate.longest_gap_ns, 2 * S);
+        rate = rate.next();
+        rate.add(&seen(4 * S, 4 * S));
+        assert!((rate.hz() - 1.0).abs() < 1e-9, "{rate:?}");
+        assert_eq!(rate.longest_gap_ns, S);
     }
 }

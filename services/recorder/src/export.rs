@@ -9,7 +9,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use lager_journal::{Envelope, Selection, Times};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::bag::{Bag, BagError};
 
@@ -25,6 +25,7 @@ pub fn export_csv(
     file: &Path,
     topics: &[String],
     to: &Path,
+    as_json: bool,
     out: &mut impl Write,
 ) -> Result<(), BagError> {
     let bag = Bag::open(file)?;
@@ -59,7 +60,13 @@ pub fn export_csv(
     for (topic, mut table) in tables {
         table.file.flush().map_err(|error| failed(to, error))?;
         let path = to.join(format!("{}.csv", topic.replace('/', "-")));
-        writeln!(out, "{}: {} rows", path.display(), table.rows)?;
+        let (path, rows) = (path.display(), table.rows);
+        if as_json {
+            let value = json!({"topic": topic, "file": path.to_string(), "rows": rows});
+            writeln!(out, "{value}")?;
+        } else {
+            writeln!(out, "{path}: {rows} rows")?;
+        }
     }
     Ok(())
 }

@@ -27,6 +27,16 @@ struct Missing {
     now: (u64, u64),
 }
 
+/// What is left of a keeper.
+pub(crate) struct Kept {
+    /// Its files.
+    pub(crate) files: Vec<PathBuf>,
+    /// What ended the recording early.
+    pub(crate) result: Result<(), RecordError>,
+    /// Its end of the queue, into which the listener may still have put samples.
+    pub(crate) from: QueueOut,
+}
+
 /// Writes the files of one recording.
 pub(crate) struct Keeper {
     config: RecordConfig,
@@ -66,8 +76,8 @@ impl Keeper {
         })
     }
 
-    /// Writes until the listener has ended. Returns the files and what ended the recording early.
-    pub(crate) fn run(mut self) -> (Vec<PathBuf>, Result<(), RecordError>) {
+    /// Writes until the listener has ended, or it cannot go on.
+    pub(crate) fn run(mut self) -> Kept {
         let result = loop {
             let flush = Instant::now() + self.config.flush;
             let (items, is_over) = self.from.take(BATCH);
@@ -84,12 +94,17 @@ impl Keeper {
         };
         let mut files = std::mem::take(&mut self.ended);
         files.push(self.part.path().to_owned());
+        self.topics.drop_waiting(&self.from);
         // What could not be written cannot be ended either.
-        let ended = match &result {
-            Err(RecordError::Write { .. }) => Ok(()),
+        let (from, ended) = match &result {
+            Err(RecordError::Write { .. }) => (self.from, Ok(())),
             _ => self.end(),
         };
-        (files, result.and(ended))
+        Kept {
+            files,
+            result: result.and(ended),
+            from,
+        }
     }
 
     fn write(&mut self, mut items: Vec<Item>) -> Result<(), RecordError> {
@@ -99,8 +114,7 @@ impl Keeper {
                 Ok(()) => {}
                 Err(Refused::Failed(error)) => return Err(error),
                 Err(Refused::Full) => {
-                    let (waiting, _) = self.from.take(usize::MAX);
-                    for item in items[place..].iter().chain(&waiting) {
+                    for item in &items[place..] {
                         self.topics.at(item.topic).drop_one();
                     }
                     return Err(RecordError::Full {
@@ -138,7 +152,7 @@ impl Keeper {
     }
 
     /// Ends the last file, with what was missed up to the listener's end.
-    fn end(self) -> Result<(), RecordError> {
+    fn end(self) -> (QueueOut, Result<(), RecordError>) {
         let topics = self.topics.all().clone();
         let told = topics.iter().enumerate().map(|(place, topic)| {
             let count = topic.count();
@@ -146,10 +160,11 @@ impl Keeper {
             (place, since(missing.before, (count.lost, count.dropped)))
         });
         let told = told.collect();
-        let length = self.part.end(&told)?;
-        self.bytes
-            .store(self.ended_bytes + length, Ordering::Relaxed);
-        Ok(())
+        let ended = self.part.end(&told).map(|length| {
+            self.bytes
+                .store(self.ended_bytes + length, Ordering::Relaxed);
+        });
+        (self.from, ended)
     }
 }
 
@@ -158,4 +173,76 @@ fn since(before: (u64, u64), now: (u64, u64)) -> (u64, u64) {
         now.0.saturating_sub(before.0),
         now.1.saturating_sub(before.1),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use lager_journal::{Envelope, EnvelopeSchema, Times};
+    use lager_topics::{Description, LineFrame, Stamp};
+
+    use super::*;
+    use crate::Split;
+    use crate::tally::{Topic, queue};
+
+    #[test]
+    fn what_waits_when_no_next_file_can_be_made_is_counted_as_dropped() {
+        let folder = std::env::temp_dir().join(format!("lager-keeper-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        // The second file is there already.
+        std::fs::write(folder.join("tour-001.mcap"), "").expect("a file");
+        let config = RecordConfig {
+            file: folder.join("tour.mcap"),
+            topics: Vec::new(),
+            split: Split {
+                bytes: Some(1),
+                time: None,
+            },
+            queue: 0,
+            flush: Duration::ZERO,
+        };
+        let topics = Topics::default();
+        let schema = EnvelopeSchema::of(&Description::of::<LineFrame>());
+        let (_, topic) = topics.add(Topic::new("sensor/line", schema));
+        let (to, from) = queue(BATCH + 7);
+        for number in 0..BATCH as u64 + 7 {
+            let envelope = Envelope {
+                stamp: Stamp {
+                    sequence: number,
+                    ..Stamp::default()
+                },
+                lost: 0,
+                dropped: 0,
+                payload: LineFrame::default(),
+            };
+            let item = Item {
+                topic: 0,
+                times: Times { log: 0, publish: 0 },
+                sequence: number,
+                lost: 0,
+                dropped: 0,
+                message: serde_json::to_vec(&envelope).expect("JSON"),
+            };
+            topic.receive();
+            assert!(to.put(item));
+        }
+        let bytes = Arc::new(AtomicU64::new(0));
+        let keeper = Keeper::new(&config, Start::default(), &topics, from, &bytes);
+        let kept = keeper.expect("a file").run();
+        assert!(
+            matches!(kept.result, Err(RecordError::Exists { .. })),
+            "{:?}",
+            kept.result
+        );
+        assert_eq!(
+            (topic.count().received, topic.count().dropped),
+            (BATCH as u64 + 7, 7)
+        );
+        let mut said = Vec::new();
+        let is_right = crate::check(&kept.files[0], false, &mut said).expect("a file");
+        let said = String::from_utf8(said).expect("text");
+        assert!(is_right && said.contains("7 dropped by it"), "{said}");
+        std::fs::remove_dir_all(folder).expect("our own folder");
+    }
 }

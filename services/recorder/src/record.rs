@@ -105,11 +105,11 @@ pub fn record(
         let run = move || match Keeper::new(&config, start, &topics, from, &bytes) {
             Ok(keeper) => {
                 let _ = ready.send(None);
-                keeper.run()
+                Some(keeper.run())
             }
             Err(error) => {
                 let _ = ready.send(Some(error));
-                (Vec::new(), Ok(()))
+                None
             }
         };
         let thread = thread::Builder::new().name("keeper".to_owned());
@@ -151,12 +151,15 @@ pub fn record(
     // The queue ends with the listener.
     drop(listener);
     keeper.thread().unpark();
-    let (files, kept) = keeper.join().expect("the keeper does not panic");
+    let kept = keeper.join().expect("the keeper does not panic");
+    let kept = kept.expect("it has said that it could begin");
+    // A keeper that could not go on has left what came while it ended its file.
+    topics.drop_waiting(&kept.from);
     Ok(Recorded {
-        files,
+        files: kept.files,
         progress: stands(Vec::new()),
         absent,
-        ended_by: kept.err().or(listened.err()),
+        ended_by: kept.result.err().or(listened.err()),
     })
 }
 

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use lager_journal::{Check, Learnt, Recovery};
+use serde_json::json;
 
 use crate::bag::{Bag, BagError};
 use crate::disk::Disk;
@@ -15,7 +16,12 @@ use crate::look::report;
 /// # Errors
 /// The file cannot be read or has nothing to recover, the copy is there already or cannot be
 /// written, or the output cannot be written.
-pub fn recover(file: &Path, copy: Option<&Path>, out: &mut impl Write) -> Result<(), BagError> {
+pub fn recover(
+    file: &Path,
+    copy: Option<&Path>,
+    as_json: bool,
+    out: &mut impl Write,
+) -> Result<(), BagError> {
     let bag = Bag::open(file)?;
     let path = file.to_owned();
     let mut check = Check::default();
@@ -25,11 +31,13 @@ pub fn recover(file: &Path, copy: Option<&Path>, out: &mut impl Write) -> Result
         if !found.is_ours {
             return Err(BagError::Foreign { path });
         }
-        writeln!(
-            out,
-            "{} is whole; there is nothing to recover",
-            file.display()
-        )?;
+        let name = file.display();
+        if as_json {
+            let value = json!({"file": name.to_string(), "whole": true, "copy": null});
+            writeln!(out, "{value}")?;
+        } else {
+            writeln!(out, "{name} is whole; there is nothing to recover")?;
+        }
         return Ok(());
     }
     if found.chunks == 0 || !found.is_ours {
@@ -46,10 +54,19 @@ pub fn recover(file: &Path, copy: Option<&Path>, out: &mut impl Write) -> Result
     match write(&bag, learnt, &mut disk).and_then(|told| Ok((told, again(&bag, &disk)?))) {
         Ok((messages, chunks)) => {
             disk.finish().map_err(failed)?;
-            for fault in &found.faults {
-                writeln!(out, "{}: {fault}", file.display())?;
+            let (name, copy) = (file.display(), copy.display());
+            if as_json {
+                let faults: Vec<String> = found.faults.iter().map(ToString::to_string).collect();
+                let value = json!({
+                    "file": name.to_string(), "whole": false, "faults": faults,
+                    "copy": copy.to_string(), "messages": messages, "chunks": chunks,
+                });
+                writeln!(out, "{value}")?;
+                return Ok(());
             }
-            let copy = copy.display();
+            for fault in &found.faults {
+                writeln!(out, "{name}: {fault}")?;
+            }
             writeln!(
                 out,
                 "{copy}: {messages} messages in {chunks} chunks are saved, and were read again"

@@ -69,6 +69,13 @@ impl Topics {
         Arc::clone(&self.all()[place])
     }
 
+    /// Notes that what waits reaches no file.
+    pub(crate) fn drop_waiting(&self, queue: &QueueOut) {
+        for item in queue.take(usize::MAX).0 {
+            self.at(item.topic).drop_one();
+        }
+    }
+
     pub(crate) fn all(&self) -> MutexGuard<'_, Vec<Arc<Topic>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

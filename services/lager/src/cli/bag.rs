@@ -73,7 +73,7 @@ pub struct RecordArgs {
     /// The file, which must not be there yet [default: ROBOT-DATE.mcap]
     pub file: Option<PathBuf>,
     /// Only this topic; may be given again [default: all, also those that come later]
-    #[arg(long, value_name = "TOPIC", value_parser = values::topic)]
+    #[arg(long, value_name = "TOPIC", value_parser = values::TopicName, hide_possible_values = true)]
     pub topic: Vec<String>,
     /// Begin a new file, FILE-001.mcap, when one has so many MiB
     #[arg(long, value_name = "MIB", allow_negative_numbers = true, value_parser = values::split_size)]

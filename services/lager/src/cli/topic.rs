@@ -35,7 +35,7 @@ pub struct TopicArgs {
 #[derive(Debug, Args)]
 pub struct WatchArgs {
     /// The topic's name, such as sensor/line
-    #[arg(value_parser = values::topic)]
+    #[arg(value_parser = values::TopicName, hide_possible_values = true)]
     pub topic: String,
     /// When it ends
     #[command(flatten)]
@@ -74,7 +74,7 @@ pub enum TopicCommand {
     /// One topic: what it carries, its limits, who writes and reads it
     Info {
         /// The topic's name, such as sensor/line
-        #[arg(value_parser = values::topic)]
+        #[arg(value_parser = values::TopicName, hide_possible_values = true)]
         topic: String,
     },
     /// Write the table of topics for programs in another language
@@ -129,7 +129,7 @@ meanwhile. With --live it is published beside the robot, if the table lets sever
 topic (`lager topic info` shows whom it wakes); what one service alone writes never is.")]
     Pub {
         /// The topic's name, such as weather/now
-        #[arg(value_parser = values::topic)]
+        #[arg(value_parser = values::TopicName, hide_possible_values = true)]
         topic: String,
         /// The payload [default: one for each JSON value on standard input]
         payload: Option<String>,

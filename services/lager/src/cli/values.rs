@@ -5,10 +5,13 @@
 //! exit code for wrong usage and names the argument. Numbers may be negative, so that `-1` is
 //! refused for what it is and not as an unknown flag.
 
+use std::ffi::OsStr;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use clap::builder::{PossibleValue, TypedValueParser};
+use clap::{Arg, Command};
 use lager_lines::{Called, Name};
 use lager_ports::RobotName;
 use lager_topics::{TOPICS, UnknownTopic};
@@ -114,9 +117,9 @@ pub fn hz(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The name of a topic of the table, or one whose first part stands in no name there: such topics
-/// are other people's.
-pub fn topic(text: &str) -> Result<String, String> {
+/// A topic of the table, or one whose first part stands in no name there: such topics are other
+/// people's.
+fn topic(text: &str) -> Result<String, String> {
     let family = |name: &str| name.split_once('/').map(|(family, _)| family.to_owned());
     let asked = family(text);
     let is_foreign = asked.is_some() && TOPICS.iter().all(|entry| family(entry.name) != asked);
@@ -124,6 +127,28 @@ pub fn topic(text: &str) -> Result<String, String> {
         Ok(text.to_owned())
     } else {
         Err(UnknownTopic(text.to_owned()).to_string())
+    }
+}
+
+/// The name of a topic; a shell completes those of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct TopicName;
+
+impl TypedValueParser for TopicName {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        arg: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<String, clap::Error> {
+        topic.parse_ref(command, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = TOPICS.iter().map(|entry| PossibleValue::new(entry.name));
+        Some(Box::new(names))
     }
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct Feed<'a> {
     bus: &'a Bus,
     watchdog: &'a Watchdog,
     open: BTreeMap<String, Box<dyn Pull>>,
-    /// Topics that cannot be read, such as one of another build.
+    /// Topics that could not be read at the last look, such as one with no place left.
     refused: BTreeSet<String>,
     services: ServiceWatch,
     ends: Option<Ends>,
@@ -83,6 +83,7 @@ impl<'a> Feed<'a> {
         };
         model.take_ends(&ends.topics, |pid| ends.life(pid));
         self.ends = Some(ends);
+        self.refused.clear();
         let word = bus.place().robot(bus.robot()).join(StopPage::FILE);
         let told = StopWord::read(&word).ok().flatten();
         model.head.stop = told.and_then(|told| told.stop());
@@ -121,7 +122,10 @@ impl<'a> Feed<'a> {
             match self.watchdog.over("opening the topic", open) {
                 Ok(Some(pull)) => drop(self.open.insert(name, pull)),
                 Ok(None) => {}
-                Err(_) => drop(self.refused.insert(name)),
+                Err(error) => {
+                    model.row(&name).unread = Some(error.to_string());
+                    self.refused.insert(name);
+                }
             }
         }
         Ok(())

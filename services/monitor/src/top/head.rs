@@ -6,6 +6,7 @@ use std::time::Duration;
 use lager_ports::Stop;
 use lager_topics::{
     BoardHealth, CommandLatency, Durations, Health, Hold, NavigatorStatus, OrderQueue, PathLatency,
+    Stamp,
 };
 use serde_json::{Value, json};
 
@@ -50,6 +51,11 @@ impl Head {
             }
         }
         self.health = Some(health);
+    }
+
+    /// Robot seconds a second, as they are shown.
+    pub(crate) fn shown_pace(&self) -> Option<f64> {
+        self.pace.map(|pace| (pace * 100.0).round() / 100.0)
     }
 
     pub(crate) fn mode(&self) -> String {
@@ -147,34 +153,77 @@ impl Head {
     }
 }
 
-/// Counts that only grow: as they are, and as they were one sample before.
-#[derive(Clone, Copy, Debug, Default)]
+/// What is shown of counts that only grow in each life of their writer: of a robot what was counted
+/// between the last two samples, of a recording all of it.
+#[derive(Clone, Debug)]
 pub(crate) struct Recent<T> {
-    now: Option<T>,
-    before: Option<T>,
+    spans: Vec<Span<T>>,
+    /// The process and epoch that wrote the last sample of a recording.
+    life: Option<(u32, u64)>,
 }
 
-impl<T> Recent<T> {
-    pub(crate) fn take(&mut self, counts: T) {
-        self.before = self.now.replace(counts);
-    }
+/// Counts, and those that were there before; none if all of them count.
+#[derive(Clone, Debug)]
+struct Span<T> {
+    before: Option<T>,
+    now: T,
+}
 
-    /// What was counted between the last two samples; of the first one, all of it.
-    fn of(&self, stage: impl Fn(&T) -> &Durations) -> Durations {
-        let Some(now) = &self.now else {
-            return Durations::default();
-        };
-        match &self.before {
-            Some(before) => stage(now).since(stage(before)),
-            None => *stage(now),
+impl<T> Default for Recent<T> {
+    fn default() -> Self {
+        Self {
+            spans: Vec::new(),
+            life: None,
         }
     }
+}
+
+impl<T: Copy> Recent<T> {
+    /// A sample of a robot.
+    pub(crate) fn take(&mut self, now: T) {
+        let before = self.spans.pop().map(|span| span.now);
+        self.spans = vec![Span { before, now }];
+    }
+
+    /// A sample of a recording that began at that moment.
+    pub(crate) fn take_recorded(&mut self, now: T, stamp: &Stamp, begun_ns: u64) {
+        let life = (stamp.writer, stamp.epoch);
+        if self.life == Some(life)
+            && let Some(span) = self.spans.last_mut()
+        {
+            span.now = now;
+            return;
+        }
+        self.life = Some(life);
+        // What an older writer had counted by then happened before the recording.
+        let before = (stamp.epoch < begun_ns).then_some(now);
+        self.spans.push(Span { before, now });
+    }
+
+    fn of(&self, stage: impl Fn(&T) -> &Durations) -> Durations {
+        let spans = self.spans.iter().map(|span| match &span.before {
+            Some(before) => stage(&span.now).since(stage(before)),
+            None => *stage(&span.now),
+        });
+        spans.reduce(joined).unwrap_or_default()
+    }
+}
+
+/// Both together.
+fn joined(mut one: Durations, other: Durations) -> Durations {
+    one.count += other.count;
+    one.sum_ns = one.sum_ns.saturating_add(other.sum_ns);
+    one.max_ns = one.max_ns.max(other.max_ns);
+    for (bucket, more) in one.buckets.iter_mut().zip(other.buckets) {
+        *bucket += more;
+    }
+    one
 }
 
 impl Head {
     /// Whether anything is known of the path.
     pub(crate) fn has_path(&self) -> bool {
-        self.path.now.is_some() || self.command.now.is_some()
+        !self.path.spans.is_empty() || !self.command.spans.is_empty()
     }
 
     /// The stages of the path in their order, by name: frames to their decision, and orders to the
@@ -251,6 +300,32 @@ mod tests {
         head.take_health(health, 1_500_000_000);
         assert!(head.link(0, 1_500_000_000).starts_with("up      0 ms old"));
         assert!(head.link(1, 1_500_000_000).starts_with("DOWN       - old"));
+    }
+
+    #[test]
+    fn a_robot_shows_its_last_second_and_a_recording_all_of_its_writers_lives() {
+        let counted = |times: u64| {
+            let mut counted = Durations::default();
+            (0..times).for_each(|_| counted.record(50_000));
+            counted
+        };
+        let mut live = Recent::default();
+        live.take(counted(5));
+        assert_eq!(live.of(|counts| counts).count, 5);
+        live.take(counted(7));
+        assert_eq!(live.of(|counts| counts).count, 2);
+
+        let mut recorded = Recent::default();
+        let begun_ns = 1_000;
+        for (epoch, times) in [(500, 5), (500, 6), (500, 9), (2_000, 3), (2_000, 4)] {
+            let stamp = Stamp {
+                epoch,
+                ..Stamp::default()
+            };
+            recorded.take_recorded(counted(times), &stamp, begun_ns);
+        }
+        // Five before the recording began, four of them in it, and four of the next writer.
+        assert_eq!(recorded.of(|counts| counts).count, 8);
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod model;
 mod render;
 mod row;
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
@@ -60,6 +61,7 @@ impl<W: Write> Tools<'_, W> {
         model.view.filter.clone_from(&config.filter);
         let mut feed = Feed::new(self.bus, self.watchdog)?;
         feed.look(&mut model)?;
+        model.end_window(Clock::monotonic_ns());
         let Some(long) = config.once else {
             let mut screen = Screen::enter()?;
             return self.watch(&mut model, &mut feed, &mut screen);
@@ -114,12 +116,22 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
+/// How many samples of a topic a recording lacks up to one that it has.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lacking {
+    /// They were lost before the recorder.
+    pub lost: u64,
+    /// The recorder had no time for them.
+    pub dropped: u64,
+}
+
 /// A recording, sample by sample, and then its table. The figures are those of all of it.
 #[derive(Debug)]
 pub struct Recorded {
     model: Model,
     begun_ns: Option<u64>,
-    lost: std::collections::BTreeMap<String, u64>,
+    /// What each topic lacked up to its last sample.
+    lacking: BTreeMap<String, Lacking>,
 }
 
 impl Recorded {
@@ -132,22 +144,22 @@ impl Recorded {
         Self {
             model,
             begun_ns: None,
-            lost: std::collections::BTreeMap::new(),
+            lacking: BTreeMap::new(),
         }
     }
 
-    /// Takes a sample: its stamp, how many of its topic were missed up to it, and its payload.
-    pub fn take(&mut self, topic: &str, stamp: &Stamp, lost: u64, payload: Value) {
+    /// Takes a sample: its stamp, how many of its topic are lacking up to it, and its payload.
+    pub fn take(&mut self, topic: &str, stamp: &Stamp, lacking: Lacking, payload: Value) {
         let published = stamp.publish_time_ns;
-        self.begun_ns.get_or_insert(published);
+        let begun_ns = *self.begun_ns.get_or_insert(published);
         let model = &mut self.model;
         model.now_ns = model.now_ns.max(published);
         model.hear(topic, stamp);
-        let known = self.lost.entry(topic.to_owned()).or_default();
-        if lost > *known {
-            model.row(topic).lose(lost - *known, published);
-            *known = lost;
-        }
+        let known = self.lacking.entry(topic.to_owned()).or_default();
+        let lost = lacking.lost.saturating_sub(known.lost);
+        let dropped = lacking.dropped.saturating_sub(known.dropped);
+        model.row(topic).lack(lost, dropped, published);
+        *known = lacking;
         let head = &mut model.head;
         match topic {
             LinkHealth::NAME => {
@@ -159,12 +171,12 @@ impl Recorded {
             MissionQueue::NAME => head.queue = of(payload).or(head.queue),
             LatencyPath::NAME => {
                 if let Some(path) = of(payload) {
-                    head.path.take(path);
+                    head.path.take_recorded(path, stamp, begun_ns);
                 }
             }
             LatencyCommand::NAME => {
                 if let Some(command) = of(payload) {
-                    head.command.take(command);
+                    head.command.take_recorded(command, stamp, begun_ns);
                 }
             }
             _ => {}
@@ -182,7 +194,7 @@ impl Recorded {
         shutdown: &Shutdown,
         out: &mut impl Write,
     ) -> io::Result<()> {
-        self.model.end_window(self.model.now_ns);
+        self.model.end_recording();
         if once {
             return print(&self.model, as_json, out);
         }
@@ -283,6 +295,8 @@ fn stroke(key: KeyEvent) -> Option<Stroke> {
         KeyCode::Char(letter) => Key::Char(letter),
         KeyCode::Up => Key::Up,
         KeyCode::Down => Key::Down,
+        KeyCode::Left => Key::Left,
+        KeyCode::Right => Key::Right,
         KeyCode::PageUp => Key::PageUp,
         KeyCode::PageDown => Key::PageDown,
         KeyCode::Home => Key::Home,

@@ -16,6 +16,8 @@ pub(crate) enum Key {
     Char(char),
     Up,
     Down,
+    Left,
+    Right,
     PageUp,
     PageDown,
     Home,
@@ -84,6 +86,8 @@ pub(crate) struct View {
     /// Rows keep their places, while their figures change.
     pub(crate) is_frozen: bool,
     pub(crate) shows_help: bool,
+    /// Which page of columns is shown, where one has no room for all: from 0, and round again.
+    pub(crate) page: isize,
     /// Whether the path's stages are drawn; `None`: if there is room.
     pub(crate) shows_path: Option<bool>,
     /// The chosen row's topic.
@@ -133,7 +137,7 @@ impl Model {
         }
         for row in self.rows.values_mut() {
             if !topics.iter().any(|topic| topic.name == row.name) {
-                (row.authors, row.readers) = (Vec::new(), 0);
+                row.leave();
             }
         }
     }
@@ -146,10 +150,20 @@ impl Model {
     /// Ends a window of all rows, and puts them in order.
     pub(crate) fn end_window(&mut self, now_ns: u64) {
         self.now_ns = now_ns;
+        let pace = self.head.shown_pace().unwrap_or(1.0);
         for row in self.rows.values_mut() {
+            row.take_pace(pace);
             row.end_window(now_ns);
         }
         self.arrange();
+    }
+
+    /// All samples have come, and were a recording's.
+    pub(crate) fn end_recording(&mut self) {
+        for row in self.rows.values_mut() {
+            row.end_recording(self.now_ns);
+        }
+        self.end_window(self.now_ns);
     }
 
     /// Topics that are to be read: those of rows that are shown and open.
@@ -231,6 +245,8 @@ impl Model {
             Key::Char(' ') | Key::Enter => self.turn_over(),
             Key::Up | Key::Char('k') => self.choose(-1),
             Key::Down | Key::Char('j') => self.choose(1),
+            Key::Left => view.page -= 1,
+            Key::Right => view.page += 1,
             Key::PageUp => self.choose(-10),
             Key::PageDown => self.choose(10),
             Key::Home => self.choose(isize::MIN),

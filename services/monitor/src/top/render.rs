@@ -27,10 +27,10 @@ const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '
 
 const HELP: &[&str] = &[
     "Up Down PgUp PgDn Home End   choose a row",
+    "Left Right                   other columns, where there is no room for all",
     "Space Enter                  close it, or open it: a closed one is not read",
     "+  -                         open, close all rows",
-    "/  F4                        filter: Enter keeps it, Esc drops it; what is",
-    "                             filtered out is not read",
+    "/  F4                        filter: only what passes is read; Esc drops it",
     "<  >  F6                     sort by the column before, behind",
     "I                            turn the order round",
     "p  Z                         pause: the picture stands, counting goes on",
@@ -39,7 +39,7 @@ const HELP: &[&str] = &[
     "q  Esc  F10  Ctrl-C          leave",
     "",
     "!  samples were lost in the last 30 s    x  its writer is dead or frozen",
-    "~  less than half of what is expected    -  closed",
+    "~  less than half of what is expected    ?  cannot be read    -  closed",
     "LOST counts what was lost on the way, SKIP what this screen was too late",
     "for, which is usual for a state. QUEUE is how many samples waited at most.",
 ];
@@ -58,7 +58,7 @@ pub(crate) fn draw(model: &Model, area: Rect, to: &mut Buffer) {
         table(model, &mut page, bottom);
     }
     page.line = bottom;
-    let (text, style) = footer(model);
+    let (text, style) = footer(model, area.width);
     page.put(&format!("{text:width$}", width = area.width.into()), style);
 }
 
@@ -126,9 +126,8 @@ fn head(model: &Model, page: &mut Page<'_>) {
             count(head.load.cores, "core")
         ),
     };
-    let pace = head
-        .pace
-        .map_or(String::new(), |pace| format!("  clock x{pace:.2}"));
+    let pace = head.shown_pace();
+    let pace = pace.map_or(String::new(), |pace| format!("  clock x{pace:.2}"));
     let troubled = model.troubled();
     let (words, style) = match troubled {
         0 => ("all topics well".to_owned(), dim()),
@@ -155,11 +154,15 @@ fn head(model: &Model, page: &mut Page<'_>) {
     path(model, page);
 }
 
-/// The latencies of the last second: of frames to their decision, or with room each stage.
+/// The latencies of the last second, or of all of a recording: of frames to their decision, or with room each stage.
 fn path(model: &Model, page: &mut Page<'_>) {
     if !model.head.has_path() {
         return page.put("path      not measured", dim());
     }
+    let since = match model.file {
+        Some(_) => "",
+        None => " in the last second",
+    };
     let is_roomy = page.area.height >= ROOMY;
     let shows_all = model.view.shows_path.unwrap_or(is_roomy);
     for (name, stage) in model.head.stages() {
@@ -171,7 +174,7 @@ fn path(model: &Model, page: &mut Page<'_>) {
         let ms = |ns: u64| ns as f64 / 1e6;
         let bars = bars(&shares::<PLACES>(&stage, LEAST_NS, MOST_NS));
         if stage.count == 0 {
-            page.put(&format!("{label} {bars} none in the last second"), dim());
+            page.put(&format!("{label} {bars} none{since}"), dim());
             continue;
         }
         page.put(
@@ -252,7 +255,8 @@ const COLUMNS: &[(u8, Column)] = &[
     (
         3,
         column("KIB/S", 7, Some(Sort::Bytes), |row, _| {
-            measured(row, row.figures.bytes_per_s / 1024.0)
+            let bytes = row.bytes_per_s();
+            bytes.map_or("-".to_owned(), |bytes| measured(row, bytes / 1024.0))
         }),
     ),
     (
@@ -289,30 +293,41 @@ const fn column(
     }
 }
 
-/// The columns that fit, in their order.
-fn fitting(width: usize) -> Vec<&'static Column> {
-    let mut kept: Vec<usize> = (0..COLUMNS.len()).collect();
-    let needs = |kept: &[usize]| {
-        1 + kept
-            .iter()
-            .map(|at| COLUMNS[*at].1.width + 1)
-            .sum::<usize>()
+/// Every column on pages that fit, by their places in [`COLUMNS`]: the most telling ones first, and
+/// the topic's name on each page.
+fn pages(width: usize) -> Vec<Vec<usize>> {
+    let fits = |page: &[usize]| {
+        let widths = page.iter().map(|at| COLUMNS[*at].1.width + 1);
+        widths.sum::<usize>() <= width
     };
-    while needs(&kept) > width + 1 && kept.len() > 1 {
-        // The last one of the lowest rank.
-        let (place, _) = kept
-            .iter()
-            .enumerate()
-            .rev()
-            .min_by_key(|(_, at)| COLUMNS[**at].0)
-            .expect("there is one");
-        kept.remove(place);
+    let mut left: Vec<usize> = (1..COLUMNS.len()).collect();
+    let mut pages = Vec::new();
+    while pages.is_empty() || !left.is_empty() {
+        let mut page = vec![0];
+        page.append(&mut left);
+        while !fits(&page) && page.len() > 2 {
+            // The last one of the lowest rank.
+            let others = page.iter().enumerate().skip(1).rev();
+            let least = others.min_by_key(|(_, at)| COLUMNS[**at].0);
+            let (place, _) = least.expect("there are two");
+            left.push(page.remove(place));
+        }
+        left.sort_unstable();
+        pages.push(page);
     }
-    kept.into_iter().map(|at| &COLUMNS[at].1).collect()
+    pages
+}
+
+/// The columns of the page that is shown, in their order.
+fn fitting(model: &Model, width: usize) -> Vec<&'static Column> {
+    let pages = pages(width);
+    let shown = model.view.page.rem_euclid(pages.len() as isize);
+    let shown = pages[shown.unsigned_abs()].iter();
+    shown.map(|at| &COLUMNS[*at].1).collect()
 }
 
 fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
-    let columns = fitting(page.area.width.into());
+    let columns = fitting(model, page.area.width.into());
     let rows = model.shown();
     let room = usize::from(bottom.saturating_sub(page.line + 1)).max(1);
     let hidden = rows.len().saturating_sub(room);
@@ -328,7 +343,7 @@ fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
             _ => String::new(),
         };
         let name = format!("{mark}{}{more}", column.head);
-        head += &cell(&name, column.width, place);
+        head += &cell(&name, column);
     }
     let width = usize::from(page.area.width);
     let head_style = Style::new().add_modifier(Modifier::REVERSED);
@@ -350,18 +365,20 @@ fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
             Trouble::Losing => '!',
             Trouble::Unwritten => 'x',
             Trouble::Slow => '~',
-            Trouble::None if row.is_open => ' ',
-            Trouble::None => '-',
+            Trouble::None if !row.is_open => '-',
+            Trouble::None if row.unread.is_some() => '?',
+            Trouble::None => ' ',
         };
         let mut line = mark.to_string();
-        for (place, column) in columns.iter().enumerate() {
-            line += &cell(&(column.cell)(row, model.now_ns), column.width, place);
+        for column in &columns {
+            line += &cell(&(column.cell)(row, model.now_ns), column);
         }
         let style = match trouble {
             Trouble::Losing | Trouble::Unwritten => bad(),
             Trouble::Slow => Style::new().fg(Color::Yellow),
-            Trouble::None if row.is_open => plain(),
-            Trouble::None => dim(),
+            Trouble::None if !row.is_open => dim(),
+            Trouble::None if row.unread.is_some() => Style::new().fg(Color::Yellow),
+            Trouble::None => plain(),
         };
         let style = match at == Some(place) {
             true => style.add_modifier(Modifier::REVERSED),
@@ -371,11 +388,12 @@ fn table(model: &Model, page: &mut Page<'_>, bottom: u16) {
     }
 }
 
-/// The two first columns are words and begin at the left.
-fn cell(text: &str, width: usize, place: usize) -> String {
+/// Words begin at the left, and numbers end at the right.
+fn cell(text: &str, column: &Column) -> String {
+    let width = column.width;
     let text: String = text.chars().take(width).collect();
-    match place {
-        0 | 1 => format!("{text:width$} "),
+    match column.head {
+        "TOPIC" | "WRITER" => format!("{text:width$} "),
         _ => format!("{text:>width$} "),
     }
 }
@@ -384,9 +402,11 @@ fn writer(row: &Row) -> String {
     let Some(first) = row.author() else {
         return "-".to_owned();
     };
-    let role = first
-        .role
-        .map_or("stranger".to_owned(), |role| role.to_string());
+    let role = match (first.role, first.life) {
+        (Some(role), _) => role.to_string(),
+        (None, Life::Recorded) => "process".to_owned(),
+        (None, _) => "stranger".to_owned(),
+    };
     let more = match row.authors.len() {
         1 => String::new(),
         n => format!(" +{}", n - 1),
@@ -396,19 +416,14 @@ fn writer(row: &Row) -> String {
 
 fn state(row: &Row) -> String {
     let worst = row.authors.iter().map(|author| author.life).max();
-    match worst {
-        None => "-",
-        Some(Life::Alive) => "alive",
-        Some(Life::Frozen) => "frozen",
-        Some(Life::Dead) => "dead",
-    }
-    .to_owned()
+    worst.map_or("-", Life::name).to_owned()
 }
 
 fn readers(row: &Row) -> String {
-    match row.places {
-        Some(places) => format!("{}/{places}", row.readers),
-        None => row.readers.to_string(),
+    match (row.readers, row.places) {
+        (None, _) => "-".to_owned(),
+        (Some(readers), Some(places)) => format!("{readers}/{places}"),
+        (Some(readers), None) => readers.to_string(),
     }
 }
 
@@ -455,7 +470,7 @@ fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{plural}")
 }
 
-fn footer(model: &Model) -> (String, Style) {
+fn footer(model: &Model, width: u16) -> (String, Style) {
     let view = &model.view;
     if view.is_typing {
         let text = format!("filter: {}_   Enter keeps it, Esc drops it", view.filter);
@@ -475,8 +490,12 @@ fn footer(model: &Model) -> (String, Style) {
         true => String::new(),
         false => format!("[{}] ", states.join(", ")),
     };
+    let more = match pages(width.into()).len() {
+        1 => "",
+        _ => " Right:more",
+    };
     let text = format!(
-        "{states}?:help /:filter <>:sort {} Space:close p:pause f:freeze q:quit",
+        "{states}?:help{more} /:filter <>:sort {} Space:close p:pause f:freeze q:quit",
         view.sort.name()
     );
     (text, dim())

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lager_ports::TopicInfo;
+use lager_ports::{Layout, TopicInfo};
 use lager_topics::{Role, Stamp, TopicEntry};
 use serde_json::{Value, json};
 
@@ -18,6 +18,8 @@ const SILENT_NS: u64 = 10_000_000_000;
 /// Whether a process that writes a topic goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Life {
+    /// Nobody looks any more: it wrote a recording.
+    Recorded,
     /// It does.
     #[default]
     Alive,
@@ -25,6 +27,18 @@ pub(crate) enum Life {
     Frozen,
     /// It was killed, and what it left is not swept yet.
     Dead,
+}
+
+impl Life {
+    /// In a word.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Recorded => "-",
+            Self::Alive => "alive",
+            Self::Frozen => "frozen",
+            Self::Dead => "dead",
+        }
+    }
 }
 
 /// A process that writes the topic.
@@ -72,14 +86,19 @@ pub(crate) struct Row {
     /// Whether its samples are looked at.
     pub(crate) is_open: bool,
     pub(crate) authors: Vec<Author>,
-    pub(crate) readers: usize,
+    /// Subscribers; not known of a recording.
+    pub(crate) readers: Option<usize>,
     /// Places for readers, where they are known.
     pub(crate) places: Option<usize>,
+    /// Why its samples cannot be read.
+    pub(crate) unread: Option<String>,
+    /// What a robot sends in a second of its own time, and in one of real time.
+    usual_hz: Option<f64>,
     pub(crate) expected_hz: Option<f64>,
     /// Samples that wait at most.
     buffer: u64,
-    /// Of a sample, with its stamp.
-    pub(crate) bytes: usize,
+    /// Of a sample, with its stamp; 0 = not known.
+    bytes: usize,
     /// Samples of which a reader is sure that they were lost.
     pub(crate) lost: u64,
     /// Samples that were overwritten in this process's own full queue; usual for a state.
@@ -107,16 +126,18 @@ struct Window {
 impl Row {
     pub(crate) fn new(name: &str, entry: Option<&(usize, &TopicEntry)>) -> Self {
         let layout = entry.map(|(_, entry)| entry.layout.size + size_of::<Stamp>());
+        let period_ms = entry.and_then(|(_, entry)| entry.period_ms);
+        let usual_hz = period_ms.map(|ms| 1_000.0 / f64::from(ms));
         Self {
             name: name.to_owned(),
             place: entry.map_or(usize::MAX, |(place, _)| *place),
             is_open: true,
             authors: Vec::new(),
-            readers: 0,
+            readers: None,
             places: entry.map(|(_, entry)| entry.qos.max_subscribers()),
-            expected_hz: entry
-                .and_then(|(_, entry)| entry.period_ms)
-                .map(|ms| 1_000.0 / f64::from(ms)),
+            unread: None,
+            usual_hz,
+            expected_hz: usual_hz,
             buffer: entry.map_or(u64::MAX, |(_, entry)| entry.qos.buffer as u64),
             bytes: layout.unwrap_or_default(),
             lost: 0,
@@ -132,7 +153,13 @@ impl Row {
 
     /// Takes who writes and reads it now.
     pub(crate) fn take_ends(&mut self, info: &TopicInfo, life: impl Fn(u32) -> Life) {
-        self.readers = info.subscribers;
+        self.readers = Some(info.subscribers);
+        let why = match info.layout {
+            Layout::Ours | Layout::Described | Layout::Unused => None,
+            Layout::Other => Some("the processes that use it are of another build"),
+            Layout::Unknown => Some("nobody says what its samples are"),
+        };
+        self.unread = why.map(str::to_owned);
         if let Some(description) = &info.description {
             self.bytes = description.size() + size_of::<Stamp>();
         }
@@ -142,6 +169,27 @@ impl Row {
             life: life(peer.pid),
         });
         self.authors = authors.collect();
+    }
+
+    /// Nobody is on it any more.
+    pub(crate) fn leave(&mut self) {
+        (self.authors, self.readers) = (Vec::new(), Some(0));
+    }
+
+    /// Its samples were those of a recording up to that moment: of its ends only a stamp is left, and
+    /// what it lost at any time is to be seen.
+    pub(crate) fn end_recording(&mut self, now_ns: u64) {
+        self.authors = vec![Author {
+            role: None,
+            pid: self.last_writer,
+            life: Life::Recorded,
+        }];
+        self.lost_at_ns = self.lost_at_ns.map(|_| now_ns);
+    }
+
+    /// Takes how many seconds of the robot's time a second has.
+    pub(crate) fn take_pace(&mut self, pace: f64) {
+        self.expected_hz = self.usual_hz.map(|hz| hz * pace);
     }
 
     /// Takes a sample.
@@ -181,6 +229,17 @@ impl Row {
         if found >= self.buffer {
             self.overrun += lost;
         } else {
+            self.lose(lost, now_ns);
+        }
+    }
+
+    /// Takes what a recording lacks before a sample: what was lost before its recorder, which of a
+    /// state is usual, and what that had no time for.
+    pub(crate) fn lack(&mut self, lost: u64, dropped: u64, now_ns: u64) {
+        let is_state = self.buffer <= 1;
+        self.overrun += if is_state { lost } else { 0 };
+        let lost = if is_state { dropped } else { lost + dropped };
+        if lost > 0 {
             self.lose(lost, now_ns);
         }
     }
@@ -226,6 +285,11 @@ impl Row {
         };
     }
 
+    /// Bytes a second, where it is known how long a sample is.
+    pub(crate) fn bytes_per_s(&self) -> Option<f64> {
+        (self.bytes > 0).then_some(self.figures.bytes_per_s)
+    }
+
     /// The process that wrote last, or any that could.
     pub(crate) fn author(&self) -> Option<&Author> {
         let wrote = |author: &&Author| author.pid == self.last_writer;
@@ -250,7 +314,7 @@ impl Row {
         if self.is_losing(now_ns) {
             return Trouble::Losing;
         }
-        let is_gone = |author: &Author| author.life != Life::Alive;
+        let is_gone = |author: &Author| matches!(author.life, Life::Frozen | Life::Dead);
         if !self.authors.is_empty() && self.authors.iter().all(is_gone) {
             return Trouble::Unwritten;
         }
@@ -267,16 +331,16 @@ impl Row {
         let authors = self.authors.iter().map(|author| {
             json!({
                 "role": author.role.map(|role| role.to_string()), "pid": author.pid,
-                "state": format!("{:?}", author.life).to_lowercase(),
+                "state": (author.life != Life::Recorded).then(|| author.life.name()),
             })
         });
         let figures = &self.figures;
         json!({
-            "topic": self.name, "open": self.is_open, "writers": authors.collect::<Vec<_>>(),
+            "topic": self.name, "open": self.is_open, "unread": self.unread, "writers": authors.collect::<Vec<_>>(),
             "subscribers": self.readers, "subscriber_places": self.places,
             "samples": self.samples, "hz": figures.hz, "expected_hz": self.expected_hz,
             "age_ns": self.age(now_ns).map(|age| age.as_nanos() as u64),
-            "jitter_p99_ns": figures.jitter_p99_ns, "bytes_per_s": figures.bytes_per_s,
+            "jitter_p99_ns": figures.jitter_p99_ns, "bytes_per_s": self.bytes_per_s(),
             "lost": self.lost, "overrun": self.overrun, "queue": figures.queue,
             "delay_p50_ns": figures.delay_p50_ns, "delay_p99_ns": figures.delay_p99_ns,
             "delay_max_ns": figures.delay_max_ns,
@@ -366,5 +430,18 @@ mod tests {
         assert_eq!(row.trouble(0), Trouble::None);
         row.authors = vec![author(Life::Dead), author(Life::Frozen)];
         assert_eq!(row.trouble(0), Trouble::Unwritten);
+    }
+
+    #[test]
+    fn a_robot_whose_clock_runs_slower_is_expected_to_send_less() {
+        let mut row = row("sensor/line");
+        for number in 0..20 {
+            row.hear(&stamp((100 + 50 * number) * MS));
+        }
+        row.end_window(1_100 * MS);
+        assert_eq!(row.trouble(1_100 * MS), Trouble::Slow);
+        row.take_pace(0.2);
+        assert_eq!(row.expected_hz, Some(20.0));
+        assert_eq!(row.trouble(1_100 * MS), Trouble::None);
     }
 }

@@ -17,6 +17,7 @@ use super::head::Load;
 use super::model::{Key, Model, Pressed};
 use super::render;
 use super::row::Life;
+use super::{Lacking, Recorded};
 
 const MS: u64 = 1_000_000;
 const S: u64 = 1_000 * MS;
@@ -272,6 +273,122 @@ fn only_rows_that_are_shown_and_open_are_read() {
     press(&mut model, "-");
     assert!(wanted(&model).is_empty());
     assert_eq!(model.press(Key::Char('q')), Pressed::Quit);
+}
+
+/// The heads of the columns that are shown.
+fn heads(model: &Model) -> Vec<String> {
+    let text = picture(model, 80, 24);
+    let head = text.lines().find(|line| line.starts_with(" TOPIC"));
+    let words = head.expect("a head").split_whitespace();
+    words.map(str::to_owned).collect()
+}
+
+#[test]
+fn a_narrow_screen_shows_every_column_page_by_page() {
+    let mut model = driving();
+    let first = heads(&model);
+    let mut seen = Vec::new();
+    loop {
+        seen.append(&mut heads(&model));
+        model.press(Key::Right);
+        if heads(&model) == first {
+            break;
+        }
+    }
+    for head in [
+        "WRITER", "STATE", "READERS", "HZ", "EXPECT", "AGE", "LOST", "SKIP", "QUEUE", "JITTER99",
+        "KIB/S", "DELAY50", "DELAY99", "DELAYMAX", "SAMPLES",
+    ] {
+        let times = seen.iter().filter(|seen| *seen == head).count();
+        assert_eq!(times, 1, "{head} in {seen:?}");
+    }
+    model.press(Key::Left);
+    assert_ne!(heads(&model), first);
+    model.press(Key::Right);
+    assert_eq!(heads(&model), first);
+}
+
+#[test]
+fn a_topic_that_cannot_be_read_says_so() {
+    let mut model = driving();
+    let mut maps = info("nav/map", Vec::new());
+    maps.layout = Layout::Other;
+    model.take_ends(&[maps], |_| Life::Alive);
+    let text = picture(&model, 200, 60);
+    assert!(
+        text.lines().any(|line| line.starts_with("?nav/map")),
+        "{text}"
+    );
+    let rows = model.as_json()["topics"].clone();
+    let of = |name: &str| {
+        let mut rows = rows.as_array().expect("rows").iter();
+        rows.find(|row| row["topic"] == name).expect("the row")["unread"].clone()
+    };
+    assert!(
+        of("nav/map")
+            .as_str()
+            .is_some_and(|why| why.contains("another build")),
+        "{rows}"
+    );
+    assert!(of("nav/status").is_null(), "{rows}");
+}
+
+#[test]
+fn a_recording_shows_who_wrote_it_and_what_it_lacks_and_claims_no_readers() {
+    let mut recorded = Recorded::new("tour.mcap", "r1", "");
+    for number in 0..1_000 {
+        let at = S + number * 100 * MS;
+        let stamp = Stamp {
+            sequence: number,
+            publish_time_ns: at,
+            source_time_ns: at,
+            writer: 4_711,
+            ..Stamp::default()
+        };
+        // From early on three are lacking, which is usual for a state.
+        let lost = if number > 5 { 3 } else { 0 };
+        let lacking = Lacking { lost, dropped: 0 };
+        for topic in ["link/health", "sensor/line", "weather/now"] {
+            recorded.take(topic, &stamp, lacking, serde_json::Value::Null);
+        }
+        let dropped = Lacking {
+            lost: 0,
+            dropped: lost,
+        };
+        recorded.take("nav/status", &stamp, dropped, serde_json::Value::Null);
+    }
+    recorded.model.end_recording();
+    let text = picture(&recorded.model, 200, 60);
+    let row = |topic: &str| -> Vec<String> {
+        let line = text.lines().find(|line| line.contains(topic));
+        let words = line.expect("a row").split_whitespace();
+        words.map(str::to_owned).collect()
+    };
+    // Topic, writer, its process and state, readers, two rates, age, lost, skipped.
+    let health = row("link/health");
+    assert_eq!(health[..5], ["link/health", "process", "4711", "-", "-"]);
+    assert_eq!(health[5..7], ["10.0", "10.0"], "{text}");
+    assert_eq!(health[8..10], ["0", "3"], "{text}");
+    let line = row("sensor/line");
+    assert_eq!(
+        (line[0].as_str(), &line[8..10]),
+        ("!sensor/line", &["3", "0"].map(str::to_owned)[..])
+    );
+    let status = row("nav/status");
+    assert_eq!(
+        (status[0].as_str(), status[8].as_str()),
+        ("!nav/status", "3")
+    );
+    // How long its samples are is in no table and not in the recording.
+    let weather = row("weather/now");
+    assert_eq!(
+        (weather[0].as_str(), weather[12].as_str()),
+        ("!weather/now", "-")
+    );
+    let rows = recorded.model.as_json()["topics"].clone();
+    assert_eq!(rows[0]["writers"][0]["pid"], 4_711, "{rows}");
+    assert!(rows[0]["writers"][0]["state"].is_null(), "{rows}");
+    assert!(rows[0]["subscribers"].is_null(), "{rows}");
 }
 
 #[test]
