@@ -15,17 +15,18 @@ use crate::browser::Page;
 use crate::played::Stage;
 
 /// Where reasons are written down as sentences.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 8] = [
     include_str!("../../services/comm/src/conversation.rs"),
     include_str!("../../services/comm/src/conversation/orders.rs"),
     include_str!("../../services/comm/src/conversation/samples.rs"),
     include_str!("../../services/comm/src/driving.rs"),
     include_str!("../../services/comm/src/map.rs"),
     include_str!("../../services/comm/src/tasks.rs"),
+    include_str!("../../services/panel/src/socket.rs"),
     include_str!("../../services/panel/src/visit.rs"),
 ];
 /// First words of lines between panel and page, which are no sentences.
-const LINES: [&str; 9] = [
+const LINES: [&str; 11] = [
     "you",
     "answer",
     "refused",
@@ -35,6 +36,8 @@ const LINES: [&str; 9] = [
     "from",
     "warehouse",
     "about",
+    "lost",
+    "stop",
 ];
 
 /// The sentences among the literals of a source, with a number in place of each value.

@@ -220,7 +220,7 @@ async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
         if let Ok(cookie) = HeaderValue::from_str(&cookie) {
             response.headers_mut().insert(header::SET_COOKIE, cookie);
         }
-        return response;
+        return guarded(response);
     }
     if rank(&shared.access, headers).is_none() {
         return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
@@ -231,7 +231,11 @@ async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
             "there is no such file here; the page is at /",
         );
     };
-    let mut response = ([(header::CONTENT_TYPE, kind)], content).into_response();
+    guarded(([(header::CONTENT_TYPE, kind)], content).into_response())
+}
+
+/// The answer with what keeps others out of it.
+fn guarded(mut response: Response) -> Response {
     for (name, value) in page::HEADERS {
         let (name, value) = (
             HeaderName::from_static(name),
@@ -242,10 +246,12 @@ async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
     response
 }
 
-const WRONG_TOKEN: &str =
-    "open the address with ?token= that `lager station` has printed; without it nobody gets in";
+const WRONG_TOKEN: &str = "open the address with ?token= that `lager station` has printed; without \
+     it nobody gets in\nöppna adressen med ?token= som `lager station` har skrivit ut; utan den \
+     kommer ingen in";
 
-const WRONG_HOST: &str = "the panel answers to its address and not to this name";
+const WRONG_HOST: &str = "the panel answers to its address and not to this name\npanelen svarar på \
+     sin adress och inte på detta namn";
 
 /// A page's socket.
 async fn live(
@@ -327,5 +333,5 @@ fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
 }
 
 fn refuse(status: StatusCode, why: &'static str) -> Response {
-    (status, format!("{why}\n")).into_response()
+    guarded((status, format!("{why}\n")).into_response())
 }

@@ -29,6 +29,8 @@ const SILENT: Duration = Duration::from_secs(5);
 /// Messages that a page may send within a second.
 const MOST_MESSAGES: u32 = 200;
 
+const TOO_MUCH: &str = "more is said than a person can";
+
 /// Talks with a page until one of the two ends it.
 pub(crate) async fn converse(socket: WebSocket, place: Place, rank: Rank) {
     let visit = Mutex::new(Visit::new(place, rank));
@@ -67,12 +69,15 @@ async fn listen(mut stream: SplitStream<WebSocket>, visit: &Mutex<Visit>) -> Opt
         visit.is_there();
         if let Message::Text(line) = &message {
             // A stop counts, however much was said before it.
-            let is_stop = line.as_str().starts_with("stop ");
-            if messages > MOST_MESSAGES && !is_stop {
-                return Some("more is said than a person can");
+            let is_much = messages > MOST_MESSAGES;
+            if is_much && !line.as_str().starts_with("stop ") {
+                return Some(TOO_MUCH);
             }
             if !visit.heard(line.as_str()) {
                 return Some("this page speaks another language; load it anew");
+            }
+            if is_much {
+                return Some(TOO_MUCH);
             }
         } else if matches!(message, Message::Binary(_)) {
             return Some("a page says lines of text");

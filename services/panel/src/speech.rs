@@ -23,8 +23,10 @@
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
 //! from <robot> <report>             a line of the extension, or `thought <text>`
 //! past <robot> <ms> <report>        an event or a thought of so long before this page came
-//! answer <number> done | stopped <ms> | refused <text>
+//! answer <number> done | stopped <ms> | refused <text> | lost <text>
 //! ```
+//!
+//! `lost`: it was given to the robot, and nobody knows what came of it.
 //!
 //! A line that cannot be read is refused if it has a number; a page that goes on like this is closed.
 

@@ -29,6 +29,7 @@ const MOST_UNREAD: u32 = 20;
 
 const ONLY_LOOKS: &str = "this page may look and stop; a driver's address is needed for more";
 const NOT_DRIVER: &str = "take the wheel first";
+const UNANSWERED: &str = "the robot does not answer";
 
 /// A page that is open.
 #[derive(Debug)]
@@ -240,14 +241,7 @@ impl Visit {
             // Its lease is the station's.
             (Action::Drive { wheels, .. }, Some(driver)) => driver.drive(wheels),
             (Action::Arm(step), Some(driver)) => driver.arm(step),
-            (
-                Action::Resume
-                | Action::Mode(_)
-                | Action::Pick(_)
-                | Action::Reset
-                | Action::Place(_),
-                None,
-            ) if self.driver_of(robot).is_some() => {
+            (action, None) if is_the_drivers(action) && self.driver_of(robot).is_some() => {
                 let by = self.driver_of(robot).unwrap_or_default();
                 return self.refuse(number, &format!("{by} drives the robot; ask him"));
             }
@@ -303,7 +297,7 @@ impl Visit {
                     self.answer(number, &format!("stopped {after_ms}"));
                 }
                 Some(Reply::Refused(why)) => self.refuse(number, why.as_str()),
-                Some(Reply::Lost) => self.refuse(number, "the robot does not answer"),
+                Some(Reply::Lost) => self.answer(number, &format!("lost {UNANSWERED}")),
             }
         }
         for (number, saving) in std::mem::take(&mut self.saving) {
@@ -423,7 +417,25 @@ fn latest(action: Action) -> Duration {
         | Action::Arm(_)
         | Action::Resume
         | Action::Mode(_)
+        | Action::Picked { .. }
+        | Action::Reset
         | Action::Place(_) => LATEST_MOVE,
         _ => LATEST,
     }
+}
+
+/// Whether this is left to the driver as long as there is one: it moves the robot, lets it move, or
+/// changes how it drives. Orders wait in a queue, and things in a simulated world are anybody's.
+fn is_the_drivers(action: Action) -> bool {
+    matches!(
+        action,
+        Action::Resume
+            | Action::Mode(_)
+            | Action::Pick(_)
+            | Action::Picked { .. }
+            | Action::Reset
+            | Action::Place(_)
+            | Action::Gains { .. }
+            | Action::Calibrate
+    )
 }

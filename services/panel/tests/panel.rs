@@ -145,7 +145,12 @@ impl Page {
 
     /// The next line that begins like this; `None` once the panel has closed.
     fn line(&mut self, beginning: &str) -> Option<String> {
+        let end = Instant::now() + WATCHDOG;
         loop {
+            assert!(
+                Instant::now() < end,
+                "no {beginning:?}, and it is not closed"
+            );
             let message = self.0.read().ok()?;
             if let Message::Close(_) = message {
                 return None;
@@ -206,7 +211,15 @@ fn another_name_for_this_machine_is_refused() {
     let panel = Running::new(None);
     let port = panel.address.port();
     for host in [format!("evil.example:{port}"), "127.0.0.1:1".into()] {
-        assert_eq!(status(&panel.ask("/", &[("Host", &host)])), 421, "{host}");
+        let answer = panel.ask("/", &[("Host", &host)]);
+        assert_eq!(status(&answer), 421, "{host}");
+        for part in [
+            "content-security-policy: ",
+            "not to this name",
+            "detta namn",
+        ] {
+            assert!(answer.contains(part), "{part}: {answer}");
+        }
     }
 }
 
@@ -303,6 +316,98 @@ fn a_page_that_says_more_than_a_person_can_is_closed() {
 }
 
 #[test]
+fn a_stop_counts_however_much_is_said_and_a_flood_of_them_closes_the_page() {
+    let panel = Running::new(None);
+    let robot = panel.robot("r1");
+    let mut page = panel.own_page();
+    page.line("about r1 connected=1 speaks=1").unwrap();
+    for number in 0..5_000 {
+        let line = match number {
+            ..200 => format!("keep r1 {number}"),
+            _ => format!("stop r1 {number}"),
+        };
+        if page.0.send(Message::text(line)).is_err() {
+            break;
+        }
+    }
+    while page.line("answer ").is_some() {}
+    let stops = || {
+        let told = robot.0.lock().unwrap();
+        told.iter().filter(|line| line.starts_with("stop ")).count()
+    };
+    let end = Instant::now() + WATCHDOG;
+    while stops() == 0 {
+        assert!(Instant::now() < end, "no stop has come");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_stop_that_the_robot_has_and_does_not_answer_is_not_told_as_refused() {
+    let panel = Running::new(None);
+    let mut robot = TcpStream::connect(panel.station).unwrap();
+    writeln!(robot, "lager 1 r1").unwrap();
+    let mut page = panel.own_page();
+    page.line("about r1 connected=1 speaks=1").unwrap();
+    page.say("stop r1 1");
+    let mut told = BufReader::new(robot).lines().map_while(Result::ok);
+    assert!(told.any(|line| line.starts_with("stop ")));
+    drop(told);
+    assert_eq!(
+        page.line("answer 1").unwrap(),
+        "answer 1 lost the robot does not answer"
+    );
+}
+
+#[test]
+fn what_moves_a_robot_or_how_it_drives_is_its_drivers_while_there_is_one() {
+    let panel = Running::new(None);
+    let robot = panel.robot("r1");
+    let (mut anna, mut bo) = (panel.own_page(), panel.own_page());
+    anna.line("about r1 connected=1 speaks=1").unwrap();
+    anna.say("take r1 1");
+    assert_eq!(anna.line("answer 1").unwrap(), "answer 1 done");
+    let hers = [
+        "resume",
+        "mode manual",
+        "pick auto",
+        "picked",
+        "picked force",
+        "reset",
+        "place 0 0 right",
+        "gains 2 2",
+        "calibrate",
+    ];
+    // His clock runs fast, so nothing comes late.
+    for (number, action) in (1..).zip(hers) {
+        bo.say(&format!("do r1 {number} {number}000 {action}"));
+        let answer = bo.line(&format!("answer {number}")).unwrap();
+        assert!(
+            answer.contains("drives the robot; ask him"),
+            "{action}: {answer}"
+        );
+    }
+    assert_eq!(robot.told(), [""; 0]);
+    for (number, action) in (20..).zip(["order 5 1", "cancel 5", "obstacle put 0 0 up"]) {
+        bo.say(&format!("do r1 {number} {number}000 {action}"));
+        assert_eq!(
+            bo.line(&format!("answer {number}")).unwrap(),
+            format!("answer {number} done")
+        );
+    }
+    // Without a driver they are anybody's.
+    anna.say("free r1 2");
+    assert_eq!(anna.line("answer 2").unwrap(), "answer 2 done");
+    for (number, action) in (30..).zip(hers) {
+        bo.say(&format!("do r1 {number} {number}000 {action}"));
+        assert_eq!(
+            bo.line(&format!("answer {number}")).unwrap(),
+            format!("answer {number} done")
+        );
+    }
+}
+
+#[test]
 fn a_warehouse_is_described_and_shown_to_everybody() {
     let panel = Running::new(None);
     let (mut page, mut other) = (panel.own_page(), panel.own_page());
@@ -352,8 +457,11 @@ fn what_moves_a_robot_is_refused_when_it_was_held_up_on_the_way() {
         answer.starts_with("answer 3 refused came ") && answer.contains(" ms late"),
         "{answer}"
     );
-    page.say("do r1 4 9500 arm F1");
-    assert!(page.line("answer 4").unwrap().contains(" ms late"));
+    for (number, action) in (10..).zip(["arm F1", "picked", "reset", "place 0 0 up"]) {
+        page.say(&format!("do r1 {number} 9500 {action}"));
+        let answer = page.line(&format!("answer {number}")).unwrap();
+        assert!(answer.contains(" ms late"), "{action}: {answer}");
+    }
     // To stand it is never too late, and what moves nothing may take its time.
     page.say("do r1 5 1 drive 1 200");
     assert_eq!(page.line("answer 5").unwrap(), "answer 5 done");
