@@ -4,6 +4,7 @@
 
 use std::time::Duration;
 
+use clap::ValueEnum;
 use criterion::{Criterion, SamplingMode};
 use lager_benches::{Options, Regime, Scenario, Session};
 
@@ -14,7 +15,7 @@ fn main() {
         regimes: vec![Regime::Plain],
         ..Options::default()
     };
-    for scenario in Scenario::ALL {
+    for scenario in Scenario::value_variants() {
         for group in scenario.groups(&options) {
             let mut benches = criterion.benchmark_group(format!("latency/{}", group.what));
             benches
@@ -25,7 +26,7 @@ fn main() {
             // Opened when it is measured: a name that was filtered out starts no process.
             let mut session: Option<Box<dyn Session>> = None;
             for (index, entry) in group.entries.iter().enumerate() {
-                let name = format!("{}/{}", entry.mode, entry.label());
+                let name = format!("{}/{}", entry.mode, entry.label);
                 benches.bench_function(name, |bencher| {
                     bencher.iter_custom(|samples| {
                         let session = session.get_or_insert_with(|| {

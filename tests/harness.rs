@@ -19,6 +19,7 @@ use serde_json::Value;
 
 pub use cable::Cable;
 pub use compare::{compare, compare_on_robot};
+pub use lager_rig::told::children;
 
 /// How long a test waits for anything before it calls it stuck. It bounds a hang; it measures
 /// nothing.
@@ -379,24 +380,6 @@ impl Drop for Running {
 #[must_use]
 pub fn pid(raw: u32) -> Pid {
     Pid::from_raw(i32::try_from(raw).expect("a process id")).expect("not 0")
-}
-
-/// The children of a process.
-#[must_use]
-pub fn children(parent: u32) -> Vec<u32> {
-    let mut found = Vec::new();
-    for task in fs::read_dir(format!("/proc/{parent}/task"))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
-        let list = fs::read_to_string(task.path().join("children")).unwrap_or_default();
-        found.extend(
-            list.split_whitespace()
-                .filter_map(|pid| pid.parse::<u32>().ok()),
-        );
-    }
-    found
 }
 
 fn arguments(process: u32) -> Vec<String> {

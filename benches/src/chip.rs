@@ -9,11 +9,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::error::BenchError;
 use crate::machine;
-use crate::report::{Mode, Regime, Report, Row};
-use crate::stats::Quantiles;
 
 /// The baud rates of the lines to the Pi that there are images for: the default and the original's.
 pub const BAUDS: [u32; 2] = [500_000, 9_600];
@@ -47,64 +46,6 @@ impl Programs {
     }
 }
 
-/// Times in cycles over all phases tried.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Span {
-    /// The shortest.
-    pub best: u64,
-    /// The middle one.
-    pub median: u64,
-    /// What 99 of 100 keep.
-    pub p99: u64,
-    /// The longest.
-    pub worst: u64,
-}
-
-/// A board's interrupts while the robot drives, in cycles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Interrupts {
-    /// How long they were watched.
-    pub cycles: u64,
-    /// Of these, in interrupts.
-    pub in_interrupts: u64,
-    /// The longest time from an interrupt's flag to its first instruction.
-    pub worst_latency: u64,
-}
-
-/// One board.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Board {
-    /// Bytes of flash the image fills.
-    pub flash_bytes: u64,
-    /// Share of time the core is awake, 0 to 1.
-    pub awake_share: f64,
-    /// Its interrupts.
-    pub interrupts: Interrupts,
-}
-
-/// What the emulator says of the images for one baud rate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Trace {
-    /// The chips' clock.
-    pub frequency_hz: u64,
-    /// The lines' baud rate.
-    pub baud: u32,
-    /// The version of rustc that built the images.
-    pub rustc: String,
-    /// Phases of the boards' loops tried.
-    pub phases: u64,
-    /// From the tape's jump to another duty.
-    pub tape_to_duty: Span,
-    /// From the tape's jump to the first start bit of the packet that tells.
-    pub tape_to_uart: Span,
-    /// The sensor board.
-    pub sensor: Board,
-    /// The steering board.
-    pub steering: Board,
-    /// Chip time in processor time while the robot drives.
-    pub real_time_factor: f64,
-}
-
 /// One exact figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
@@ -114,124 +55,87 @@ pub struct Figure {
     pub value: f64,
     /// Of what: `cycles`, `cycles/s`, `bytes`, `%`, `x`.
     pub unit: String,
+    /// So many cycles in milliseconds of the chips' time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ms: Option<f64>,
 }
+
+/// What the emulator says of the images for one baud rate.
+struct Trace(Value);
 
 impl Trace {
-    /// Everything but the rows, the counted ones exactly.
-    #[must_use]
-    pub fn figures(&self) -> Vec<Figure> {
-        let at = baud_name(self.baud);
+    fn number(&self, place: &str) -> Result<f64, String> {
+        let number = self.0.pointer(place).and_then(Value::as_f64);
+        number.ok_or_else(|| format!("it does not say {place}"))
+    }
+
+    fn figures(&self) -> Result<Vec<Figure>, String> {
+        let (baud, hertz) = (self.number("/baud")? as u32, self.number("/frequency_hz")?);
+        let at = match baud % 1_000 {
+            0 => format!("{}kBd", baud / 1_000),
+            _ => format!("{baud}Bd"),
+        };
+        let figure = |what: &str, of: &str, value: f64, unit: &str| Figure {
+            name: format!("{what}@{at}{of}"),
+            value,
+            unit: unit.to_owned(),
+            ms: (unit == "cycles").then_some(value / hertz * 1e3),
+        };
         let mut figures = Vec::new();
-        let mut add = |name: String, value: f64, unit: &str| {
-            figures.push(Figure {
-                name,
-                value,
-                unit: unit.to_owned(),
-            });
-        };
-        for (what, span) in [
-            ("tape-to-duty", &self.tape_to_duty),
-            ("tape-to-uart", &self.tape_to_uart),
+        // Over all phases tried, from the tape's jump to another duty, and to the first start bit of
+        // the packet that tells the line.
+        for (what, place) in [
+            ("tape-to-duty", "/tape_to_duty"),
+            ("tape-to-uart", "/tape_to_uart"),
         ] {
-            let what = format!("{what}@{at}");
-            add(format!("{what}/best"), span.best as f64, "cycles");
-            add(format!("{what}/median"), span.median as f64, "cycles");
-            add(format!("{what}/worst"), span.worst as f64, "cycles");
-        }
-        for (name, board) in [("sensor", &self.sensor), ("steering", &self.steering)] {
-            let Interrupts {
-                cycles,
-                in_interrupts,
-                worst_latency,
-            } = board.interrupts;
-            let share = in_interrupts as f64 / cycles as f64;
-            let in_a_second = (share * self.frequency_hz as f64).round();
-            let of = |what: &str| format!("{what}@{at}/{name}");
-            add(of("interrupt-latency"), worst_latency as f64, "cycles");
-            add(of("interrupts"), in_a_second, "cycles/s");
-            add(of("interrupt-share"), 100.0 * share, "%");
-            add(of("awake"), 100.0 * board.awake_share, "%");
-            add(of("flash"), board.flash_bytes as f64, "bytes");
-        }
-        add(format!("real-time@{at}"), self.real_time_factor, "x");
-        figures
-    }
-
-    fn rows(&self) -> [Row; 2] {
-        let row = |what: &str, span: &Span| {
-            let times = Quantiles {
-                n: self.phases,
-                p50_ns: self.nanoseconds(span.median),
-                p99_ns: self.nanoseconds(span.p99),
-                p999_ns: self.nanoseconds(span.worst),
-            };
-            let what = format!("{what}@{}", baud_name(self.baud));
-            // The boards sleep until an interrupt wakes them; nobody's core matters.
-            Row {
-                name: "chip".to_owned(),
-                ..Row::of(&what, Mode::Block, Regime::Plain, Some(times))
+            for of in ["/best", "/median", "/worst"] {
+                let cycles = self.number(&format!("{place}{of}"))?;
+                figures.push(figure(what, of, cycles, "cycles"));
             }
-        };
-        [
-            row("tape-to-duty", &self.tape_to_duty),
-            row("tape-to-uart", &self.tape_to_uart),
-        ]
-    }
-
-    fn nanoseconds(&self, cycles: u64) -> u64 {
-        cycles * 1_000_000_000 / self.frequency_hz
+        }
+        // While the robot drives.
+        for board in ["/sensor", "/steering"] {
+            let number = |place: &str| self.number(&format!("{board}{place}"));
+            // The longest time from an interrupt's flag to its first instruction.
+            let latency = number("/interrupts/worst_latency")?;
+            let share = number("/interrupts/in_interrupts")? / number("/interrupts/cycles")?;
+            let (awake, flash) = (number("/awake_share")?, number("/flash_bytes")?);
+            figures.extend([
+                figure("interrupt-latency", board, latency, "cycles"),
+                figure("interrupts", board, (share * hertz).round(), "cycles/s"),
+                figure("interrupt-share", board, 100.0 * share, "%"),
+                figure("awake", board, 100.0 * awake, "%"),
+                figure("flash", board, flash, "bytes"),
+            ]);
+        }
+        let real_time = self.number("/real_time_factor")?;
+        figures.push(figure("real-time", "", real_time, "x"));
+        Ok(figures)
     }
 }
 
-fn baud_name(baud: u32) -> String {
-    if baud.is_multiple_of(1_000) {
-        format!("{}kBd", baud / 1_000)
-    } else {
-        format!("{baud}Bd")
-    }
-}
-
-/// The rows of the other scenarios' reports, in ns, and the exact figures. p99.9 of a row is its
-/// longest time: there are fewer than a thousand phases.
+/// The exact figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChipReport {
-    /// As the other scenarios have it.
-    #[serde(flatten)]
-    pub report: Report,
+    /// The machine in one line.
+    pub machine: String,
     /// What was counted, and the real-time factor.
     pub figures: Vec<Figure>,
-}
-
-impl ChipReport {
-    /// The report on traces.
-    #[must_use]
-    pub fn of(traces: &[Trace]) -> Self {
-        Self {
-            report: Report {
-                machine: machine::describe(),
-                rows: traces.iter().flat_map(Trace::rows).collect(),
-            },
-            figures: traces.iter().flat_map(Trace::figures).collect(),
-        }
-    }
-
-    /// The report as one line of JSON.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        serde_json::to_string(self).expect("names and numbers are always JSON")
-    }
+    /// The version of rustc that built the images.
+    pub rustc: String,
 }
 
 impl fmt::Display for ChipReport {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(formatter, "{}", self.report)?;
+        writeln!(formatter, "{}\n", self.machine)?;
         for figure in &self.figures {
-            let digits = if figure.value.fract() == 0.0 { 0 } else { 2 };
-            writeln!(
-                formatter,
-                "  {:<36} {:>9.digits$} {}",
-                figure.name, figure.value, figure.unit
-            )?;
+            let Figure {
+                name, value, unit, ..
+            } = figure;
+            let digits = if value.fract() == 0.0 { 0 } else { 2 };
+            let ms = figure.ms.map(|ms| format!(", {ms:.2} ms"));
+            let ms = ms.unwrap_or_default();
+            writeln!(formatter, "  {name:<36} {value:>9.digits$} {unit}{ms}")?;
         }
         Ok(())
     }
@@ -241,34 +145,43 @@ impl fmt::Display for ChipReport {
 ///
 /// # Errors
 /// A program is missing, or the emulator says why there are no figures.
-pub fn measure(programs: [(u32, Programs); BAUDS.len()]) -> Result<Vec<Trace>, BenchError> {
-    programs
+pub fn measure(programs: [(u32, Programs); BAUDS.len()]) -> Result<ChipReport, BenchError> {
+    let emulator = programs[0].1.emulator.clone();
+    let failed = |why| BenchError::Emulator(emulator.clone(), why);
+    let traced = programs
         .map(|(baud, programs)| std::thread::spawn(move || trace(&programs, baud)))
-        .into_iter()
-        .map(|trace| trace.join().expect("nothing here panics"))
-        .collect()
+        .map(|trace| trace.join().expect("nothing here panics"));
+    let mut report = ChipReport {
+        machine: machine::describe(),
+        figures: Vec::new(),
+        rustc: String::new(),
+    };
+    for trace in traced {
+        let trace = trace?;
+        report.figures.extend(trace.figures().map_err(failed)?);
+        report.rustc = trace.0["rustc"].as_str().unwrap_or_default().to_owned();
+    }
+    Ok(report)
 }
 
 fn trace(programs: &Programs, baud: u32) -> Result<Trace, BenchError> {
-    for file in [
-        &programs.emulator,
-        &programs.sensor_elf,
-        &programs.steering_elf,
-    ] {
+    let Programs {
+        emulator,
+        sensor_elf,
+        steering_elf,
+    } = programs;
+    for file in [emulator, sensor_elf, steering_elf] {
         if !file.exists() {
             return Err(BenchError::NotBuilt(file.clone()));
         }
     }
-    let failed = |detail: String| BenchError::Emulator {
-        emulator: programs.emulator.clone(),
-        detail,
-    };
-    let output = Command::new(&programs.emulator)
+    let failed = |why| BenchError::Emulator(emulator.clone(), why);
+    let output = Command::new(emulator)
         .arg("--trace")
         .arg("--sensor-elf")
-        .arg(&programs.sensor_elf)
+        .arg(sensor_elf)
         .arg("--steering-elf")
-        .arg(&programs.steering_elf)
+        .arg(steering_elf)
         .args(["--baud", &baud.to_string()])
         .output()
         .map_err(|error| failed(error.to_string()))?;
@@ -276,34 +189,29 @@ fn trace(programs: &Programs, baud: u32) -> Result<Trace, BenchError> {
         let said = String::from_utf8_lossy(&output.stderr);
         return Err(failed(said.trim().to_owned()));
     }
-    serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))
+    let trace = serde_json::from_slice(&output.stdout);
+    Ok(Trace(trace.map_err(|error| failed(error.to_string()))?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn traced() -> Trace {
-        let board = r#"{"flash_bytes":11294,"awake_share":0.9,"ignored":1,
+    #[test]
+    fn what_the_emulator_says_becomes_figures_and_a_table() {
+        let board = r#"{"flash_bytes":11294,"awake_share":0.9,
             "interrupts":{"cycles":32000000,"in_interrupts":10000000,"worst_latency":112}}"#;
         let span = r#"{"best":6000,"median":10000,"p99":14000,"worst":16000}"#;
         let text = format!(
-            r#"{{"frequency_hz":16000000,"baud":500000,"rustc":"1.96.0","phases":300,
-            "tape_to_duty":{span},"tape_to_uart":{span},"sensor":{board},"steering":{board},
-            "real_time_factor":2.125}}"#
+            r#"{{"frequency_hz":16000000,"baud":500000,"tape_to_duty":{span},"tape_to_uart":{span},
+            "sensor":{board},"steering":{board},"real_time_factor":2.125}}"#
         );
-        serde_json::from_str(&text).unwrap()
-    }
-
-    #[test]
-    fn cycles_become_nanoseconds_and_stay_figures() {
-        let report = ChipReport::of(&[traced()]);
-        let row = &report.report.rows[0];
-        assert_eq!(row.what, "tape-to-duty@500kBd");
-        assert_eq!(
-            (row.n, row.p50_ns, row.p99_ns, row.p999_ns),
-            (300, 625_000, 875_000, 1_000_000)
-        );
+        let trace = Trace(serde_json::from_str(&text).unwrap());
+        let report = ChipReport {
+            machine: "a machine".to_owned(),
+            figures: trace.figures().unwrap(),
+            rustc: String::new(),
+        };
         let value = |name: &str| {
             let found = report.figures.iter().find(|figure| figure.name == name);
             found.map(|figure| figure.value)
@@ -312,17 +220,12 @@ mod tests {
         assert_eq!(value("interrupts@500kBd/sensor"), Some(5_000_000.0));
         assert_eq!(value("interrupt-share@500kBd/steering"), Some(31.25));
         assert_eq!(value("real-time@500kBd"), Some(2.125));
-    }
-
-    #[test]
-    fn table_and_json_have_rows_and_figures() {
-        let report = ChipReport::of(&[traced()]);
         let table = report.to_string();
-        for part in ["1000.0 us", "16000 cycles", "31.25 %", "2.12 x"] {
+        for part in ["16000 cycles, 1.00 ms", "31.25 %", "2.12 x"] {
             assert!(table.contains(part), "{table}");
         }
-        let read: ChipReport = serde_json::from_str(&report.to_json()).unwrap();
-        assert_eq!(read, report);
+        let nothing = Trace(Value::Null).figures();
+        assert_eq!(nothing, Err("it does not say /baud".to_owned()));
     }
 
     #[test]

@@ -5,24 +5,21 @@
 //! ([`Group::measure`]), criterion times single rows ([`Group::open`]). What a round is, the
 //! scenario says; nothing here reads a clock.
 
-use core::fmt;
 use std::io::{IsTerminal, Write};
 
-use lager_rig::{Refused, heed_interrupts, interrupted};
+use lager_rig::{heed_interrupts, interrupted};
 
 use crate::error::BenchError;
-use crate::machine::Awake;
+use crate::machine::kept_awake;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
 use crate::slow;
 use crate::stats::{Quantiles, median};
 
 /// One line of a report before it is measured.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// See [`Row::name`].
-    pub name: &'static str,
-    /// See [`Row::variant`].
-    pub variant: &'static str,
+    /// See [`Row::label`].
+    pub label: &'static str,
     /// See [`Row::mode`].
     pub mode: Mode,
     /// The labels it is compared with, the most important first; each belongs to an entry of the
@@ -32,54 +29,16 @@ pub struct Entry {
 
 impl Entry {
     pub(crate) const fn new(
-        name: &'static str,
-        variant: &'static str,
+        label: &'static str,
         mode: Mode,
         against: &'static [&'static str],
     ) -> Self {
         Self {
-            name,
-            variant,
+            label,
             mode,
             against,
         }
     }
-
-    /// See [`Row::label`].
-    #[must_use]
-    pub fn label(&self) -> String {
-        if self.variant.is_empty() {
-            self.name.to_owned()
-        } else {
-            format!("{}/{}", self.name, self.variant)
-        }
-    }
-
-    /// A row of it without ratios.
-    pub(crate) fn row(&self, what: &str, regime: Regime, times: Option<Quantiles>) -> Row {
-        Row {
-            name: self.name.to_owned(),
-            variant: self.variant.to_owned(),
-            ..Row::of(what, self.mode, regime, times)
-        }
-    }
-}
-
-/// Those of `all` whose mode is wanted, and those that these are compared with.
-pub(crate) fn wanted<T>(
-    all: impl IntoIterator<Item = (Entry, T)>,
-    options: &Options,
-) -> Vec<(Entry, T)> {
-    let mut all: Vec<(Entry, T)> = all.into_iter().collect();
-    let asked = |entry: &Entry| options.modes.contains(&entry.mode);
-    let needed: Vec<&'static str> = all
-        .iter()
-        .filter(|(entry, _)| asked(entry))
-        .flat_map(|(entry, _)| entry.against)
-        .copied()
-        .collect();
-    all.retain(|(entry, _)| asked(entry) || needed.contains(&entry.label().as_str()));
-    all
 }
 
 /// What is open while a group is measured. Stays in the thread that opened it: its processes end
@@ -113,63 +72,35 @@ pub struct Group {
     pub entries: Vec<Entry>,
     /// Rounds of each entry in a run: quick, and in full.
     pub(crate) rounds: [usize; 2],
-    /// Samples of a round of each entry: quick, and in full.
-    pub(crate) samples: Vec<[usize; 2]>,
-    /// Without the right to real time it is left out, with a sentence.
-    pub(crate) is_real_time: bool,
-    pub(crate) open: Box<dyn Fn(Regime) -> Opened + Send>,
+    /// Samples of a round: quick, and in full.
+    pub(crate) samples: [usize; 2],
+    pub(crate) open: Box<dyn Fn() -> Opened + Send>,
 }
 
 impl Group {
-    /// A group whose rows all have as many rounds in a run and samples in a round: quick, and in
-    /// full. `open` is told the rows, each with what it stands for.
-    pub(crate) fn new<T: Clone + Send + 'static>(
-        what: impl Into<String>,
-        regime: Regime,
-        rows: Vec<(Entry, T)>,
-        rounds: [usize; 2],
-        samples: [usize; 2],
-        open: impl Fn(Regime, Vec<(Entry, T)>) -> Opened + Send + 'static,
-    ) -> Self {
-        Self {
-            what: what.into(),
-            regime,
-            samples: vec![samples; rows.len()],
-            entries: rows.iter().map(|(entry, _)| entry.clone()).collect(),
-            rounds,
-            is_real_time: false,
-            open: Box::new(move |regime| open(regime, rows.clone())),
-        }
-    }
-
     /// Starts what is needed to measure it in this thread.
     ///
     /// # Errors
     /// See [`BenchError`].
     pub fn open(&self) -> Opened {
         heed_interrupts();
-        (self.open)(self.regime)
+        (self.open)()
     }
 
     /// Measures every entry against the others, in a thread of its own: `options.runs` runs of some
-    /// rounds each, every entry once in each round, each round beginning with another one.
+    /// rounds each, every entry once in each round, each round beginning with another one. Without
+    /// the right to real time, what needs it is left out, with a sentence: the rest is worth having.
     ///
     /// # Errors
     /// A session failed, or somebody wants to stop.
     pub(crate) fn measure(self, options: &Options) -> Result<Vec<Row>, BenchError> {
-        std::thread::scope(|scope| {
-            std::thread::Builder::new()
-                .spawn_scoped(scope, move || self.measure_here(options))
-                .map_err(Refused::to_make("a thread"))?
-                .join()
-                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
-    }
-
-    fn measure_here(self, options: &Options) -> Result<Vec<Row>, BenchError> {
-        match self.open_and_measure(options) {
-            Err(error @ BenchError::RealTime { .. }) if self.is_real_time => {
-                // The rest is worth having without that right.
+        let measured = std::thread::scope(|scope| {
+            let measuring = scope.spawn(move || self.open_and_measure(options));
+            let joined = measuring.join();
+            joined.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        });
+        match measured {
+            Err(error @ BenchError::RealTime(_)) => {
                 eprintln!("{error}");
                 Ok(Vec::new())
             }
@@ -178,7 +109,7 @@ impl Group {
     }
 
     fn open_and_measure(&self, options: &Options) -> Result<Vec<Row>, BenchError> {
-        let _awake = Awake::during(self.regime)?;
+        let _awake = kept_awake(self.regime)?;
         let mut session = self.open()?;
         let mut rows = self.take_turns(options, &mut *session)?;
         session.finish(&mut rows)?;
@@ -208,10 +139,10 @@ impl Group {
                     }
                     let index = (place + turn) % entries.len();
                     let entry = &entries[index];
-                    let row = format!("{what} {} {regime}: {}", entry.mode, entry.label());
+                    let row = format!("{what} {} {regime}: {}", entry.mode, entry.label);
                     tell(&format!("{row}, run {} of {count}", run + 1));
                     slow::row(&row);
-                    samples[index].extend(session.round(index, self.samples[index][thorough])?);
+                    samples[index].extend(session.round(index, self.samples[thorough])?);
                 }
             }
             for (index, samples) in samples.iter_mut().enumerate() {
@@ -223,42 +154,20 @@ impl Group {
     }
 }
 
-impl fmt::Debug for Group {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter
-            .debug_struct("Group")
-            .field("what", &self.what)
-            .field("regime", &self.regime)
-            .field("entries", &self.entries)
-            .finish_non_exhaustive()
-    }
-}
-
 /// The rows of what was measured: `runs` holds each entry's runs, the same number of each.
 fn rows(what: &str, regime: Regime, entries: &[Entry], runs: &[Vec<Quantiles>]) -> Vec<Row> {
-    entries
-        .iter()
-        .zip(runs)
-        .filter_map(|(entry, own)| {
-            let over = Quantiles::over(own)?;
-            let ratios: Vec<Ratio> = entry
-                .against
-                .iter()
-                .filter_map(|label| {
-                    let other = entries.iter().position(|other| other.label() == **label)?;
-                    ratio(label, own, &runs[other])
-                })
-                .collect();
-            let first = ratios.first();
-            Some(Row {
-                ratio_to: first.map_or_else(String::new, |first| first.to.clone()),
-                ratio_p50: first.map_or(1.0, |first| first.p50),
-                ratio_p99: first.map_or(1.0, |first| first.p99),
-                ratios,
-                ..entry.row(what, regime, Some(over))
-            })
+    let row = |(entry, own): (&Entry, &Vec<Quantiles>)| {
+        let times = Quantiles::over(own)?;
+        let ratio_to = |label: &&str| {
+            let other = entries.iter().position(|other| other.label == *label)?;
+            ratio(label, own, &runs[other])
+        };
+        Some(Row {
+            ratios: entry.against.iter().filter_map(ratio_to).collect(),
+            ..Row::new(what, entry.label, entry.mode, regime, times)
         })
-        .collect()
+    };
+    entries.iter().zip(runs).filter_map(row).collect()
 }
 
 /// The median of the ratios of each run: what drifts from run to run cancels.
@@ -296,10 +205,9 @@ mod tests {
     use super::*;
 
     const ENTRIES: &[Entry] = &[
-        Entry::new("lager", "", Mode::Spin, &["iceoryx2/header"]),
-        Entry::new("iceoryx2", "header", Mode::Spin, &[]),
-        Entry::new("lager", "", Mode::Adaptive, &["iceoryx2/header"]),
-        Entry::new("pipe", "", Mode::Block, &[]),
+        Entry::new("lager", Mode::Spin, &["iceoryx2/header"]),
+        Entry::new("iceoryx2/header", Mode::Spin, &[]),
+        Entry::new("pipe", Mode::Block, &[]),
     ];
 
     /// What each round of an entry of [`ENTRIES`] yields.
@@ -317,9 +225,14 @@ mod tests {
         rounds: usize,
         round: impl FnMut(usize) -> Result<Vec<u64>, BenchError>,
     ) -> Result<Vec<Row>, BenchError> {
-        let rows: Vec<_> = entries.iter().map(|entry| (entry.clone(), ())).collect();
-        let open = |_, _| unreachable!("it is open");
-        let group = Group::new("hop", Regime::Plain, rows, [rounds; 2], [1; 2], open);
+        let group = Group {
+            what: "hop".to_owned(),
+            regime: Regime::Plain,
+            entries: entries.to_vec(),
+            rounds: [rounds; 2],
+            samples: [1; 2],
+            open: Box::new(|| unreachable!("it is open")),
+        };
         let options = Options {
             runs,
             ..Options::default()
@@ -328,25 +241,9 @@ mod tests {
     }
 
     #[test]
-    fn a_wanted_mode_brings_what_it_is_compared_with() {
-        let wanted = |modes: &[Mode]| {
-            let options = Options {
-                modes: modes.to_vec(),
-                ..Options::default()
-            };
-            let numbered = ENTRIES.iter().cloned().zip(0..);
-            let wanted = wanted(numbered, &options).into_iter();
-            wanted.map(|(_, number)| number).collect::<Vec<_>>()
-        };
-        assert_eq!(wanted(&[Mode::Adaptive]), [1, 2]);
-        assert_eq!(wanted(&[Mode::Block]), [3]);
-        assert_eq!(wanted(&Mode::ALL), [0, 1, 2, 3]);
-    }
-
-    #[test]
     fn rows_take_turns_and_each_round_begins_with_another() {
         let mut order = Vec::new();
-        measure(&ENTRIES[..3], 1, 3, |index| {
+        measure(ENTRIES, 1, 3, |index| {
             order.push(index);
             Ok(vec![1])
         })
@@ -365,17 +262,15 @@ mod tests {
             Ok(vec![own * drift; 100])
         })
         .unwrap();
-        assert_eq!(rows[0].ratio_to, "iceoryx2/header");
-        assert!((rows[0].ratio_p50 - 1.2).abs() < 1e-9, "{rows:?}");
-        assert_eq!((rows[0].n, rows[0].p50_ns), (300, 1200));
-        assert_eq!((rows[1].ratio_to.as_str(), rows[1].ratio_p50), ("", 1.0));
+        assert_eq!(rows[0].ratios[0].to, "iceoryx2/header");
+        assert!((rows[0].ratios[0].p50 - 1.2).abs() < 1e-9, "{rows:?}");
+        assert_eq!((rows[0].times.n, rows[0].times.p50_ns), (300, 1200));
+        assert_eq!(rows[1].ratios, []);
     }
 
     #[test]
     fn what_fails_in_a_round_ends_the_measurement() {
-        let failed = measure(ENTRIES, 1, 1, |_| {
-            Err(BenchError::NothingToMeasure("on purpose".to_owned()))
-        });
-        assert!(matches!(failed, Err(BenchError::NothingToMeasure(_))));
+        let failed = measure(ENTRIES, 1, 1, |_| Err(BenchError::Interrupted));
+        assert!(matches!(failed, Err(BenchError::Interrupted)));
     }
 }

@@ -15,104 +15,91 @@
 //! Rows called `hop` are half of the round trip, as fast as samples come back; `hop@full-rate` is
 //! one way at the same rate, `hop@10kHz` with a sample every 100 µs.
 
-mod contender;
-mod ours;
-mod processes;
+mod ends;
 
 use core::time::Duration;
-use std::os::fd::{AsRawFd, OwnedFd};
+use std::error::Error;
+use std::os::fd::OwnedFd;
 
-use lager_rig::Refused;
 use lager_rig::process::Main;
+use lager_rig::{Parent, Refused};
 use rustix::event::{EventfdFlags, eventfd};
+use rustix::pipe::pipe;
 
 use crate::baseline::stream;
 use crate::error::BenchError;
-use crate::group::{Entry, Group, wanted};
-use crate::pair::Pair;
+use crate::group::{Entry, Group};
+use crate::pair;
 use crate::report::{Mode, Options, Ratio, Regime, Row};
-use contender::Contender;
-use processes::{Job, Lanes, Lines, Timing};
+use ends::{HEADER, Job, ROWS};
 
 const SENDER: &str = "sender of the hop";
 const RECEIVER: &str = "receiver of the hop";
 
-pub(crate) const PROCESSES: &[(&str, Main)] =
-    &[(SENDER, processes::sender), (RECEIVER, processes::receiver)];
+pub(crate) const PROCESSES: &[(&str, Main)] = &[(SENDER, exchange), (RECEIVER, exchange)];
+
+fn exchange(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    pair::measure(parent, ends::round)
+}
 
 /// From one sample to the next when they come at 10 kHz.
 const PACE: Duration = Duration::from_micros(100);
 
-/// The groups of one regime.
+/// The groups of one regime: rows of one mode, and what they are compared with.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let mut groups = vec![group("hop", Timing::RoundTrip, regime, options)];
-    if options.modes.contains(&Mode::Adaptive) {
-        let full_rate = Timing::OneWay(Duration::ZERO);
-        groups.push(group("hop@full-rate", full_rate, regime, options));
-        groups.push(group("hop@10kHz", Timing::OneWay(PACE), regime, options));
-    }
-    groups
+    // The time from one sample to the next, where one way is timed; and the samples of a round, as
+    // many as take a fraction of a second.
+    [
+        ("hop", Mode::Spin, None, [5_000, 20_000]),
+        ("hop", Mode::Block, None, [500, 2_500]),
+        (
+            "hop@full-rate",
+            Mode::Adaptive,
+            Some(Duration::ZERO),
+            [5_000, 20_000],
+        ),
+        ("hop@10kHz", Mode::Adaptive, Some(PACE), [500, 2_000]),
+    ]
+    .into_iter()
+    .filter(|(_, mode, ..)| options.modes.contains(mode))
+    // On a shared core, whoever looks without pause keeps the sender from sending.
+    .filter(|(_, mode, ..)| regime != Regime::SameCore || *mode == Mode::Block)
+    .map(|(what, mode, gap, samples)| {
+        let takes_part =
+            |entry: &Entry| entry.mode == mode || (mode == Mode::Adaptive && entry.label == HEADER);
+        let numbered = ROWS.iter().enumerate();
+        let rows: Vec<_> = numbered
+            .filter(|(_, (entry, _))| takes_part(entry))
+            .map(|(row, (entry, _))| (*entry, Job { row, gap }))
+            .collect();
+        Group {
+            what: what.to_owned(),
+            regime,
+            entries: rows.iter().map(|(entry, _)| *entry).collect(),
+            rounds: pair::ROUNDS,
+            samples,
+            open: Box::new(move || {
+                // Both processes inherit the lines when they start.
+                pair::open(regime, [SENDER, RECEIVER], &lines()?, rows.clone())
+            }),
+        }
+    })
+    .collect()
 }
 
-fn group(what: &str, timing: Timing, regime: Regime, options: &Options) -> Group {
-    let takes_part = |(entry, contender): &(Entry, Contender)| {
-        let is_timed_so = match timing {
-            Timing::RoundTrip => entry.mode != Mode::Adaptive,
-            Timing::OneWay(_) => matches!(
-                contender,
-                Contender::Lager(Mode::Spin | Mode::Adaptive) | Contender::IceoryxHeader
-            ),
-        };
-        // On a shared core, whoever looks without pause keeps the sender from sending.
-        is_timed_so && (regime != Regime::SameCore || entry.mode == Mode::Block)
-    };
-    let working = Contender::ALL
-        .iter()
-        .filter(|one| takes_part(one))
-        .cloned()
-        .map(|(entry, contender)| (entry, Job { contender, timing }));
-    let rows = wanted(working, options);
-    let samples = rows
-        .iter()
-        .map(|(entry, _)| samples(entry.mode, timing))
-        .collect();
-    let group = Group::new(what, regime, rows, [2, 4], [0; 2], move |regime, rows| {
-        let lines = lines()?;
-        // Both processes inherit the lines when they start.
-        let numbers = lines
-            .each_ref()
-            .map(|pair| pair.each_ref().map(OwnedFd::as_raw_fd));
-        let ends = [SENDER, RECEIVER];
-        let pair = Pair::<Lanes, _>::start(regime, ends, &numbers, rows, timing.gap())?;
-        Ok(Box::new(pair))
-    });
-    Group { samples, ..group }
-}
-
-/// Samples of a round: as many as take a fraction of a second.
-fn samples(mode: Mode, timing: Timing) -> [usize; 2] {
-    match (mode, timing.gap().is_zero()) {
-        (Mode::Block, _) => [500, 2_500],
-        (_, false) => [500, 2_000],
-        (_, true) => [5_000, 20_000],
-    }
-}
-
-fn lines() -> Result<Lines<OwnedFd>, BenchError> {
-    let pipe = || {
-        let (read, write) = stream::a_pipe().map_err(Refused::to_make("a pipe"))?;
-        Ok::<_, Refused>([read, write])
-    };
+/// What goes through the kernel, in the order that `ends` takes it in.
+fn lines() -> Result<[[OwnedFd; 2]; 5], BenchError> {
+    let a_pipe = || pipe().map_err(Refused::to_make("a pipe"));
     // Without CLOEXEC: the processes inherit it.
     let bell = || eventfd(0, EventfdFlags::empty()).map_err(Refused::to_make("an eventfd"));
     let uds = stream::datagrams().map_err(Refused::to_make("a Unix socket"))?;
     let tcp = stream::loopback().map_err(Refused::to_make("a TCP connection over loopback"))?;
     Ok([
-        pipe()?,
-        pipe()?,
+        a_pipe()?.into(),
+        a_pipe()?.into(),
         [bell()?, bell()?],
-        [uds.0, uds.1],
-        [tcp.0, tcp.1],
+        uds.into(),
+        tcp.into(),
     ])
 }
 
@@ -138,7 +125,7 @@ pub(crate) fn beside_its_parts(rows: &mut [Row]) {
     let ratio = |figure: fn(&Row) -> u64| {
         figure(&rows[hop]) as f64 / (figure(&rows[futex]) + figure(&rows[polled])) as f64
     };
-    let [p50, p99] = [ratio(|row| row.p50_ns), ratio(|row| row.p99_ns)];
+    let [p50, p99] = [ratio(|row| row.times.p50_ns), ratio(|row| row.times.p99_ns)];
     rows[hop].ratios.push(Ratio {
         to: ITS_PARTS.to_owned(),
         p50,

@@ -14,33 +14,39 @@
 mod baseline;
 pub mod chip;
 pub mod error;
-mod fanout;
 mod group;
 mod hop;
 pub mod machine;
-mod names;
 mod pair;
 mod path;
-mod processes;
+mod publish;
 pub mod report;
-mod ring;
 mod sample;
 mod scenario;
 pub mod slow;
-mod stats;
+pub mod stats;
 pub mod steps;
 pub mod times;
-mod turns;
 
 pub use error::BenchError;
 pub use group::{Entry, Group, Opened, Session};
 pub use lager_rig::{Domain, heed_interrupts, interrupted};
-pub use names::UnknownName;
 pub use path::may_have_real_time;
-pub use processes::run_if_asked;
 pub use report::{Mode, Options, Ratio, Regime, Report, Row};
 pub use scenario::Scenario;
-pub use stats::median;
+pub use stats::{Quantiles, median};
 
 /// What the folders of measurements begin with.
 pub const FAMILY: &str = "lager-bench";
+
+/// If this process was started as one of a scenario's, is that and ends; otherwise returns at once.
+/// To be called first thing in `main` of every executable that measures.
+pub fn run_if_asked() {
+    lager_rig::process::run_if_asked(&[
+        machine::PROCESSES,
+        hop::PROCESSES,
+        publish::PROCESSES,
+        path::PROCESSES,
+        path::FLOOR_PROCESSES,
+    ]);
+}

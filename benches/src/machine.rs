@@ -1,16 +1,14 @@
-//! The machine: what it is, its cores, and the processes that keep cores from halting.
+//! The machine: what it is, which cores a scenario runs on, and the processes that keep cores from
+//! halting.
 //!
 //! It is apart because every scenario binds its processes to cores and says on what machine it ran.
 //! It never changes anything for other processes.
 
-use core::marker::PhantomData;
 use std::error::Error;
 
 use lager_rig::process::Main;
-use lager_rig::schedule::schedule;
+use lager_rig::schedule::{pin, schedule, usable_cores};
 use lager_rig::{Parent, Process, Refused};
-use rustix::io::Errno;
-use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
 use crate::error::BenchError;
 use crate::report::Regime;
@@ -50,109 +48,30 @@ fn processor_of(cpuinfo: &str) -> Option<String> {
     })
 }
 
-/// The cores this process may use, in ascending order.
-#[must_use]
-pub fn usable_cores() -> Vec<usize> {
-    let Ok(set) = sched_getaffinity(None) else {
-        return Vec::new();
-    };
-    (0..CpuSet::MAX_CPU)
-        .filter(|core| set.is_set(*core))
-        .collect()
-}
-
 /// Where the first and the second process of a scenario run: on one core for
 /// [`Regime::SameCore`], on one each otherwise.
-///
-/// # Errors
-/// There are too few cores.
-pub fn cores_for(regime: Regime) -> Result<(usize, usize), BenchError> {
+pub(crate) fn cores_for(regime: Regime) -> Result<(usize, usize), BenchError> {
     let cores = usable_cores();
     let needed = if regime == Regime::SameCore { 1 } else { 2 };
     match (regime, cores.as_slice()) {
         (Regime::SameCore, [.., last]) => Ok((*last, *last)),
         (Regime::Plain | Regime::NoHalt, [first, second, ..]) => Ok((*first, *second)),
-        _ => Err(BenchError::TooFewCores {
-            needed,
-            found: cores.len(),
-        }),
+        _ => Err(BenchError::TooFewCores(needed, cores.len())),
     }
 }
 
-/// Binds the calling thread to `core`.
-///
-/// # Errors
-/// The kernel refuses.
-pub fn pin(core: usize) -> Result<(), BenchError> {
-    let mut set = CpuSet::new();
-    if core < CpuSet::MAX_CPU {
-        set.set(core);
+/// The processes that keep the cores from halting as long as they live, if `regime` asks for it.
+pub(crate) fn kept_awake(regime: Regime) -> Result<Vec<Process>, BenchError> {
+    let mut cores = usable_cores();
+    if regime != Regime::NoHalt {
+        cores.clear();
     }
-    sched_setaffinity(None, &set).map_err(refused(core))
-}
-
-fn refused(core: usize) -> impl FnOnce(Errno) -> BenchError {
-    move |error| BenchError::Affinity {
-        core,
-        detail: error.to_string(),
-    }
-}
-
-/// The thread that made this is bound to a core as long as this lives; stays in that thread.
-#[derive(Debug)]
-pub(crate) struct Bound {
-    before: CpuSet,
-    _in_its_thread: PhantomData<*const ()>,
-}
-
-impl Bound {
-    /// Binds the calling thread to `core`.
-    pub(crate) fn to(core: usize) -> Result<Self, BenchError> {
-        let before = sched_getaffinity(None).map_err(refused(core))?;
-        pin(core)?;
-        Ok(Self {
-            before,
-            _in_its_thread: PhantomData,
-        })
-    }
-}
-
-impl Drop for Bound {
-    fn drop(&mut self) {
-        // Refused only if the cores have been taken away meanwhile, and then nothing is to be done.
-        let _ = sched_setaffinity(None, &self.before);
-    }
-}
-
-/// Processes that keep cores from halting, for as long as this lives.
-#[derive(Debug)]
-pub struct Awake {
-    _spinners: Vec<Process>,
-}
-
-impl Awake {
-    /// Keeps the cores from halting if `regime` asks for it.
-    ///
-    /// # Errors
-    /// The processes cannot be started, bound, or given the lowest priority.
-    pub fn during(regime: Regime) -> Result<Self, BenchError> {
-        let cores = if regime == Regime::NoHalt {
-            usable_cores()
-        } else {
-            Vec::new()
-        };
-        let spinners = cores
-            .into_iter()
-            .map(|core| {
-                let mut spinner = Process::start(SPINNER)?;
-                let () = spinner.ask(&core)?;
-                Ok(spinner)
-            })
-            .collect::<Result<_, BenchError>>()?;
-        Ok(Self {
-            _spinners: spinners,
-        })
-    }
+    let started = cores.into_iter().map(|core| {
+        let mut spinner = Process::start(SPINNER)?;
+        let () = spinner.ask(&core)?;
+        Ok(spinner)
+    });
+    started.collect()
 }
 
 /// Runs whenever nothing else wants the core, until it is killed.
@@ -161,10 +80,7 @@ impl Awake {
 /// 250 Hz, also against a process that yields it for a moment. An adaptive receiver yields every
 /// 4 us (`lager_ports::Waiter`), and lost its core to this process until then.
 fn keep_from_halting(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(core) = parent.hear::<usize>()? else {
-        return Ok(());
-    };
-    pin(core)?;
+    pin(parent.told()?)?;
     schedule(libc::SCHED_IDLE, 0).map_err(Refused::to_make("a process of the lowest priority"))?;
     parent.say(&())?;
     loop {
@@ -184,27 +100,6 @@ mod tests {
         let arm = "processor\t: 0\nCPU part\t: 0xd08\n\nModel\t\t: Raspberry Pi 4 Model B\n";
         assert_eq!(processor_of(arm).as_deref(), Some("Raspberry Pi 4 Model B"));
         assert_eq!(processor_of(""), None);
-    }
-
-    #[test]
-    fn a_bound_thread_is_free_again_afterwards() {
-        let cores = usable_cores();
-        let last = *cores.last().unwrap();
-        let seen = std::thread::spawn(move || {
-            let bound = Bound::to(last).unwrap();
-            let meanwhile = usable_cores();
-            drop(bound);
-            (meanwhile, usable_cores())
-        });
-        assert_eq!(seen.join().unwrap(), (vec![last], cores));
-    }
-
-    #[test]
-    fn a_core_that_is_not_there_is_refused() {
-        let refused = std::thread::spawn(|| pin(CpuSet::MAX_CPU + 1))
-            .join()
-            .unwrap();
-        assert!(matches!(refused, Err(BenchError::Affinity { .. })));
     }
 
     #[test]

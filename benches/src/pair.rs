@@ -11,44 +11,55 @@
 
 use core::time::Duration;
 use std::error::Error;
-use std::os::fd::RawFd;
+use std::os::fd::{AsRawFd, OwnedFd, RawFd};
 use std::path::PathBuf;
 
 use lager_ports::{Bus, BusConfig};
-use lager_rig::{Barrier, Domain, Parent, Process, Shareable, Shared, bus_at};
+use lager_rig::schedule::pin;
+use lager_rig::{Barrier, Counter, Domain, Parent, Process, Shareable, Shared, bus_at, inherit};
 use lager_topics::Role;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::baseline::Fault;
-use crate::error::{BenchError, no_bus};
-use crate::group::{Entry, Session};
+use crate::baseline::LIMIT;
+use crate::baseline::memory::Lane;
+use crate::error::{BenchError, Fault, no_bus};
+use crate::group::{Entry, Opened, Session};
 use crate::machine;
 use crate::report::Regime;
 use crate::slow;
 
+/// Rounds of each row in a run: quick, and in full.
+pub(crate) const ROUNDS: [usize; 2] = [2, 4];
+
 /// What both processes see without a bus.
 #[derive(Debug)]
 #[repr(C)]
-struct Memory<M> {
+pub(crate) struct Memory {
     barrier: Barrier,
-    more: M,
+    /// What each of the two writes into.
+    pub(crate) lanes: [Lane<8>; 2],
+    /// The sample that the readers are ready for: they have all that came before.
+    pub(crate) ready: Counter,
+    /// The last sample that the writer has published.
+    pub(crate) published: Counter,
 }
 
-// SAFETY: a barrier is shareable, as is what is beside it.
+// SAFETY: atomics only, and zeros are valid.
 #[allow(unsafe_code)]
-unsafe impl<M: Shareable> Shareable for Memory<M> {}
+unsafe impl Shareable for Memory {}
 
 /// What a process is told once.
 #[derive(Serialize, Deserialize)]
-struct Setup<S> {
+struct Setup {
+    is_first: bool,
     /// The core to stay on.
     core: usize,
     /// The bus's folder.
     folder: PathBuf,
     /// The number of the memory.
     memory: RawFd,
-    more: S,
+    lines: Vec<[RawFd; 2]>,
 }
 
 /// What both processes are told for each round.
@@ -70,7 +81,7 @@ pub(crate) struct Round<X> {
 
 impl<X> Round<X> {
     /// The numbers of all samples, unique within a measurement.
-    pub(crate) fn all(&self) -> impl Iterator<Item = u64> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = u64> + use<X> {
         let base = u64::from(self.number) << 32;
         (1..=u64::from(self.warm_up) + u64::from(self.samples)).map(move |sample| base + sample)
     }
@@ -81,72 +92,70 @@ impl<X> Round<X> {
         times
     }
 
-    /// That sample `expected` did not come.
-    pub(crate) fn failed(&self, expected: u64, fault: Fault) -> BenchError {
-        fault.of(&self.contender, expected)
-    }
-
-    /// That sample `got` came in the place of `expected`.
-    pub(crate) fn wrong(&self, expected: u64, got: u64) -> BenchError {
-        BenchError::WrongSample {
+    /// What is wrong with sample `number`.
+    pub(crate) fn failed(&self, number: u64, fault: Fault) -> BenchError {
+        let in_round = |number: u64| number & u64::from(u32::MAX);
+        BenchError::Failed {
             contender: self.contender.clone(),
-            expected: expected & u64::from(u32::MAX),
-            got: got & u64::from(u32::MAX),
+            sample: in_round(number),
+            fault: match fault {
+                Fault::Wrong(got) => Fault::Wrong(in_round(got)),
+                other => other,
+            },
         }
     }
 }
 
 /// Both processes, and what they measure for each row. Dropped in this order: nobody is on the bus
 /// when it is swept.
-pub(crate) struct Pair<M: Shareable, X> {
+struct Pair<X> {
     first: Process,
     second: Process,
-    _memory: Shared<Memory<M>>,
+    _memory: Shared<Memory>,
     _domain: Domain,
     rows: Vec<(Entry, X)>,
-    gap: Duration,
     rounds: u32,
 }
 
-impl<M: Shareable, X> Pair<M, X> {
-    /// Starts both, and tells them `more`. They measure `rows`, with `gap` from one sample to the
-    /// next.
-    pub(crate) fn start(
-        regime: Regime,
-        [first, second]: [&str; 2],
-        more: &impl Serialize,
-        rows: Vec<(Entry, X)>,
-        gap: Duration,
-    ) -> Result<Self, BenchError> {
-        let cores = machine::cores_for(regime)?;
-        let domain = Domain::new(crate::FAMILY)?;
-        let memory = Shared::<Memory<M>>::new()?;
-        let start = |name, core| {
-            let mut process = Process::start(name)?;
-            let () = process.ask(&Setup {
-                core,
-                folder: domain.folder().to_owned(),
-                memory: memory.number(),
-                more,
-            })?;
-            Ok::<Process, BenchError>(process)
-        };
-        Ok(Self {
-            first: start(first, cores.0)?,
-            second: start(second, cores.1)?,
-            _memory: memory,
-            _domain: domain,
-            rows,
-            gap,
-            rounds: 0,
-        })
-    }
+/// Starts both processes, with `lines` that they inherit, to measure `rows`.
+pub(crate) fn open<X: Serialize + 'static>(
+    regime: Regime,
+    [first, second]: [&str; 2],
+    lines: &[[OwnedFd; 2]],
+    rows: Vec<(Entry, X)>,
+) -> Opened {
+    let cores = machine::cores_for(regime)?;
+    let domain = Domain::new(crate::FAMILY)?;
+    let memory = Shared::<Memory>::new()?;
+    let start = |name, is_first, core| {
+        let mut process = Process::start(name)?;
+        let numbers = |line: &[OwnedFd; 2]| line.each_ref().map(OwnedFd::as_raw_fd);
+        let () = process.ask(&Setup {
+            is_first,
+            core,
+            folder: domain.folder().to_owned(),
+            memory: memory.number(),
+            lines: lines.iter().map(numbers).collect(),
+        })?;
+        Ok::<Process, BenchError>(process)
+    };
+    Ok(Box::new(Pair {
+        first: start(first, true, cores.0)?,
+        second: start(second, false, cores.1)?,
+        _memory: memory,
+        _domain: domain,
+        rows,
+        rounds: 0,
+    }))
 }
 
-impl<M: Shareable, X: Serialize> Session for Pair<M, X> {
+impl<X: Serialize> Session for Pair<X> {
     /// The first process's times. If the second has any, they are when it received what the first
     /// sent at its times.
     fn round(&mut self, index: usize, samples: usize) -> Result<Vec<u64>, BenchError> {
+        // Both give up by themselves when nothing comes; this is for those that cannot, because
+        // a bare `read` has no time-out: ten times what the slowest machine should need.
+        const SAMPLE: Duration = Duration::from_millis(1);
         self.rounds += 1;
         let (entry, what) = &self.rows[index];
         let samples = u32::try_from(samples).unwrap_or(u32::MAX);
@@ -155,13 +164,10 @@ impl<M: Shareable, X: Serialize> Session for Pair<M, X> {
             warm_up: samples / 10 + 10,
             samples,
             spin_ns: slow::spin_ns(),
-            contender: format!("{} {}", entry.label(), entry.mode),
+            contender: format!("{} {}", entry.label, entry.mode),
             what,
         };
-        // Both give up by themselves when nothing comes; this is for those that cannot, because
-        // a bare `read` has no time-out: ten times what the slowest machine should need.
-        let limit = Duration::from_secs(60)
-            + (self.gap + Duration::from_micros(500)) * (round.warm_up + samples);
+        let limit = Duration::from_secs(60) + SAMPLE * (round.warm_up + samples);
         self.first.tell(&round);
         self.second.tell(&round);
         let (sent, received): (Vec<u64>, Vec<u64>) =
@@ -176,46 +182,42 @@ impl<M: Shareable, X: Serialize> Session for Pair<M, X> {
     }
 }
 
-/// One of the two: takes its place, and measures rounds as long as the parent wants any. `open`
-/// makes what it has at hand in all of them.
-pub(crate) fn measure<M, S, X, C>(
+/// One of the two: takes its place, and measures rounds as long as the parent wants any.
+pub(crate) fn measure<X: DeserializeOwned>(
     parent: &mut Parent,
-    open: impl FnOnce(Side<M, S>) -> C,
-    round: impl Fn(&C, &Round<X>) -> Result<Vec<u64>, BenchError>,
-) -> Result<(), Box<dyn Error>>
-where
-    M: Shareable,
-    S: DeserializeOwned,
-    X: DeserializeOwned,
-{
-    let Some(setup) = parent.hear::<Setup<S>>()? else {
-        return Ok(());
-    };
-    machine::pin(setup.core)?;
-    let at_hand = open(Side {
-        memory: Shared::inherited(setup.memory)?,
+    round: fn(&Side, &Round<X>) -> Result<Vec<u64>, BenchError>,
+) -> Result<(), Box<dyn Error>> {
+    let setup: Setup = parent.told()?;
+    pin(setup.core)?;
+    let side = Side {
+        is_first: setup.is_first,
+        shared: Shared::inherited(setup.memory)?,
         config: bus_at(setup.folder),
-        more: setup.more,
-    });
+        lines: setup.lines.iter().map(|line| line.map(inherit)).collect(),
+    };
     parent.say(&())?;
     while let Some(told) = parent.hear::<Round<X>>()? {
         slow::spins_for(told.spin_ns);
-        parent.say(&round(&at_hand, &told)?)?;
+        parent.say(&round(&side, &told)?)?;
     }
     Ok(())
 }
 
 /// What one of the two has at hand all the time.
-pub(crate) struct Side<M: Shareable, S> {
-    memory: Shared<Memory<M>>,
+pub(crate) struct Side {
+    pub(crate) is_first: bool,
+    pub(crate) shared: Shared<Memory>,
     pub(crate) config: BusConfig,
-    pub(crate) more: S,
+    pub(crate) lines: Vec<[OwnedFd; 2]>,
 }
 
-impl<M: Shareable, S> Side<M, S> {
-    /// What both see without a bus.
-    pub(crate) fn memory(&self) -> &M {
-        &self.memory.more
+impl Side {
+    /// Waits until `counter` is at sample `number`.
+    pub(crate) fn wait(&self, counter: &Counter, number: u64) -> Result<(), Fault> {
+        match counter.becomes(number, LIMIT) {
+            true => Ok(()),
+            false => Err(Fault::Silent(LIMIT)),
+        }
     }
 
     pub(crate) fn bus(&self, role: Role) -> Result<Bus, BenchError> {
@@ -229,9 +231,9 @@ impl<M: Shareable, S> Side<M, S> {
         work: impl FnOnce() -> Result<T, BenchError>,
     ) -> Result<T, BenchError> {
         const LIMIT: Duration = Duration::from_secs(15);
-        let meet = |count| match self.memory.barrier.pass(2, count, LIMIT) {
+        let meet = |count| match self.shared.barrier.pass(2, count, LIMIT) {
             true => Ok(()),
-            false => Err(BenchError::Alone { limit: LIMIT }),
+            false => Err(BenchError::Alone(LIMIT)),
         };
         meet(2 * round.number - 1)?;
         let done = work()?;

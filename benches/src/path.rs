@@ -16,7 +16,6 @@
 //! | `path` | `lager/adaptive` | `lager/block`; both with the processor time of both services |
 //! | `path@observed` | `lager/8 observers`, `lager/64 observers` | `lager/alone`; all SCHED_FIFO |
 //! | `path-overtaken` | the samples of each `lager` row whose command was overtaken | |
-//! | `path-stages` | each stage of `lager`, as the robot itself publishes it | |
 //!
 //! An observer is a process of its own on a node of its own, subscribed to `sensor/line` and
 //! `steering/command`, that reads all that has come ten times a second.
@@ -25,21 +24,20 @@
 //! the floor's middle to the second; in the regime of one core all are on that one.
 
 mod floor;
-mod pace;
 mod processes;
 mod robot;
 mod services;
-mod stages;
 mod turn;
 
+use lager_rig::schedule::{Bound, NoRealTime, Place, RealTime};
+
 use crate::error::BenchError;
-use crate::group::{Entry, Group, Session, wanted};
-use crate::machine::{Bound, cores_for};
+use crate::group::{Entry, Group, Session};
+use crate::machine::cores_for;
 use crate::report::{Mode, Options, Regime, Row};
 use crate::stats::Quantiles;
 use floor::Floor;
-use robot::Robot;
-use services::{Place, RealTime};
+use robot::{Places, Robot};
 use turn::{Chain, TURN, turn};
 
 pub(crate) use floor::PROCESSES as FLOOR_PROCESSES;
@@ -48,37 +46,29 @@ pub(crate) use services::PROCESSES;
 /// Turns of each chain in one run: quick, and in full.
 const TURNS: [usize; 2] = [2, 8];
 
-/// Frames of somewhat more than a second.
-const A_SECOND: usize = 1_100;
-
 /// SCHED_FIFO priorities: the boards are hardware, so nothing of the robot comes before them.
 const SERVICES: i32 = 40;
 const BOARDS: i32 = 50;
 
 /// What is measured with nobody watching, and the number of observers: 0.
 const ALONE: [(Entry, usize); 3] = [
-    (Entry::new("lager", "block", Mode::Block, &["floor"]), 0),
-    (Entry::new("floor", "", Mode::Block, &[]), 0),
+    (Entry::new("lager/block", Mode::Block, &["floor"]), 0),
+    (Entry::new("floor", Mode::Block, &[]), 0),
     (
-        Entry::new(
-            "lager",
-            "adaptive",
-            Mode::Adaptive,
-            &["lager/block", "floor"],
-        ),
+        Entry::new("lager/adaptive", Mode::Adaptive, &["lager/block", "floor"]),
         0,
     ),
 ];
 
 /// The same with so many observers.
 const OBSERVED: [(Entry, usize); 3] = [
-    (Entry::new("lager", "alone", Mode::Block, &[]), 0),
+    (Entry::new("lager/alone", Mode::Block, &[]), 0),
     (
-        Entry::new("lager", "8 observers", Mode::Block, &["lager/alone"]),
+        Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
         8,
     ),
     (
-        Entry::new("lager", "64 observers", Mode::Block, &["lager/alone"]),
+        Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
         64,
     ),
 ];
@@ -86,24 +76,26 @@ const OBSERVED: [(Entry, usize); 3] = [
 /// The groups of one regime. A spinning path is not measured: bridge and logic would keep two cores,
 /// and the boards need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let mut options = options.clone();
-    if regime == Regime::SameCore {
-        // Nobody spins on the only core that the others have.
-        options.modes.retain(|mode| *mode != Mode::Adaptive);
-    }
-    let group = |what: &str, rows: [(Entry, usize); 3], is_real_time: bool| {
-        let rows = wanted(rows, &options);
-        let group = Group::new(what, regime, rows, TURNS, [TURN; 2], move |regime, rows| {
-            Ok(Box::new(Chains::start(regime, &rows, is_real_time)?))
-        });
+    let group = |what: &str, rows: &[(Entry, usize)], is_real_time: bool| {
+        let rows = rows.to_vec();
         Group {
-            is_real_time,
-            ..group
+            what: what.to_owned(),
+            regime,
+            entries: rows.iter().map(|(entry, _)| *entry).collect(),
+            rounds: TURNS,
+            samples: [TURN; 2],
+            open: Box::new(move || Ok(Box::new(Chains::start(regime, &rows, is_real_time)?))),
         }
     };
-    let mut groups = vec![group("path", ALONE, false)];
-    if regime != Regime::SameCore {
-        groups.push(group("path@observed", OBSERVED, true));
+    let wants = |mode| options.modes.contains(&mode);
+    // Nobody spins on the only core that the others have.
+    let adapts = wants(Mode::Adaptive) && regime != Regime::SameCore;
+    let mut groups = Vec::new();
+    if adapts || wants(Mode::Block) {
+        groups.push(group("path", &ALONE[..if adapts { 3 } else { 2 }], false));
+    }
+    if wants(Mode::Block) && regime != Regime::SameCore {
+        groups.push(group("path@observed", &OBSERVED, true));
     }
     groups
 }
@@ -112,8 +104,7 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
 struct Chains {
     chains: Vec<Box<dyn Chain>>,
     regime: Regime,
-    /// The robots publish where the time goes; it is asked of those that are not in real time.
-    tells_stages: bool,
+    is_real_time: bool,
     _bound: Bound,
 }
 
@@ -125,34 +116,31 @@ impl Chains {
         rows: &[(Entry, usize)],
         is_real_time: bool,
     ) -> Result<Self, BenchError> {
-        let (ends, logic) = cores_for(regime)?;
-        let [ends, logic] = [ends, logic].map(|core| Place {
+        let (first, second) = cores_for(regime)?;
+        let [ends, logic] = [first, second].map(|core| Place {
             core: Some(core),
             priority: is_real_time.then_some(SERVICES),
         });
-        let start = |(entry, observers): &(Entry, usize)| -> Result<Box<dyn Chain>, BenchError> {
-            if entry.name == "floor" {
-                return Ok(Box::new(Floor::start(ends, logic)?));
-            }
-            let mut robot = Robot::start(&entry.label(), entry.mode, ends, logic)?;
-            robot.observed_by(*observers)?;
-            if is_real_time {
-                robot.with_boards_at(BOARDS)?;
-            }
-            Ok(Box::new(robot))
+        let places = Places {
+            bridge: ends,
+            logic,
+            boards: is_real_time.then_some(BOARDS),
         };
-        let mut chains = Vec::new();
-        for row in rows {
-            let mut chain = start(row)?;
+        let mut chains: Vec<Box<dyn Chain>> = Vec::new();
+        for (entry, observers) in rows {
+            let mut chain: Box<dyn Chain> = match entry.label {
+                "floor" => Box::new(Floor::start(ends, logic)?),
+                label => Box::new(Robot::start(label, entry.mode, places, *observers)?),
+            };
             chain.processes().rest();
             chains.push(chain);
         }
         Ok(Self {
             chains,
             regime,
-            tells_stages: !is_real_time,
+            is_real_time,
             // Last of all: what a thread starts inherits its core.
-            _bound: Bound::to(cores_for(regime)?.0)?,
+            _bound: Bound::to(first)?,
         })
     }
 }
@@ -162,32 +150,18 @@ impl Session for Chains {
         turn(&mut *self.chains[index], samples)
     }
 
-    /// Processor time, frames that were overtaken, and the stages of the path.
+    /// Processor time, unless it is real time, and how many of a robot's frames were overtaken; all
+    /// 0 if none was.
     fn finish(&mut self, rows: &mut Vec<Row>) -> Result<(), BenchError> {
         let mut more = Vec::new();
         for (row, chain) in rows.iter_mut().zip(&mut self.chains) {
-            if self.tells_stages {
+            if !self.is_real_time {
                 row.cpu_percent = chain.processes().cpu_percent();
             }
-            if row.name == "floor" {
-                continue;
-            }
-            // How many of a robot's frames were overtaken; all 0 if none was.
-            let times = Quantiles::of(&mut chain.overtaken().to_vec());
-            more.push(Row {
-                name: row.name.clone(),
-                variant: row.variant.clone(),
-                ..Row::of("path-overtaken", row.mode, self.regime, times)
-            });
-            if !self.tells_stages {
-                continue;
-            }
-            // Counts are published once a second.
-            turn(&mut **chain, A_SECOND)?;
-            let before = chain.counted()?;
-            turn(&mut **chain, A_SECOND)?;
-            if let Some((before, after)) = before.zip(chain.counted()?) {
-                more.extend(stages::rows(&before, &after, self.regime, row.mode));
+            if let Some(overtaken) = chain.overtaken() {
+                let times = Quantiles::of(&mut overtaken.to_vec()).unwrap_or_default();
+                let what = "path-overtaken";
+                more.push(Row::new(what, &row.label(), row.mode, self.regime, times));
             }
         }
         rows.extend(more);
@@ -199,7 +173,7 @@ impl Session for Chains {
 ///
 /// # Errors
 /// It may not; the sentence says what to do.
-pub fn may_have_real_time() -> Result<(), BenchError> {
+pub fn may_have_real_time() -> Result<(), NoRealTime> {
     // In a thread of its own, which ends with what it got.
     std::thread::spawn(|| RealTime::begin(BOARDS).map(drop))
         .join()

@@ -1,38 +1,54 @@
-//! What a measurement yields: rows with quantiles and ratios, as a table and as JSON.
+//! What a measurement yields: rows with quantiles and ratios, as a table and as JSON; and the
+//! choices of what is measured.
 //!
 //! Nothing is measured or decided here; a goal is held by the guard, not by a report.
 
 use core::fmt;
 
+use clap::ValueEnum;
 use lager_ports::Policy;
 use serde::{Deserialize, Serialize};
 
-use crate::names::named;
 use crate::stats::Quantiles;
 
-named! {
-    /// How the receiver waits.
-    pub enum Mode {
-        /// It looks without pause.
-        Spin = "spin",
-        /// It looks while samples come fast and sleeps when they do not.
-        Adaptive = "adaptive",
-        /// It sleeps until it is woken.
-        Block = "block",
-    }
+/// How the receiver waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// It looks without pause.
+    Spin,
+    /// It looks while samples come fast and sleeps when they do not.
+    Adaptive,
+    /// It sleeps until it is woken.
+    Block,
 }
 
-named! {
-    /// Under which circumstances the two processes run.
-    pub enum Regime {
-        /// A core each, and an idle core may halt: a sleeping receiver pays for leaving the halt.
-        Plain = "plain",
-        /// Both on one core: the cost of the software alone.
-        SameCore = "same-core",
-        /// A core each, kept from halting by a process that runs only when nothing else does.
-        NoHalt = "no-halt",
-    }
+/// Under which circumstances the two processes run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Regime {
+    /// A core each, and an idle core may halt: a sleeping receiver pays for leaving the halt.
+    Plain,
+    /// Both on one core: the cost of the software alone.
+    SameCore,
+    /// A core each, kept from halting by a process that runs only when nothing else does.
+    NoHalt,
 }
+
+/// Shows choices by the names that they have on the command line, in limits and in JSON.
+macro_rules! shown_by_name {
+    ($($choice:ty),*) => {$(
+        impl core::fmt::Display for $choice {
+            fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                let name = clap::ValueEnum::to_possible_value(self).expect("none is hidden");
+                formatter.pad(name.get_name())
+            }
+        }
+    )*};
+}
+pub(crate) use shown_by_name;
+
+shown_by_name!(Mode, Regime);
 
 impl Mode {
     /// What a waiter of the typed ports is told.
@@ -64,8 +80,8 @@ impl Default for Options {
         Self {
             runs: 5,
             quick: false,
-            modes: Mode::ALL.to_vec(),
-            regimes: Regime::ALL.to_vec(),
+            modes: Mode::value_variants().to_vec(),
+            regimes: Regime::value_variants().to_vec(),
         }
     }
 }
@@ -84,7 +100,7 @@ pub struct Ratio {
     pub runs: Vec<[f64; 2]>,
 }
 
-/// What one contender showed in one mode and regime. Times are in ns.
+/// What one contender showed in one mode and regime.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// What carried the samples: `lager`, `iceoryx2`, `cacheline`, `futex`, `eventfd`, `pipe`,
@@ -99,21 +115,10 @@ pub struct Row {
     pub mode: Mode,
     /// Under which circumstances.
     pub regime: Regime,
-    /// Samples of all runs.
-    pub n: u64,
-    /// The median over the runs of each run's median.
-    pub p50_ns: u64,
-    /// The median over the runs of the time that 99 % of a run's samples kept.
-    pub p99_ns: u64,
-    /// The median over the runs of the time that 99.9 % of a run's samples kept.
-    pub p999_ns: u64,
-    /// What [`Row::ratio_p50`] and [`Row::ratio_p99`] compare with; empty if nothing does.
-    pub ratio_to: String,
-    /// The first of [`Row::ratios`]; 1 if there is none.
-    pub ratio_p50: f64,
-    /// The first of [`Row::ratios`]; 1 if there is none.
-    pub ratio_p99: f64,
-    /// Every comparison, the first one included.
+    /// The samples of all runs, and the medians over the runs of each figure.
+    #[serde(flatten)]
+    pub times: Quantiles,
+    /// What it is compared with, the most important first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ratios: Vec<Ratio>,
     /// Processor time of the measured services per real time, in percent of one core.
@@ -122,22 +127,22 @@ pub struct Row {
 }
 
 impl Row {
-    /// A row without a name and without ratios; of no samples all its figures are 0.
-    pub(crate) fn of(what: &str, mode: Mode, regime: Regime, times: Option<Quantiles>) -> Self {
-        let told = |figure: fn(&Quantiles) -> u64| times.as_ref().map_or(0, figure);
+    /// A row without ratios.
+    pub(crate) fn new(
+        what: &str,
+        label: &str,
+        mode: Mode,
+        regime: Regime,
+        times: Quantiles,
+    ) -> Self {
+        let (name, variant) = label.split_once('/').unwrap_or((label, ""));
         Self {
-            name: String::new(),
-            variant: String::new(),
+            name: name.to_owned(),
+            variant: variant.to_owned(),
             what: what.to_owned(),
             mode,
             regime,
-            n: told(|times| times.n),
-            p50_ns: told(|times| times.p50_ns),
-            p99_ns: told(|times| times.p99_ns),
-            p999_ns: told(|times| times.p999_ns),
-            ratio_to: String::new(),
-            ratio_p50: 1.0,
-            ratio_p99: 1.0,
+            times,
             ratios: Vec::new(),
             cpu_percent: None,
         }
@@ -162,14 +167,6 @@ pub struct Report {
     pub machine: String,
     /// The figures.
     pub rows: Vec<Row>,
-}
-
-impl Report {
-    /// The report as one line of JSON.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        serde_json::to_string(self).expect("names and numbers are always JSON")
-    }
 }
 
 impl fmt::Display for Report {
@@ -205,10 +202,10 @@ impl Row {
             "  {:<20} {:<8} {:>7} {:>9} {:>9} {:>9}",
             self.label(),
             self.mode,
-            self.n,
-            time(self.p50_ns),
-            time(self.p99_ns),
-            time(self.p999_ns)
+            self.times.n,
+            time(self.times.p50_ns),
+            time(self.times.p99_ns),
+            time(self.times.p999_ns)
         )?;
         let ratios = self.ratios.iter().map(|ratio| {
             let (p50, p99) = (times(ratio.p50), times(ratio.p99));
@@ -258,48 +255,26 @@ mod tests {
             p99: 2.0 * p50,
             runs: vec![[p50, 2.0 * p50]],
         };
+        let times = Quantiles {
+            n: 50_000,
+            p50_ns: 9_999,
+            p99_ns: 10_000,
+            p999_ns: 1_234_567,
+        };
+        let mut row = Row::new("hop", "lager", Mode::Block, Regime::NoHalt, times);
+        row.ratios = vec![ratio("iceoryx2/event", 0.8), ratio("futex", 1.1)];
         Report {
             machine: "a machine".to_owned(),
-            rows: vec![Row {
-                name: "lager".to_owned(),
-                variant: String::new(),
-                what: "hop".to_owned(),
-                mode: Mode::Block,
-                regime: Regime::NoHalt,
-                n: 50_000,
-                p50_ns: 9_999,
-                p99_ns: 10_000,
-                p999_ns: 1_234_567,
-                ratio_to: "iceoryx2/event".to_owned(),
-                ratio_p50: 0.8,
-                ratio_p99: 1.6,
-                ratios: vec![ratio("iceoryx2/event", 0.8), ratio("futex", 1.1)],
-                cpu_percent: None,
-            }],
+            rows: vec![row],
         }
-    }
-
-    #[test]
-    fn names_are_read_as_they_are_written() {
-        for mode in Mode::ALL {
-            assert_eq!(mode.to_string().parse(), Ok(mode));
-            assert_eq!(serde_json::to_value(mode).unwrap(), mode.as_str());
-        }
-        for regime in Regime::ALL {
-            assert_eq!(regime.to_string().parse(), Ok(regime));
-            assert_eq!(serde_json::to_value(regime).unwrap(), regime.as_str());
-        }
-        let error = "fast".parse::<Mode>().unwrap_err().to_string();
-        assert!(error.contains("spin, adaptive or block"), "{error}");
     }
 
     #[test]
     fn json_has_the_agreed_fields() {
-        let json: serde_json::Value = serde_json::from_str(&report().to_json()).unwrap();
+        let json = serde_json::to_value(report()).unwrap();
         let expected = serde_json::json!({
             "name": "lager", "what": "hop", "mode": "block", "regime": "no-halt", "n": 50_000,
             "p50_ns": 9_999, "p99_ns": 10_000, "p999_ns": 1_234_567,
-            "ratio_to": "iceoryx2/event", "ratio_p50": 0.8, "ratio_p99": 1.6,
             "ratios": [
                 {"to": "iceoryx2/event", "p50": 0.8, "p99": 1.6, "runs": [[0.8, 1.6]]},
                 {"to": "futex", "p50": 1.1, "p99": 2.2, "runs": [[1.1, 2.2]]},

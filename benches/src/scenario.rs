@@ -1,44 +1,40 @@
 //! What can be measured, by name: for `lager bench`, the guard and criterion alike.
 
+use clap::ValueEnum;
+
 use crate::error::BenchError;
 use crate::group::Group;
 use crate::machine;
-use crate::names::named;
-use crate::report::{Options, Report};
-use crate::{fanout, hop, path, ring};
+use crate::report::{Options, Report, shown_by_name};
+use crate::{hop, path, publish};
 
-named! {
-    /// What is measured by its time.
-    pub enum Scenario {
-        /// One way between two processes, and what it costs a writer to wake one.
-        Hop = "hop",
-        /// From a sensor frame to the command that it causes.
-        Path = "path",
-        /// What publishing costs the writer when many read.
-        Fanout = "fanout",
-    }
+/// What is measured by its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scenario {
+    /// One way between two processes, and what it costs a writer to wake one.
+    Hop,
+    /// From a sensor frame to the command that it causes.
+    Path,
+    /// What publishing costs the writer when many read.
+    Fanout,
 }
+
+shown_by_name!(Scenario);
 
 impl Scenario {
     /// The rows that `options` want, in groups that take turns.
     #[must_use]
     pub fn groups(self, options: &Options) -> Vec<Group> {
-        let mut groups = Vec::new();
-        for regime in &options.regimes {
-            groups.extend(match self {
-                Self::Hop => [
-                    hop::groups(*regime, options),
-                    ring::groups(*regime, options),
-                ]
-                .into_iter()
-                .flatten()
-                .collect(),
-                Self::Path => path::groups(*regime, options),
-                Self::Fanout => fanout::groups(*regime, options),
-            });
-        }
-        groups.retain(|group| !group.entries.is_empty());
-        groups
+        let of_regime = |regime: &_| match self {
+            Self::Hop => {
+                let mut groups = hop::groups(*regime, options);
+                groups.extend(publish::ring(*regime, options));
+                groups
+            }
+            Self::Path => path::groups(*regime, options),
+            Self::Fanout => publish::fan_out(*regime, options),
+        };
+        options.regimes.iter().flat_map(of_regime).collect()
     }
 
     /// Measures all that `options` want, beside what it is compared with.
@@ -51,12 +47,11 @@ impl Scenario {
             rows.extend(group.measure(options)?);
         }
         if rows.is_empty() {
-            let why = match self {
+            return Err(BenchError::NothingToMeasure(match self {
                 Self::Hop => "nothing works in these modes and regimes",
                 Self::Path => "the path is measured blocking and adaptive, the latter on two cores",
                 Self::Fanout => "the readers look without pause, so it is measured in mode spin",
-            };
-            return Err(BenchError::NothingToMeasure(why.to_owned()));
+            }));
         }
         if self == Self::Hop {
             hop::beside_its_parts(&mut rows);
@@ -65,5 +60,21 @@ impl Scenario {
             machine: machine::describe(),
             rows,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_a_row_is_compared_with_is_in_its_group_once() {
+        let all = Scenario::value_variants().iter();
+        for group in all.flat_map(|scenario| scenario.groups(&Options::default())) {
+            for label in group.entries.iter().flat_map(|entry| entry.against) {
+                let found = group.entries.iter().filter(|other| other.label == *label);
+                assert_eq!(found.count(), 1, "{} against {label}", group.what);
+            }
+        }
     }
 }

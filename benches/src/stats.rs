@@ -1,16 +1,18 @@
 //! Quantiles of samples and medians over runs.
 
-/// What one run of one contender showed; times in ns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Quantiles {
+use serde::{Deserialize, Serialize};
+
+/// What one run of one contender showed, or the medians of several; times in ns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Quantiles {
     /// Samples.
-    pub(crate) n: u64,
+    pub n: u64,
     /// The median.
-    pub(crate) p50_ns: u64,
+    pub p50_ns: u64,
     /// 99 % of the samples are at most this.
-    pub(crate) p99_ns: u64,
+    pub p99_ns: u64,
     /// 99.9 % of the samples are at most this.
-    pub(crate) p999_ns: u64,
+    pub p999_ns: u64,
 }
 
 impl Quantiles {

@@ -198,8 +198,7 @@ pub fn driving() -> Navigator {
     for input in start {
         navigator.handle(Duration::ZERO, input);
     }
-    let status = navigator.status();
-    assert_eq!(status.phase.get(), Some(Phase::Driving), "{status:?}");
+    still_driving(&navigator);
     navigator
 }
 

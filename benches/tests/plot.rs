@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
-use lager_benches::{Mode, Regime, Report, Row};
+use lager_benches::{Mode, Quantiles, Ratio, Regime, Report, Row};
 
 fn plot(input: &str) -> Output {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/plot");
@@ -37,14 +37,20 @@ fn row(name: &str, mode: Mode, p50_ns: u64) -> Row {
         what: "hop".to_owned(),
         mode,
         regime: Regime::Plain,
-        n: 100,
-        p50_ns,
-        p99_ns: 2 * p50_ns,
-        p999_ns: 3 * p50_ns,
-        ratio_to: "iceoryx2/header".to_owned(),
-        ratio_p50: 1.25,
-        ratio_p99: 1.5,
-        ratios: Vec::new(),
+        times: Quantiles {
+            n: 100,
+            p50_ns,
+            p99_ns: 2 * p50_ns,
+            p999_ns: 3 * p50_ns,
+        },
+        ratios: ["iceoryx2/header", "futex"]
+            .map(|to| Ratio {
+                to: to.to_owned(),
+                p50: 1.25,
+                p99: 1.5,
+                runs: Vec::new(),
+            })
+            .into(),
         cpu_percent: (mode == Mode::Block).then_some(7.0),
     }
 }
@@ -59,7 +65,7 @@ fn a_report_becomes_a_well_formed_drawing() {
             row("lager", Mode::Spin, 300),
         ],
     };
-    let drawn = plot(&report.to_json());
+    let drawn = plot(&serde_json::to_string(&report).expect("JSON"));
     let svg = String::from_utf8(drawn.stdout).expect("UTF-8");
     assert!(drawn.status.success(), "{:?}", drawn.stderr);
     assert!(is_well_formed(&svg), "{svg}");
@@ -80,7 +86,7 @@ fn less_than_the_clocks_tick_is_drawn_too() {
         machine: "a machine".to_owned(),
         rows: vec![row("lager", Mode::Spin, 0), row("iceoryx2", Mode::Spin, 50)],
     };
-    let drawn = plot(&report.to_json());
+    let drawn = plot(&serde_json::to_string(&report).expect("JSON"));
     let svg = String::from_utf8(drawn.stdout).expect("UTF-8");
     assert!(drawn.status.success(), "{:?}", drawn.stderr);
     assert!(is_well_formed(&svg), "{svg}");

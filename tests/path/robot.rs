@@ -3,12 +3,11 @@
 
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, Cause, Clock, Publisher, Subscriber};
-use lager_rig::one_square;
+use lager_ports::{Bus, Clock, Subscriber};
+use lager_rig::Outset;
 use lager_tests::{Domain, WATCHDOG};
 use lager_topics::{
-    Ask, AskKind, BridgeRequest, CommandLatency, LatencyCommand, LatencyPath, LinkHealth,
-    MissionOrder, Mode, NavMap, NavStatus, Order, PathLatency, Phase, Role, SensorDistance,
+    CommandLatency, LatencyCommand, LatencyPath, LinkHealth, PathLatency, Role, SensorDistance,
     SensorLine, Stamp, SteeringCommand, SteeringState,
 };
 use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCommand};
@@ -30,9 +29,8 @@ pub(crate) struct Robot {
     pub(crate) logic: Part,
     pub(crate) boards: Boards,
     pub(crate) seen: Seen,
-    map: Publisher<NavMap>,
-    orders: Publisher<MissionOrder>,
-    operator: Bus,
+    operator: Outset,
+    _bus: Bus,
     /// From before each answered frame was sent until after its command was read, in ns.
     pub(crate) spans: Vec<[u64; 2]>,
 }
@@ -153,53 +151,24 @@ impl Robot {
             let arguments = [name, "--exact", "--ignored", "--nocapture"];
             Part::start(log, &arguments, &environment)
         };
-        let operator = Bus::open(&bus, Role::Operator).expect("the bus opens");
+        let bus = Bus::open(&bus, Role::Operator).expect("the bus opens");
         let mut robot = Self {
             bridge: part("bridge"),
             logic: part("logic"),
             boards,
             seen: Seen::new(&domain.observe("r1", 1.0)),
-            map: operator.publisher().expect("a topic"),
-            orders: operator.publisher().expect("a topic"),
-            operator,
+            operator: Outset::new(&bus).expect("topics"),
+            _bus: bus,
             spans: Vec::new(),
         };
         robot.set_out();
         robot
     }
 
-    /// Brings both boards up, gives the map and the order, and waits until logic drives.
+    /// Brings both boards up, and waits until logic looks for the product.
     fn set_out(&mut self) {
-        let own = Cause::OWN;
-        self.map.send(own, one_square()).expect("sent");
-        let mut health = self.operator.subscriber::<LinkHealth>().expect("a topic");
-        self.step_until("both boards are up", |_| {
-            let health = health.latest().expect("readable");
-            health.is_some_and(|health| health.sensor.up != 0 && health.steering.up != 0)
-        });
-        let ask = Ask {
-            kind: AskKind::SetMode.into(),
-            mode: Mode::Autonomous.into(),
-            ..Ask::default()
-        };
-        let client = self.operator.client::<BridgeRequest>().expect("a request");
-        client
-            .call(ask, Duration::from_secs(30))
-            .expect("an answer");
-        let mut status = self.operator.subscriber::<NavStatus>().expect("a topic");
-        let mut asked = false;
-        self.step_until("logic looks for the product", |robot| {
-            robot.map.tick();
-            let phase = status
-                .latest()
-                .expect("readable")
-                .and_then(|status| status.phase.get());
-            if phase == Some(Phase::WaitingForOrder) && !asked {
-                asked = true;
-                let order = Order { id: 1, product: 1 };
-                robot.orders.send(own, order).expect("sent");
-            }
-            phase == Some(Phase::Approaching)
+        self.step_until("the robot is on its way", |robot| {
+            robot.operator.goes_on().expect("an operator")
         });
         // Until a board has reported, the bridge tells in its place what it was told.
         self.step_until("the board has reported", |robot| {

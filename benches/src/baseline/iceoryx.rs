@@ -3,8 +3,8 @@
 //! Three kinds of line differ in what they carry besides the sample: the same header as the typed
 //! ports and the same limits ([`Stamp`]), no header and no clock but the same limits, and
 //! iceoryx2's own defaults. The same limits include the transport's configuration, which is the
-//! robot's own ([`Member::join`]). A receiver looks without pause, or sleeps on an iceoryx2 event that the
-//! sender notifies after publishing.
+//! robot's own ([`Member::join`]). A receiver looks without pause, or sleeps on an iceoryx2 event
+//! that the sender notifies after publishing.
 
 use core::fmt::Debug;
 use core::time::Duration;
@@ -23,53 +23,47 @@ use iceoryx2::service::port_factory::{event, publish_subscribe};
 use lager_ports::{BusConfig, Clock};
 use lager_topics::{Qos, Stamp};
 
-use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
-use crate::error::BenchError;
+use super::{End, Slept, TIME_OUT, sleep_until, spin};
+use crate::error::{BenchError, Fault};
 use crate::sample::Sample;
 
 /// Samples a subscriber may hold, as the typed ports allow.
 const MAX_HELD: usize = 4;
 
 /// What stands in front of each sample.
-pub(crate) trait Header: Debug + Default + ZeroCopySend + 'static {
-    /// Fills it in for the sample with that number.
-    fn fill(&mut self, number: u64, stream: &Stream);
-}
+pub(crate) trait Header: Copy + Debug + Default + ZeroCopySend + 'static {
+    /// That of a stream's first sample; the stream begins now and is this process's.
+    fn first() -> Self {
+        Self::default()
+    }
 
-/// What the headers of one sender have in common.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Stream {
-    epoch: u64,
-    writer: u32,
-}
-
-impl Stream {
-    /// A stream that begins now and is this process's.
-    pub(crate) fn new() -> Self {
-        Self {
-            epoch: Clock::monotonic_ns(),
-            writer: std::process::id(),
-        }
+    /// That of the sample after this one.
+    fn next(self) -> Self {
+        self
     }
 }
 
 impl Header for Stamp {
-    fn fill(&mut self, number: u64, stream: &Stream) {
+    fn first() -> Self {
+        Self {
+            epoch: Clock::monotonic_ns(),
+            writer: std::process::id(),
+            ..Self::default()
+        }
+    }
+
+    fn next(self) -> Self {
         let now = Clock::monotonic_ns();
-        *self = Self {
-            sequence: number,
+        Self {
+            sequence: self.sequence + 1,
             source_time_ns: now,
             publish_time_ns: now,
-            epoch: stream.epoch,
-            writer: stream.writer,
-            ..Self::default()
-        };
+            ..self
+        }
     }
 }
 
-impl Header for () {
-    fn fill(&mut self, _: u64, _: &Stream) {}
-}
+impl Header for () {}
 
 /// A process's membership.
 pub(crate) struct Member {
@@ -101,13 +95,17 @@ impl Member {
     }
 
     /// A publisher of any payload; `None` leaves iceoryx2's limits as they are.
-    pub(crate) fn publisher<P: Debug + ZeroCopySend, H: Header>(
+    pub(crate) fn sender<P: Debug + ZeroCopySend + 'static, H: Header>(
         &self,
         name: &str,
         limits: Option<&Qos>,
-    ) -> Result<Publisher<ipc::Service, P, H>, BenchError> {
-        patiently("a publisher", || {
+    ) -> Result<Sender<P, H>, BenchError> {
+        let publisher = patiently("a publisher", || {
             Ok(self.topic(name, limits)?.publisher_builder().create()?)
+        })?;
+        Ok(Sender {
+            publisher,
+            header: H::first(),
         })
     }
 
@@ -192,10 +190,9 @@ fn config(bus: &BusConfig) -> Result<Config, BenchError> {
 }
 
 fn failed(what: &str, detail: impl Debug) -> BenchError {
-    BenchError::Bus {
-        what: "bare iceoryx2",
-        detail: format!("{what} could not be had: {detail:?}"),
-    }
+    BenchError::Bus(format!(
+        "bare iceoryx2: {what} could not be had: {detail:?}"
+    ))
 }
 
 /// Tries again while the other process is in the middle of creating or removing the same thing.
@@ -215,106 +212,64 @@ fn patiently<T>(
 }
 
 /// Publishes with a header of one's own.
-pub(crate) struct Sender<H: Header> {
-    publisher: Publisher<ipc::Service, Sample, H>,
-    stream: Stream,
-    next: u64,
+pub(crate) struct Sender<P: Debug + ZeroCopySend + 'static, H: Header> {
+    publisher: Publisher<ipc::Service, P, H>,
+    header: H,
 }
 
-impl<H: Header> Sender<H> {
-    pub(crate) fn new(publisher: Publisher<ipc::Service, Sample, H>) -> Self {
-        Self {
-            publisher,
-            stream: Stream::new(),
-            next: 0,
-        }
-    }
-
-    pub(crate) fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+impl<P: Copy + Debug + ZeroCopySend + 'static, H: Header> Sender<P, H> {
+    #[allow(unsafe_code)]
+    pub(crate) fn send(&mut self, payload: &P) -> Result<(), Fault> {
         let mut loan = self.publisher.loan_uninit().map_err(broken)?;
-        loan.user_header_mut().fill(self.next, &self.stream);
-        self.next += 1;
-        loan.write_payload(*sample).send().map_err(broken)?;
+        self.header = self.header.next();
+        *loan.user_header_mut() = self.header;
+        loan.payload_mut().write(*payload);
+        // SAFETY: the payload was written just now.
+        let loan = unsafe { loan.assume_init() };
+        loan.send().map_err(broken)?;
         Ok(())
     }
 }
 
-/// Both directions with a receiver that looks without pause.
-pub(crate) struct Polling<H: Header> {
-    sender: Sender<H>,
-    subscriber: Subscriber<ipc::Service, Sample, H>,
-    // The ports need it to live.
-    _member: Member,
-}
-
-impl<H: Header> Polling<H> {
-    /// Publishes to `out` and subscribes to `back`.
-    pub(crate) fn new(
-        member: Member,
-        (out, back): (&str, &str),
-        limits: Option<&Qos>,
-    ) -> Result<Self, BenchError> {
-        Ok(Self {
-            subscriber: member.subscriber(back, limits)?,
-            sender: Sender::new(member.publisher(out, limits)?),
-            _member: member,
-        })
-    }
-}
-
-impl<H: Header> End for Polling<H> {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.sender.send(sample)
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
-        spin(|| receive(&self.subscriber))
-    }
+/// Publishes to `out` and subscribes to `back`, with a receiver that looks without pause.
+pub(crate) fn polling<H: Header>(
+    member: &Member,
+    (out, back): (&str, &str),
+    limits: Option<&Qos>,
+) -> Result<impl End + use<H>, BenchError> {
+    let subscriber = member.subscriber::<Sample, H>(back, limits)?;
+    let mut sender = member.sender::<Sample, H>(out, limits)?;
+    let send = move |sample: &Sample| sender.send(sample);
+    Ok((send, move || spin(|| receive(&subscriber))))
 }
 
 /// The same with a receiver that sleeps on an event.
-pub(crate) struct Listening {
-    notifier: Notifier<ipc::Service>,
-    listener: Listener<ipc::Service>,
-    ports: Polling<Stamp>,
-}
-
-impl Listening {
-    /// Publishes to `out` and subscribes to `back`.
-    pub(crate) fn new(
-        member: Member,
-        (out, back): (&str, &str),
-        limits: &Qos,
-    ) -> Result<Self, BenchError> {
-        // As many as iceoryx2 allows by default.
-        const LISTENERS: usize = 16;
-        Ok(Self {
-            listener: member.listener(back, LISTENERS)?,
-            notifier: member.notifier(out, LISTENERS)?,
-            ports: Polling::new(member, (out, back), Some(limits))?,
-        })
-    }
-}
-
-impl End for Listening {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.ports.send(sample)?;
-        self.notifier.notify().map_err(broken)?;
+pub(crate) fn listening(
+    member: &Member,
+    (out, back): (&str, &str),
+    limits: &Qos,
+) -> Result<impl End + use<>, BenchError> {
+    // As many as iceoryx2 allows by default.
+    const LISTENERS: usize = 16;
+    let listener = member.listener(back, LISTENERS)?;
+    let notifier = member.notifier(out, LISTENERS)?;
+    let subscriber = member.subscriber::<Sample, Stamp>(back, Some(limits))?;
+    let mut sender = member.sender::<Sample, Stamp>(out, Some(limits))?;
+    let send = move |sample: &Sample| {
+        sender.send(sample)?;
+        notifier.notify().map_err(broken)?;
         Ok(())
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
-        let sleep = || match self.listener.timed_wait(|_| (), TIME_OUT) {
-            Ok(0) => Ok(Slept::TimedOut),
-            Ok(_) => Ok(Slept::Woken),
-            Err(error) => Err(broken(error)),
-        };
-        sleep_until(|| receive(&self.ports.subscriber), sleep)
-    }
+    };
+    let sleep = move || match listener.timed_wait(|_| (), TIME_OUT) {
+        Ok(0) => Ok(Slept::TimedOut),
+        Ok(_) => Ok(Slept::Woken),
+        Err(error) => Err(broken(error)),
+    };
+    Ok((send, move || sleep_until(|| receive(&subscriber), &sleep)))
 }
 
 /// The next sample, if there is one.
-pub(crate) fn receive<H: Header>(
+fn receive<H: Header>(
     subscriber: &Subscriber<ipc::Service, Sample, H>,
 ) -> Result<Option<Sample>, Fault> {
     let received = subscriber.receive().map_err(broken)?;

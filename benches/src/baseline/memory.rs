@@ -7,7 +7,7 @@ use std::os::fd::OwnedFd;
 use rustix::thread::futex;
 use rustix::time::Timespec;
 
-use super::{End, Fault, Slept, TIME_OUT, sleep_until, spin};
+use super::{End, Slept, TIME_OUT, sleep_until, spin};
 use crate::sample::{Block, Sample};
 
 /// A cache line that holds a block; the number is written last.
@@ -78,112 +78,62 @@ pub(crate) struct Lane<const WORDS: usize> {
 }
 
 /// A cache line each way, watched without pause.
-pub(crate) struct CacheLine<'memory> {
-    out: &'memory Slot<8>,
-    back: &'memory Slot<8>,
-    seen: u64,
-}
-
-impl<'memory> CacheLine<'memory> {
-    pub(crate) fn new(out: &'memory Lane<8>, back: &'memory Lane<8>) -> Self {
-        Self {
-            out: &out.slot,
-            back: &back.slot,
-            seen: back.slot.number(),
-        }
-    }
-}
-
-impl End for CacheLine<'_> {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.out.write(sample);
+pub(crate) fn cache_line(out: &Lane<8>, back: &Lane<8>) -> impl End {
+    let (out, back) = (&out.slot, &back.slot);
+    let mut seen = back.number();
+    let send = move |sample: &Sample| {
+        out.write(sample);
         Ok(())
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
-        let (back, seen) = (self.back, self.seen);
+    };
+    let receive = move || {
         spin(|| Ok((back.number() != seen).then_some(())))?;
         let sample = back.read();
-        self.seen = sample.number();
+        seen = sample.number();
         Ok(sample)
-    }
+    };
+    (send, receive)
 }
 
 /// A cache line each way, and a futex to sleep on.
-pub(crate) struct Futex<'memory> {
-    out: &'memory Lane<8>,
-    back: &'memory Lane<8>,
-    seen: u32,
-}
-
-impl<'memory> Futex<'memory> {
-    pub(crate) fn new(out: &'memory Lane<8>, back: &'memory Lane<8>) -> Self {
-        Self {
-            out,
-            back,
-            seen: back.word.count(),
-        }
-    }
-}
-
-impl End for Futex<'_> {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.out.slot.write(sample);
-        Ok(self.out.word.wake()?)
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
-        let (word, seen) = (&self.back.word, self.seen);
-        self.seen = sleep_until(
-            || {
-                let count = word.count();
-                Ok((count != seen).then_some(count))
-            },
-            || Ok(word.sleep(seen)?),
-        )?;
-        Ok(self.back.slot.read())
-    }
+pub(crate) fn a_futex(out: &Lane<8>, back: &Lane<8>) -> impl End {
+    let mut seen = back.word.count();
+    let send = move |sample: &Sample| {
+        out.slot.write(sample);
+        Ok(out.word.wake()?)
+    };
+    let receive = move || {
+        let look = || {
+            let count = back.word.count();
+            Ok((count != seen).then_some(count))
+        };
+        seen = sleep_until(look, || Ok(back.word.sleep(seen)?))?;
+        Ok(back.slot.read())
+    };
+    (send, receive)
 }
 
 /// A cache line each way, and an eventfd to sleep on, without a time-out.
-pub(crate) struct EventFd<'memory> {
-    out: &'memory Slot<8>,
-    back: &'memory Slot<8>,
-    ring: &'memory OwnedFd,
-    bell: &'memory OwnedFd,
-}
-
-impl<'memory> EventFd<'memory> {
-    pub(crate) fn new(
-        (out, ring): (&'memory Lane<8>, &'memory OwnedFd),
-        (back, bell): (&'memory Lane<8>, &'memory OwnedFd),
-    ) -> Self {
-        Self {
-            out: &out.slot,
-            back: &back.slot,
-            ring,
-            bell,
-        }
-    }
-}
-
-impl End for EventFd<'_> {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        self.out.write(sample);
-        rustix::io::write(self.ring, &1_u64.to_ne_bytes())?;
+pub(crate) fn an_eventfd(
+    (out, ring): (&Lane<8>, &OwnedFd),
+    (back, bell): (&Lane<8>, &OwnedFd),
+) -> impl End {
+    let send = move |sample: &Sample| {
+        out.slot.write(sample);
+        rustix::io::write(ring, &1_u64.to_ne_bytes())?;
         Ok(())
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
+    };
+    let receive = move || {
         let mut count = [0; 8];
-        rustix::io::read(self.bell, &mut count)?;
-        Ok(self.back.read())
-    }
+        rustix::io::read(bell, &mut count)?;
+        Ok(back.slot.read())
+    };
+    (send, receive)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baseline::tests::pass;
     use lager_rig::{Shareable, Shared};
 
     #[repr(C)]
@@ -193,30 +143,15 @@ mod tests {
     #[allow(unsafe_code)]
     unsafe impl Shareable for Lanes {}
 
-    fn there_and_back(mut first: impl End + Send, mut second: impl End + Send) {
-        std::thread::scope(|scope| {
-            scope.spawn(move || {
-                for _ in 0..100 {
-                    let sample = second.receive().unwrap();
-                    second.send(&sample).unwrap();
-                }
-            });
-            for number in 1..=100 {
-                first.send(&Sample::new(number)).unwrap();
-                assert_eq!(first.receive().unwrap(), Sample::new(number));
-            }
-        });
-    }
-
     #[test]
     fn samples_come_back_over_each_of_them() {
         use rustix::event::{EventfdFlags, eventfd};
         let memory = Shared::<Lanes>::new().unwrap();
         let [there, back] = &memory.0;
-        there_and_back(CacheLine::new(there, back), CacheLine::new(back, there));
-        there_and_back(Futex::new(there, back), Futex::new(back, there));
+        pass(cache_line(there, back), cache_line(back, there));
+        pass(a_futex(there, back), a_futex(back, there));
         let bells = [0, 1].map(|_| eventfd(0, EventfdFlags::CLOEXEC).unwrap());
         let [there, back] = [(there, &bells[0]), (back, &bells[1])];
-        there_and_back(EventFd::new(there, back), EventFd::new(back, there));
+        pass(an_eventfd(there, back), an_eventfd(back, there));
     }
 }

@@ -12,7 +12,7 @@ pub(crate) mod zenoh;
 use core::time::Duration;
 use std::time::Instant;
 
-use crate::error::BenchError;
+use crate::error::Fault;
 use crate::sample::Sample;
 
 /// How long a sleeping receiver sleeps before it looks whether it was forgotten: the same for the
@@ -22,7 +22,7 @@ pub(crate) const TIME_OUT: Duration = Duration::from_millis(100);
 /// How long a receiver waits for a sample before it gives up the measurement.
 pub(crate) const LIMIT: Duration = Duration::from_secs(5);
 
-/// One end of a line between two processes; stays in its thread.
+/// One end of a line between two processes: how it sends, and how it receives.
 pub(crate) trait End {
     /// Hands the sample over.
     fn send(&mut self, sample: &Sample) -> Result<(), Fault>;
@@ -31,38 +31,17 @@ pub(crate) trait End {
     fn receive(&mut self) -> Result<Sample, Fault>;
 }
 
-/// Why an end does not work.
-#[derive(Debug)]
-pub(crate) enum Fault {
-    /// Nothing came within [`LIMIT`].
-    Silent,
-    /// The carrier failed; it says why.
-    Broken(String),
-}
-
-impl Fault {
-    /// As the fault of what carries sample number `expected`.
-    pub(crate) fn of(self, contender: &str, expected: u64) -> BenchError {
-        let contender = contender.to_owned();
-        match self {
-            Self::Silent => BenchError::NoSample {
-                contender,
-                expected: expected & u64::from(u32::MAX),
-                limit: LIMIT,
-            },
-            Self::Broken(detail) => BenchError::Carrier { contender, detail },
-        }
+impl<S, R> End for (S, R)
+where
+    S: FnMut(&Sample) -> Result<(), Fault>,
+    R: FnMut() -> Result<Sample, Fault>,
+{
+    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
+        self.0(sample)
     }
-}
 
-/// A fault of a port of ours.
-pub(crate) fn broken(error: impl core::fmt::Display) -> Fault {
-    Fault::Broken(error.to_string())
-}
-
-impl From<rustix::io::Errno> for Fault {
-    fn from(error: rustix::io::Errno) -> Self {
-        Self::Broken(error.to_string())
+    fn receive(&mut self) -> Result<Sample, Fault> {
+        self.1()
     }
 }
 
@@ -80,7 +59,7 @@ pub(crate) fn spin<T>(mut look: impl FnMut() -> Result<Option<T>, Fault>) -> Res
             core::hint::spin_loop();
         }
         if start.elapsed() > LIMIT {
-            return Err(Fault::Silent);
+            return Err(Fault::Silent(LIMIT));
         }
     }
 }
@@ -108,40 +87,47 @@ pub(crate) fn sleep_until<T>(
         if sleep()? == Slept::TimedOut {
             left -= 1;
             if left == 0 {
-                return Err(Fault::Silent);
+                return Err(Fault::Silent(LIMIT));
             }
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    #[test]
-    fn a_receiver_gives_up_when_nobody_ever_sends() {
-        let mut sleeps = 0;
-        let silent = sleep_until(
-            || Ok(None::<()>),
-            || {
-                sleeps += 1;
-                Ok(Slept::TimedOut)
-            },
-        );
-        assert!(matches!(silent, Err(Fault::Silent)));
-        assert_eq!(sleeps, 50);
+    /// Samples pass from one end to the other and back.
+    pub(crate) fn pass(mut first: impl End, mut second: impl End + Send) {
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                for _ in 0..100 {
+                    let sample = second.receive().unwrap();
+                    second.send(&sample).unwrap();
+                }
+            });
+            for number in 1..=100 {
+                first.send(&Sample::new(number)).unwrap();
+                assert_eq!(first.receive().unwrap(), Sample::new(number));
+            }
+        });
     }
 
     #[test]
-    fn a_receiver_bears_any_number_of_wakes_in_vain() {
+    fn a_receiver_gives_up_when_nobody_ever_sends_and_bears_any_number_of_wakes_in_vain() {
+        let mut sleeps = 0;
+        let time_out = || {
+            sleeps += 1;
+            Ok(Slept::TimedOut)
+        };
+        let silent = sleep_until(|| Ok(None::<()>), time_out);
+        assert!(matches!(silent, Err(Fault::Silent(_))));
+        assert_eq!(sleeps, 50);
         let mut looks = 0;
-        let found = sleep_until(
-            || {
-                looks += 1;
-                Ok((looks > 1000).then_some(looks))
-            },
-            || Ok(Slept::Woken),
-        );
-        assert_eq!(found.unwrap(), 1001);
+        let look = || {
+            looks += 1;
+            Ok((looks > 1000).then_some(looks))
+        };
+        assert_eq!(sleep_until(look, || Ok(Slept::Woken)).unwrap(), 1001);
     }
 }

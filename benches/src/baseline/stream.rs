@@ -7,33 +7,25 @@ use std::os::fd::OwnedFd;
 use lager_topics::bytes_of;
 use rustix::io::{Errno, FdFlags, fcntl_setfd, read, write};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
-use rustix::pipe::pipe;
 
-use super::{End, Fault};
+use super::End;
+use crate::error::Fault;
 use crate::sample::{SIZE, Sample};
 
 /// An end that writes into one descriptor and reads from one.
-pub(crate) struct Stream<'line> {
-    pub(crate) out: &'line OwnedFd,
-    pub(crate) back: &'line OwnedFd,
-}
-
-impl End for Stream<'_> {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        // All three take 64 bytes whole while there is room, and one sample is on its way at a time.
-        match write(self.out, bytes_of(sample))? {
-            SIZE => Ok(()),
-            short => Err(Fault::Broken(format!(
-                "only {short} of {SIZE} bytes went out"
-            ))),
-        }
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
+pub(crate) fn end(out: &OwnedFd, back: &OwnedFd) -> impl End {
+    // All three take 64 bytes whole while there is room, and one sample is on its way at a time.
+    let send = move |sample: &Sample| match write(out, bytes_of(sample))? {
+        SIZE => Ok(()),
+        short => Err(Fault::Broken(format!(
+            "only {short} of {SIZE} bytes went out"
+        ))),
+    };
+    let receive = move || {
         let mut bytes = [0; SIZE];
         let mut filled = 0;
         while filled < SIZE {
-            match read(self.back, &mut bytes[filled..]) {
+            match read(back, &mut bytes[filled..]) {
                 Ok(0) => return Err(Fault::Broken("the other end is closed".to_owned())),
                 Ok(some) => filled += some,
                 Err(Errno::INTR) => {}
@@ -41,22 +33,14 @@ impl End for Stream<'_> {
             }
         }
         Ok(Sample::from_bytes(&bytes))
-    }
-}
-
-/// A pipe: what to read from, what to write into. Children inherit both.
-pub(crate) fn a_pipe() -> rustix::io::Result<(OwnedFd, OwnedFd)> {
-    pipe()
+    };
+    (send, receive)
 }
 
 /// Both ends of a Unix datagram socket. Children inherit them.
 pub(crate) fn datagrams() -> rustix::io::Result<(OwnedFd, OwnedFd)> {
-    socketpair(
-        AddressFamily::UNIX,
-        SocketType::DGRAM,
-        SocketFlags::empty(),
-        None,
-    )
+    let (unix, datagrams) = (AddressFamily::UNIX, SocketType::DGRAM);
+    socketpair(unix, datagrams, SocketFlags::empty(), None)
 }
 
 /// Both ends of a TCP connection over loopback, without delay. Children inherit them.
@@ -75,34 +59,23 @@ pub(crate) fn loopback() -> std::io::Result<(OwnedFd, OwnedFd)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn a_sample_passes(out: &OwnedFd, back: &OwnedFd) {
-        let mut sender = Stream { out, back: out };
-        let mut receiver = Stream { out: back, back };
-        sender.send(&Sample::new(5)).unwrap();
-        assert_eq!(receiver.receive().unwrap(), Sample::new(5));
-    }
+    use crate::baseline::tests::pass;
+    use rustix::pipe::pipe;
 
     #[test]
-    fn a_sample_passes_through_each_of_them() {
-        let (reader, writer) = a_pipe().unwrap();
-        a_sample_passes(&writer, &reader);
-        let (one, other) = datagrams().unwrap();
-        a_sample_passes(&one, &other);
-        a_sample_passes(&other, &one);
-        let (one, other) = loopback().unwrap();
-        a_sample_passes(&one, &other);
-        a_sample_passes(&other, &one);
+    fn samples_come_back_over_each_of_them() {
+        let (there, back) = (pipe().unwrap(), pipe().unwrap());
+        pass(end(&there.1, &back.0), end(&back.1, &there.0));
+        for (one, other) in [datagrams().unwrap(), loopback().unwrap()] {
+            pass(end(&one, &one), end(&other, &other));
+        }
     }
 
     #[test]
     fn an_end_whose_other_end_is_gone_says_so() {
-        let (reader, writer) = a_pipe().unwrap();
+        let (reader, writer) = pipe().unwrap();
         drop(writer);
-        let mut end = Stream {
-            out: &reader,
-            back: &reader,
-        };
-        assert!(matches!(end.receive(), Err(Fault::Broken(_))));
+        let gone = end(&reader, &reader).receive();
+        assert!(matches!(gone, Err(Fault::Broken(_))));
     }
 }

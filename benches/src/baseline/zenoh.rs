@@ -20,79 +20,46 @@ use std::time::{Duration, Instant};
 
 use lager_topics::bytes_of;
 use serde_json::json;
-use zenoh::handlers::FifoChannelHandler;
-use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
-use zenoh::sample::Sample as Received;
-use zenoh::{Config, Session, Wait};
+use zenoh::{Config, Wait};
 
-use super::{End, Fault, LIMIT, broken};
-use crate::error::BenchError;
+use super::{End, LIMIT};
+use crate::error::{BenchError, Fault, broken};
 use crate::sample::{SIZE, Sample};
 
-/// Which side of the socket an end is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
-    /// It makes the socket.
-    Listens,
-    /// It connects, as soon as the socket is there.
-    Connects,
-}
-
-/// An end that puts to one key and subscribes to another.
-pub(crate) struct Peer {
-    publisher: Publisher<'static>,
-    subscriber: Subscriber<FifoChannelHandler<Received>>,
-    // Dropped last: it closes what the others need.
-    _session: Session,
-}
-
-impl Peer {
-    /// Puts to `out` and subscribes to `back`. Returns when the other end subscribes to `out`, so
-    /// that not even the first sample is lost. The socket is gone when the end is.
-    pub(crate) fn meet(
-        socket: &Path,
-        side: Side,
-        (out, back): (&'static str, &'static str),
-    ) -> Result<Self, BenchError> {
-        let session = zenoh::open(config(socket, side)?).wait().map_err(failed)?;
-        let subscriber = session.declare_subscriber(back).wait().map_err(failed)?;
-        let publisher = session
-            .declare_publisher(out)
-            // Neither dropped nor gathered into batches: one sample is on its way at a time.
-            .congestion_control(CongestionControl::Block)
-            .express(true)
-            .wait()
-            .map_err(failed)?;
-        let start = Instant::now();
-        while !publisher
-            .matching_status()
-            .wait()
-            .map_err(failed)?
-            .matching()
-        {
-            if start.elapsed() > LIMIT {
-                return Err(BenchError::Alone { limit: LIMIT });
-            }
-            std::thread::sleep(Duration::from_millis(1));
+/// An end that puts to `out` and subscribes to `back`; the first one makes the socket, the other
+/// connects as soon as it is there. Returns when the other end subscribes to `out`, so that not even
+/// the first sample is lost. The socket is gone when the end is.
+pub(crate) fn meet(
+    socket: &Path,
+    is_first: bool,
+    (out, back): (&'static str, &'static str),
+) -> Result<impl End + use<>, BenchError> {
+    let session = zenoh::open(config(socket, is_first)?)
+        .wait()
+        .map_err(failed)?;
+    let subscriber = session.declare_subscriber(back).wait().map_err(failed)?;
+    let publisher = session
+        .declare_publisher(out)
+        // Neither dropped nor gathered into batches: one sample is on its way at a time.
+        .congestion_control(CongestionControl::Block)
+        .express(true)
+        .wait()
+        .map_err(failed)?;
+    let start = Instant::now();
+    let is_met = || publisher.matching_status().wait().map_err(failed);
+    while !is_met()?.matching() {
+        if start.elapsed() > LIMIT {
+            return Err(BenchError::Alone(LIMIT));
         }
-        Ok(Self {
-            publisher,
-            subscriber,
-            _session: session,
-        })
+        std::thread::sleep(Duration::from_millis(1));
     }
-}
-
-impl End for Peer {
-    fn send(&mut self, sample: &Sample) -> Result<(), Fault> {
-        let bytes = bytes_of(sample);
-        self.publisher.put(bytes).wait().map_err(broken)
-    }
-
-    fn receive(&mut self) -> Result<Sample, Fault> {
-        let received = self.subscriber.recv_timeout(LIMIT).map_err(broken)?;
-        let received = received.ok_or(Fault::Silent)?;
+    let send = move |sample: &Sample| publisher.put(bytes_of(sample)).wait().map_err(broken);
+    let receive = move || {
+        // Dropped with the end: it closes what the others need.
+        let _keeps = &session;
+        let received = subscriber.recv_timeout(LIMIT).map_err(broken)?;
+        let received = received.ok_or(Fault::Silent(LIMIT))?;
         let bytes = received.payload().to_bytes();
         match bytes.len() {
             SIZE => Ok(Sample::from_bytes(&bytes)),
@@ -100,14 +67,15 @@ impl End for Peer {
                 "{other} bytes came, and a sample has {SIZE}"
             ))),
         }
-    }
+    };
+    Ok((send, receive))
 }
 
-fn config(socket: &Path, side: Side) -> Result<Config, BenchError> {
+fn config(socket: &Path, is_first: bool) -> Result<Config, BenchError> {
     let endpoint = format!("unixsock-stream/{}", socket.display());
-    let (listen, connect) = match side {
-        Side::Listens => (vec![endpoint], vec![]),
-        Side::Connects => (vec![], vec![endpoint]),
+    let (listen, connect) = match is_first {
+        true => (vec![endpoint], vec![]),
+        false => (vec![], vec![endpoint]),
     };
     let config = json!({
         "mode": "peer",
@@ -129,15 +97,17 @@ fn config(socket: &Path, side: Side) -> Result<Config, BenchError> {
 }
 
 fn failed(error: impl Display) -> BenchError {
-    BenchError::Carrier {
+    BenchError::Failed {
         contender: "zenoh".to_owned(),
-        detail: error.to_string(),
+        sample: 0,
+        fault: broken(error),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baseline::tests::pass;
 
     #[test]
     fn samples_pass_both_ways_and_the_socket_goes_with_the_ends() {
@@ -146,22 +116,9 @@ mod tests {
         std::fs::create_dir(&folder).unwrap();
         let socket = folder.join("socket");
         let there = socket.clone();
-        let second = std::thread::spawn(move || {
-            let mut end = Peer::meet(&there, Side::Connects, ("back", "there")).unwrap();
-            for _ in 0..3 {
-                let sample = end.receive().unwrap();
-                end.send(&sample).unwrap();
-            }
-            // Whoever closes first might take the last sample with it.
-            end
-        });
-        let mut first = Peer::meet(&socket, Side::Listens, ("there", "back")).unwrap();
-        for number in 1..=3 {
-            first.send(&Sample::new(number)).unwrap();
-            assert_eq!(first.receive().unwrap(), Sample::new(number));
-        }
-        drop(second.join().unwrap());
-        drop(first);
+        let second = std::thread::spawn(move || meet(&there, false, ("back", "there")).unwrap());
+        let first = meet(&socket, true, ("there", "back")).unwrap();
+        pass(first, second.join().unwrap());
         assert!(!socket.exists());
         std::fs::remove_dir_all(&folder).unwrap();
     }
@@ -169,7 +126,7 @@ mod tests {
     #[test]
     fn a_socket_that_cannot_be_made_is_said() {
         let socket = Path::new("/nowhere/at/all");
-        let refused = Peer::meet(socket, Side::Listens, ("there", "back"));
-        assert!(matches!(refused, Err(BenchError::Carrier { .. })));
+        let refused = meet(socket, true, ("there", "back"));
+        assert!(matches!(refused, Err(BenchError::Failed { .. })));
     }
 }

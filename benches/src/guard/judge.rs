@@ -95,7 +95,7 @@ fn one(limit: &Limit, figures: &Figures, margin: Margin) -> Judgement {
         // Counts are whole.
         (count * (1.0 + margin_percent / 100.0)).floor()
     });
-    let measured = figures.figures.get(&limit.figure).copied();
+    let measured = figures.get(&limit.figure);
     let verdict = match measured {
         None if figures.cannot_be_measured(&limit.figure) => Verdict::NotJudged,
         None => Verdict::Missing,
@@ -146,27 +146,24 @@ fn conditions(counted: Option<&Counted>, figures: &Figures) -> (Margin, Vec<Stri
 fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
     // Below the measured count by more than this the limit has come loose.
     const LOOSE: f64 = 0.9;
-    figures
-        .figures
-        .iter()
-        .filter_map(|(name, value)| {
-            let source = &figures.source;
-            match limits.of(source).find(|limit| limit.figure == *name) {
-                None => Some(format!("{source}: `{name}` ({value}) has no limit")),
-                Some(limit) if *value < limit.measured.unwrap_or(0.0) * LOOSE => Some(format!(
-                    "{source}: `{name}` has come down to {value}; write that into the file of limits, so that it stays there"
-                )),
-                Some(_) => None,
-            }
-        })
-        .collect()
+    let source = &figures.source;
+    let note = |name: &String| {
+        let value = figures.get(name)?;
+        match limits.of(source).find(|limit| limit.figure == *name) {
+            None => Some(format!("{source}: `{name}` ({value}) has no limit")),
+            Some(limit) if value < limit.measured.unwrap_or(0.0) * LOOSE => Some(format!(
+                "{source}: `{name}` has come down to {value}; write that into the file of limits, so that it stays there"
+            )),
+            Some(_) => None,
+        }
+    };
+    figures.runs.keys().filter_map(note).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::figures::Built;
-    use std::path::Path;
 
     const RATIO: &str = "hop spin plain: lager / futex p50";
 
@@ -188,7 +185,7 @@ mod tests {
              {of_send}
              reason = 'because'"
         );
-        Limits::parse(Path::new("limits.toml"), &text).unwrap()
+        Limits::parse(&text).unwrap()
     }
 
     /// What becomes of the one limit of a source, and what is said beside.
@@ -205,7 +202,7 @@ mod tests {
         let figures = Figures {
             source: source.to_owned(),
             built,
-            figures: [(figure.0.to_owned(), figure.1)].into(),
+            runs: [(figure.0.to_owned(), vec![figure.1])].into(),
             ..Figures::default()
         };
         let (judgements, notes) = judge(limits, &figures);

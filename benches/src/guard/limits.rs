@@ -2,11 +2,13 @@
 //! would guard nothing. Nothing is measured or judged here.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use clap::ValueEnum;
 use lager_benches::Scenario;
 use serde::Deserialize;
 
+use crate::error::{GuardError, read};
 use crate::figures::RatioName;
 
 /// Everything the file says.
@@ -59,80 +61,32 @@ pub(crate) struct Limit {
     pub(crate) reason: String,
 }
 
-/// Why a file of limits is not one.
-#[derive(Debug, PartialEq, thiserror::Error)]
-pub(crate) enum LimitsError {
-    #[error("{file} cannot be read ({detail}); name another file with --limits")]
-    Unreadable { file: PathBuf, detail: String },
-    #[error("{file} is no list of limits: {detail}")]
-    Syntax { file: PathBuf, detail: String },
-    #[error(
-        "there is no limit in {file}; a guard without limits guards nothing, so write at least one [[limit]]"
-    )]
-    Empty { file: PathBuf },
-    #[error("`{figure}` of `{source_name}` has two limits; keep one")]
-    Twice { source_name: String, figure: String },
-    #[error("the limit of `{figure}` has no reason; say why it is what it is")]
-    NoReason { figure: String },
-    #[error("`{figure}`: {what} must be a positive number, not {value}")]
-    NotPositive {
-        figure: String,
-        what: &'static str,
-        value: f64,
-    },
-    #[error(
-        "`{figure}` is a count; give what was measured (`measured = …`), the margin comes from [counted.{source_name}], or what is to be reached (`at_least = …`)"
-    )]
-    NotACount { source_name: String, figure: String },
-    #[error(
-        "`{figure}` is a ratio; give the limit itself (`at_most = …`), nothing that is measured, no margin and nothing to be reached"
-    )]
-    NotARatio { figure: String },
-    #[error(
-        "`{figure}` comes from `{source_name}`, which is neither hop, path or fanout nor described under [counted.{source_name}]"
-    )]
-    UnknownSource { source_name: String, figure: String },
-    #[error(
-        "`{figure}` names no ratio ({detail}); write it as `what mode regime: label / label p50`, for instance `hop block same-core: lager / iceoryx2/listener p50`"
-    )]
-    NoRatioName { figure: String, detail: String },
-    #[error(
-        "[counted.{source_name}]: the margins are percentages from 0 to 100, and the one for another rustc is not the smaller one"
-    )]
-    Margin { source_name: String },
-}
-
 impl Limits {
     /// Reads and checks a file.
-    pub(crate) fn load(file: &Path) -> Result<Self, LimitsError> {
-        let text = std::fs::read_to_string(file).map_err(|error| LimitsError::Unreadable {
-            file: file.to_owned(),
-            detail: error.to_string(),
-        })?;
-        Self::parse(file, &text)
+    pub(crate) fn load(file: &Path) -> Result<Self, GuardError> {
+        Self::parse(&read(file)?).map_err(|why| GuardError::Unusable(file.to_owned(), why))
     }
 
-    pub(crate) fn parse(file: &Path, text: &str) -> Result<Self, LimitsError> {
-        let limits: Self = toml::from_str(text).map_err(|error| LimitsError::Syntax {
-            file: file.to_owned(),
-            detail: error.to_string().trim_end().to_owned(),
-        })?;
+    /// What the text of a file says, or why it would not guard what it should.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let limits: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         if limits.limits.is_empty() {
-            return Err(LimitsError::Empty {
-                file: file.to_owned(),
-            });
+            return Err("it has no limit and would guard nothing; write one [[limit]]".to_owned());
         }
         for (source, counted) in &limits.counted {
-            counted.check(source)?;
+            let (margin, other) = (counted.margin_percent, counted.margin_percent_other_rustc);
+            if !(0.0 <= margin && margin <= other && other <= 100.0) {
+                return Err(format!(
+                    "[counted.{source}]: the margins are percentages from 0 to 100, and the one for another rustc is not the smaller one"
+                ));
+            }
         }
         let mut seen = BTreeSet::new();
         for limit in &limits.limits {
-            limit.check(&limits.counted)?;
+            let refused = |why: String| format!("`{}` of `{}` {why}", limit.figure, limit.source);
+            limit.check(&limits.counted).map_err(refused)?;
             if !seen.insert((&limit.source, &limit.figure)) {
-                return Err(LimitsError::Twice {
-                    source_name: limit.source.clone(),
-                    figure: limit.figure.clone(),
-                });
+                return Err(refused("has two limits; keep one".to_owned()));
             }
         }
         Ok(limits)
@@ -146,65 +100,55 @@ impl Limits {
     }
 }
 
-impl Counted {
-    fn check(&self, source: &str) -> Result<(), LimitsError> {
-        let sound = 0.0..=100.0;
-        if sound.contains(&self.margin_percent)
-            && sound.contains(&self.margin_percent_other_rustc)
-            && self.margin_percent <= self.margin_percent_other_rustc
-        {
-            Ok(())
-        } else {
-            Err(LimitsError::Margin {
-                source_name: source.to_owned(),
-            })
-        }
-    }
-}
-
 impl Limit {
-    fn check(&self, counted: &BTreeMap<String, Counted>) -> Result<(), LimitsError> {
-        let source_name = self.source.clone();
-        let figure = self.figure.clone();
+    /// The name's parts, if it is of a ratio.
+    pub(crate) fn ratio(&self) -> Option<RatioName<'_>> {
+        RatioName::parse(&self.figure)
+    }
+
+    fn check(&self, counted: &BTreeMap<String, Counted>) -> Result<(), String> {
         if self.reason.trim().is_empty() {
-            return Err(LimitsError::NoReason { figure });
+            return Err("has no reason; say why the limit is what it is".to_owned());
         }
-        for (what, value) in [
+        let numbers = [
             ("at_most", self.at_most),
             ("at_least", self.at_least),
             ("measured", self.measured),
             ("margin_percent", self.margin_percent),
             ("goal", self.goal),
-        ] {
+        ];
+        for (what, value) in numbers {
             if let Some(value) = value
                 && !(value.is_finite() && value > 0.0)
             {
-                return Err(LimitsError::NotPositive {
-                    figure,
-                    what,
-                    value,
-                });
+                return Err(format!("has {what} = {value}; give a positive number"));
             }
         }
-        let timed = self.source.parse::<Scenario>().is_ok();
-        match (timed, self.at_most, self.at_least, self.measured) {
-            (true, Some(_), None, None) if self.margin_percent.is_none() => self
-                .figure
-                .parse::<RatioName>()
-                .map(|_| ())
-                .map_err(|detail| LimitsError::NoRatioName { figure, detail }),
-            (true, ..) => Err(LimitsError::NotARatio { figure }),
-            (false, ..) if !counted.contains_key(&self.source) => Err(LimitsError::UnknownSource {
-                source_name,
-                figure,
-            }),
-            (false, None, None, Some(_)) => Ok(()),
-            (false, None, Some(_), None) if self.margin_percent.is_none() => Ok(()),
-            (false, ..) => Err(LimitsError::NotACount {
-                source_name,
-                figure,
-            }),
+        let is_timed = Scenario::from_str(&self.source, false).is_ok();
+        if !is_timed && !counted.contains_key(&self.source) {
+            return Err(format!(
+                "comes from what is neither hop, path or fanout nor described under [counted.{}]",
+                self.source
+            ));
         }
+        let margin = self.margin_percent.is_some();
+        let why = match (is_timed, self.at_most, self.at_least, self.measured) {
+            (true, Some(_), None, None) if !margin => match self.ratio() {
+                Some(_) => return Ok(()),
+                None => {
+                    "names no ratio; write it as `what mode regime: label / label p50`, for instance `hop block same-core: lager / iceoryx2/event p50`"
+                }
+            },
+            (true, ..) => {
+                "is a ratio; give the limit itself (`at_most = …`), nothing that is measured, no margin and nothing to be reached"
+            }
+            (false, None, None, Some(_)) => return Ok(()),
+            (false, None, Some(_), None) if !margin => return Ok(()),
+            (false, ..) => {
+                "is a count; give what was measured (`measured = …`), the margin comes from its source, or what is to be reached (`at_least = …`)"
+            }
+        };
+        Err(why.to_owned())
     }
 }
 
@@ -220,14 +164,6 @@ mod tests {
     const COUNT: &str = "[[limit]]\nsource = 'instructions'\nfigure = 'decode'\n\
                          measured = 480\nreason = 'because'\n";
 
-    fn parse(text: &str) -> Result<Limits, LimitsError> {
-        Limits::parse(Path::new("limits.toml"), text)
-    }
-
-    fn refusal(text: &str) -> String {
-        parse(text).unwrap_err().to_string()
-    }
-
     #[test]
     fn the_checked_in_limits_are_sound() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("limits.toml");
@@ -239,7 +175,7 @@ mod tests {
 
     #[test]
     fn ratios_and_counts_are_read() {
-        let limits = parse(&format!("{COUNTED}{RATIO}{COUNT}")).unwrap();
+        let limits = Limits::parse(&format!("{COUNTED}{RATIO}{COUNT}")).unwrap();
         assert_eq!(limits.limits.len(), 2);
         assert_eq!(limits.of("hop").next().unwrap().at_most, Some(1.2));
         assert_eq!(
@@ -277,7 +213,7 @@ mod tests {
             (format!("{RATIO}at_least = 2\n"), "is a ratio"),
         ];
         for (text, expected) in cases {
-            let refusal = refusal(&text);
+            let refusal = Limits::parse(&text).unwrap_err();
             assert!(refusal.contains(expected), "{text}\n-> {refusal}");
         }
     }

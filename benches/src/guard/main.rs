@@ -7,24 +7,26 @@
 //! Exit codes: 0 all limits are kept, 1 a limit is broken or its figure is missing, 2 the guard
 //! could not do its work.
 
+mod error;
 mod figures;
 mod judge;
 mod limits;
 mod measure;
 mod trial;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use lager_benches::chip::{self, Programs};
-use lager_benches::{BenchError, Scenario, machine, median};
+use lager_benches::{Scenario, machine, median};
 use serde::Serialize;
 
-use crate::figures::{Built, Figures, FiguresError};
+use crate::error::{GuardError, read};
+use crate::figures::{Built, Figures};
 use crate::judge::{Judgement, Verdict, judge};
-use crate::limits::{Limits, LimitsError};
-use crate::measure::{MeasureError, Thoroughness, measure};
+use crate::limits::Limits;
+use crate::measure::measure;
 
 /// Holds the bus, the path and the boards' images to their limits: ratios measured in one run, and
 /// counts of instructions and cycles.
@@ -74,27 +76,6 @@ fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Why the guard could not do its work.
-#[derive(Debug, thiserror::Error)]
-enum GuardError {
-    #[error(transparent)]
-    Limits(#[from] LimitsError),
-    #[error(transparent)]
-    Figures(#[from] FiguresError),
-    #[error(transparent)]
-    Measure(#[from] MeasureError),
-    #[error("cycles: {0}")]
-    Chip(#[from] BenchError),
-    #[error("the guard could not be started again with a slow-down: {0}")]
-    Trial(std::io::Error),
-    #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
-    NoSuchSource(String, String),
-    #[error(
-        "there are no counts of `{0}`; run `benches/guard`, which makes them, or leave them out with --only"
-    )]
-    NoCounts(String),
-}
-
 /// The source that is counted by the emulator, in chips.
 const CYCLES: &str = "cycles";
 
@@ -117,11 +98,9 @@ fn main() -> ExitCode {
         try_limits(&arguments)
     } else {
         guard(&arguments).map(|findings| {
-            if arguments.json {
-                let json = serde_json::to_string(&findings).expect("names and numbers are JSON");
-                println!("{json}");
-            } else {
-                print(&findings);
+            match arguments.json {
+                true => println!("{}", json(&findings)),
+                false => print(&findings),
             }
             findings.kept
         })
@@ -139,10 +118,6 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
     let limits = Limits::load(&arguments.limits)?;
     let sources = sources(&limits, &arguments.only)?;
     let counts = counts(arguments)?;
-    let how = Thoroughness {
-        runs: arguments.runs,
-        attempts: arguments.attempts,
-    };
     let mut findings = Findings {
         machine: machine::describe(),
         kept: true,
@@ -151,25 +126,24 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
     };
     for source in sources {
         let counted = counts.iter().find(|figures| figures.source == source);
-        let figures = match (counted, source.parse::<Scenario>()) {
+        let figures = match (counted, Scenario::from_str(&source, false)) {
             (Some(figures), _) => figures.clone(),
             (None, Ok(scenario)) => {
-                let measured = measure(&limits, scenario, how)?;
-                if measured.attempts > 1 {
-                    let times = measured.attempts;
+                let (runs, attempts) = (arguments.runs, arguments.attempts);
+                let (figures, times) = measure(&limits, scenario, runs, attempts)?;
+                if times > 1 {
                     findings.notes.push(format!(
                         "{source}: measured {times} times because a limit was broken; the medians of all runs count"
                     ));
                 }
-                measured.figures
+                figures
             }
             (None, Err(_)) if source == CYCLES => {
                 // `benches/guard` runs this in the source tree.
-                let here = Path::new("");
-                let traces =
-                    chip::measure(chip::BAUDS.map(|baud| (baud, Programs::in_tree(here, baud))))?;
+                let programs = chip::BAUDS.map(|baud| (baud, Programs::in_tree("".as_ref(), baud)));
+                let report = chip::measure(programs).map_err(GuardError::Chip)?;
                 let limited = |name: &str| limits.of(CYCLES).any(|limit| limit.figure == name);
-                Figures::of_traces(CYCLES, &traces, limited)?
+                Figures::of_chips(CYCLES, report, limited)?
             }
             (None, Err(_)) => return Err(GuardError::NoCounts(source)),
         };
@@ -185,29 +159,17 @@ fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
 fn spread(arguments: &Arguments, times: usize) -> Result<(), GuardError> {
     let limits = Limits::load(&arguments.limits)?;
     let scenarios = scenarios(&limits, arguments)?;
-    println!("{}\n", machine::describe());
-    println!(
-        "{:<70} {:>7} {:>7} {:>7} {:>7} {:>7}",
-        "figure", "lowest", "median", "highest", "limit", "goal"
-    );
+    head(["lowest", "median", "highest", "limit", "goal"], "");
     for scenario in scenarios {
-        let measured = measure::spread(&limits, scenario, arguments.runs, times)?;
-        for limit in limits.of(scenario.as_str()) {
-            let mut values: Vec<f64> = measured
-                .iter()
-                .filter_map(|figures| figures.figures.get(&limit.figure).copied())
-                .collect();
+        let once = |_| measure::once(&limits, scenario, arguments.runs);
+        let measured = (0..times).map(once).collect::<Result<Vec<_>, _>>()?;
+        for limit in limits.of(&scenario.to_string()) {
+            let values = measured.iter().filter_map(|one| one.get(&limit.figure));
+            let mut values: Vec<f64> = values.collect();
             values.sort_unstable_by(f64::total_cmp);
-            let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), number);
-            println!(
-                "{:<70} {:>7} {:>7} {:>7} {:>7} {:>7}",
-                limit.figure,
-                show(values.first().copied()),
-                show(median(values.clone())),
-                show(values.last().copied()),
-                show(limit.at_most),
-                show(limit.goal),
-            );
+            let (lowest, highest) = (values.first().copied(), values.last().copied());
+            let cells = [lowest, median(values), highest, limit.at_most, limit.goal];
+            line(&limit.figure, cells.map(number), "");
         }
     }
     Ok(())
@@ -217,40 +179,25 @@ fn spread(arguments: &Arguments, times: usize) -> Result<(), GuardError> {
 fn try_limits(arguments: &Arguments) -> Result<bool, GuardError> {
     let limits = Limits::load(&arguments.limits)?;
     let scenarios = scenarios(&limits, arguments)?;
-    let how = Thoroughness {
-        runs: arguments.runs,
-        attempts: 1,
-    };
     let mut all_noticed = true;
     if !arguments.json {
-        println!("{}\n", machine::describe());
-        println!(
-            "{:<70} {:>7} {:>7} {:>12} {:>7}  noticed",
-            "figure", "limit", "before", "slower by ns", "with it"
-        );
+        head(["limit", "before", "slower ns", "with it"], "noticed");
     }
     for scenario in scenarios {
-        let measured = measure(&limits, scenario, how)?;
-        for mut trial in trial::trials(&limits, &measured.figures) {
-            let source = scenario.as_str();
-            trial::run(&mut trial, &arguments.limits, source, arguments.runs)
-                .map_err(GuardError::Trial)?;
+        let (figures, _) = measure(&limits, scenario, arguments.runs, 1)?;
+        for mut trial in trial::trials(&limits, &figures) {
+            let source = scenario.to_string();
+            trial::run(&mut trial, &arguments.limits, &source, arguments.runs)?;
             for planted in trial {
                 all_noticed &= planted.noticed;
                 if arguments.json {
-                    let json = serde_json::to_string(&planted).expect("names and numbers are JSON");
-                    println!("{json}");
+                    println!("{}", json(&planted));
                     continue;
                 }
-                println!(
-                    "{:<70} {:>7} {:>7} {:>12} {:>7}  {}",
-                    planted.figure,
-                    number(planted.limit),
-                    number(planted.before),
-                    planted.spin_ns,
-                    planted.with.map_or_else(|| "-".to_owned(), number),
-                    if planted.noticed { "yes" } else { "NO" },
-                );
+                let (limit, before) = (Some(planted.limit), Some(planted.before));
+                let cells = [limit, before, Some(planted.spin_ns as f64), planted.with];
+                let noticed = if planted.noticed { "yes" } else { "NO" };
+                line(&planted.figure, cells.map(number), noticed);
             }
         }
     }
@@ -275,55 +222,26 @@ fn sources(limits: &Limits, only: &[String]) -> Result<Vec<String>, GuardError> 
 /// Those of the sources that are timed.
 fn scenarios(limits: &Limits, arguments: &Arguments) -> Result<Vec<Scenario>, GuardError> {
     let sources = sources(limits, &arguments.only)?;
-    let scenario = |source: &String| source.parse().ok();
+    let scenario = |source: &String| Scenario::from_str(source, false).ok();
     Ok(sources.iter().filter_map(scenario).collect())
 }
 
 fn counts(arguments: &Arguments) -> Result<Vec<Figures>, GuardError> {
-    let read = |file: &Path| {
-        std::fs::read_to_string(file).map_err(|error| FiguresError::Unreadable {
-            file: file.display().to_string(),
-            detail: error.to_string(),
-        })
-    };
-    let mut counts = Vec::new();
-    if let Some(file) = &arguments.callgrind {
-        let name = file.display().to_string();
-        counts.push(Figures::of_callgrind(
-            &name,
-            &read(file)?,
-            Built::by_rustc()?,
-        )?);
-    }
-    for file in &arguments.counts {
-        counts.push(Figures::of_counts(
-            &file.display().to_string(),
-            &read(file)?,
-        )?);
-    }
-    Ok(counts)
+    let callgrind = arguments.callgrind.iter();
+    let instructions =
+        callgrind.map(|file| Figures::of_callgrind(file, &read(file)?, Built::by_rustc()?));
+    let others = arguments.counts.iter();
+    let others = others.map(|file| Figures::of_counts(file, &read(file)?));
+    instructions.chain(others).collect()
 }
 
 fn print(findings: &Findings) {
-    println!("{}\n", findings.machine);
-    println!(
-        "{:<70} {:>9} {:>9} {:>7}  verdict",
-        "figure", "measured", "limit", "goal"
-    );
-    let mut source = "";
+    head(["measured", "limit", "goal"], "verdict");
     for one in &findings.limits {
-        if one.source != source {
-            source = &one.source;
-            println!("{source}");
-        }
-        println!(
-            "  {:<68} {:>9} {:>9} {:>7}  {}",
-            one.figure,
-            one.measured.map_or_else(|| "-".to_owned(), number),
-            bound(one),
-            one.goal.map(number).unwrap_or_default(),
-            one.verdict,
-        );
+        let mark = if one.at_least { ">= " } else { "" };
+        let limit = format!("{mark}{}", number(Some(one.limit)));
+        let cells = [number(one.measured), limit, number(one.goal)];
+        line(&one.figure, cells, &one.verdict.to_string());
         if one.verdict.fails() {
             println!("      {}", one.reason);
         }
@@ -331,30 +249,36 @@ fn print(findings: &Findings) {
     for note in &findings.notes {
         println!("\n{note}");
     }
-    let failing = findings
-        .limits
-        .iter()
-        .filter(|one| one.verdict.fails())
-        .count();
-    let judged = findings
-        .limits
-        .iter()
-        .filter(|one| one.verdict != Verdict::NotJudged)
-        .count();
-    println!("\n{} of {judged} limits kept", judged - failing);
+    let count = |is: fn(Verdict) -> bool| {
+        let verdicts = findings.limits.iter().map(|one| one.verdict);
+        verdicts.filter(|verdict| is(*verdict)).count()
+    };
+    let kept = count(|verdict| verdict == Verdict::Kept);
+    let judged = count(|verdict| verdict != Verdict::NotJudged);
+    println!("\n{kept} of {judged} limits kept");
 }
 
-/// The limit, marked where it is one from below.
-fn bound(one: &Judgement) -> String {
-    let mark = if one.at_least { ">= " } else { "" };
-    format!("{mark}{}", number(one.limit))
+/// The machine, and the head of a table of figures.
+fn head<const N: usize>(columns: [&str; N], last: &str) {
+    println!("{}\n", machine::describe());
+    line("figure", columns.map(str::to_owned), last);
+}
+
+/// A line of a table of figures.
+fn line<const N: usize>(figure: &str, cells: [String; N], last: &str) {
+    let cells = cells.map(|cell| format!(" {cell:>9}")).concat();
+    println!("{figure:<70}{cells}  {last}");
 }
 
 /// Ratios with two digits, counts as what they are.
-fn number(value: f64) -> String {
-    if value.fract() == 0.0 && value >= 100.0 {
-        format!("{value}")
-    } else {
-        format!("{value:.2}")
+fn number(value: Option<f64>) -> String {
+    match value {
+        Some(value) if value.fract() == 0.0 && value >= 100.0 => format!("{value}"),
+        Some(value) => format!("{value:.2}"),
+        None => "-".to_owned(),
     }
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("names and numbers are JSON")
 }

@@ -4,85 +4,45 @@
 //! is measured again is put together with what was measured before, and the median of all runs
 //! counts. So a single lucky run does not hide code that is slower than its limit.
 
-use lager_benches::{BenchError, Mode, Options, Regime, Scenario};
+use clap::ValueEnum;
+use lager_benches::{Mode, Options, Regime, Scenario, may_have_real_time};
 
-use crate::figures::{Figures, FiguresError, RatioName};
+use crate::error::GuardError;
+use crate::figures::{Figures, RatioName};
 use crate::judge::judge;
 use crate::limits::Limits;
 
-/// How thoroughly to measure.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Thoroughness {
-    /// Runs of each measurement; a ratio is the median over them.
-    pub(crate) runs: usize,
-    /// Measurements of a scenario while one of its limits is broken.
-    pub(crate) attempts: usize,
-}
-
-/// Why a scenario has no figures.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum MeasureError {
-    #[error("{scenario}: {error}")]
-    Bench {
-        scenario: Scenario,
-        error: BenchError,
-    },
-    #[error(transparent)]
-    Figures(#[from] FiguresError),
-}
-
-/// What a scenario has shown.
-#[derive(Debug)]
-pub(crate) struct Measured {
-    pub(crate) figures: Figures,
-    pub(crate) attempts: usize,
-}
-
-/// Measures `scenario` until its limits are kept, at most as often as allowed.
+/// Measures `scenario` until its limits are kept, at most `attempts` times; the figures, and how
+/// often it was measured.
 pub(crate) fn measure(
     limits: &Limits,
     scenario: Scenario,
-    how: Thoroughness,
-) -> Result<Measured, MeasureError> {
-    let options = options(limits, scenario, how.runs);
-    let mut so_far: Option<Figures> = None;
-    let mut attempts = 0;
-    loop {
-        attempts += 1;
-        let figures = once(scenario, &options)?;
-        let figures = match so_far.take() {
-            Some(earlier) => earlier.pooled_with(figures),
-            None => figures,
-        };
-        let broken = judge(limits, &figures)
-            .0
-            .iter()
-            .any(|judgement| judgement.verdict.fails());
-        if !broken || attempts >= how.attempts {
-            return Ok(Measured { figures, attempts });
+    runs: usize,
+    attempts: usize,
+) -> Result<(Figures, usize), GuardError> {
+    let mut figures = once(limits, scenario, runs)?;
+    for attempt in 1..attempts {
+        let (judgements, _) = judge(limits, &figures);
+        if !judgements.iter().any(|one| one.verdict.fails()) {
+            return Ok((figures, attempt));
         }
-        so_far = Some(figures);
+        figures = figures.pooled_with(once(limits, scenario, runs)?);
     }
+    Ok((figures, attempts))
 }
 
-/// Measures `scenario` so many times and returns the figures of each, for whoever chooses limits.
-pub(crate) fn spread(
+/// Measures `scenario` once.
+pub(crate) fn once(
     limits: &Limits,
     scenario: Scenario,
     runs: usize,
-    times: usize,
-) -> Result<Vec<Figures>, MeasureError> {
-    let options = options(limits, scenario, runs);
-    (0..times).map(|_| once(scenario, &options)).collect()
-}
-
-fn once(scenario: Scenario, options: &Options) -> Result<Figures, MeasureError> {
+) -> Result<Figures, GuardError> {
     let report = scenario
-        .measure(options)
-        .map_err(|error| MeasureError::Bench { scenario, error })?;
-    let mut figures = Figures::of_report(scenario.as_str(), &report)?;
+        .measure(&options(limits, scenario, runs))
+        .map_err(|error| GuardError::Scenario(scenario, error))?;
+    let mut figures = Figures::of_report(&scenario.to_string(), &report)?;
     if scenario == Scenario::Path
-        && let Err(error) = lager_benches::may_have_real_time()
+        && let Err(error) = may_have_real_time()
     {
         let note = format!("path@observed: {error}");
         figures.unmeasured.insert("path@observed".to_owned(), note);
@@ -92,19 +52,19 @@ fn once(scenario: Scenario, options: &Options) -> Result<Figures, MeasureError> 
 
 /// Only the modes and regimes that some limit is about: the rest would cost minutes.
 fn options(limits: &Limits, scenario: Scenario, runs: usize) -> Options {
-    let names: Vec<RatioName> = limits
-        .of(scenario.as_str())
-        .filter_map(|limit| limit.figure.parse().ok())
-        .collect();
+    let source = scenario.to_string();
+    let names: Vec<RatioName> = limits.of(&source).filter_map(|one| one.ratio()).collect();
+    let named = |mode: &Mode| names.iter().any(|name| name.mode == *mode);
+    let regimes = Regime::value_variants().iter().copied();
     Options {
         runs,
         quick: true,
-        modes: Mode::ALL
-            .into_iter()
-            .filter(|mode| names.iter().any(|name| name.mode == *mode))
+        modes: Mode::value_variants()
+            .iter()
+            .copied()
+            .filter(named)
             .collect(),
-        regimes: Regime::ALL
-            .into_iter()
+        regimes: regimes
             .filter(|regime| names.iter().any(|name| name.regime == *regime))
             .collect(),
     }

@@ -12,6 +12,7 @@ use lager_benches::slow;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::error::GuardError;
 use crate::figures::{Figures, RatioName};
 use crate::limits::{Limit, Limits};
 
@@ -40,10 +41,10 @@ pub(crate) type Trial = Vec<Planted>;
 pub(crate) fn trials(limits: &Limits, figures: &Figures) -> Vec<Trial> {
     let mut trials: Vec<(Trial, Vec<RatioName>)> = Vec::new();
     for limit in limits.of(&figures.source) {
-        let (Some(planted), Ok(name)) = (planted(limit, figures), limit.figure.parse()) else {
+        let (Some(planted), Some(name)) = (planted(limit, figures), limit.ratio()) else {
             continue;
         };
-        let fits = |names: &[RatioName]| names.iter().all(|other| other.is_apart_from(&name));
+        let fits = |names: &[RatioName]| names.iter().all(|other| are_apart(other, &name));
         match trials.iter_mut().find(|(_, names)| fits(names)) {
             Some((trial, names)) => {
                 trial.push(planted);
@@ -55,10 +56,17 @@ pub(crate) fn trials(limits: &Limits, figures: &Figures) -> Vec<Trial> {
     trials.into_iter().map(|(trial, _)| trial).collect()
 }
 
+/// Whether one of the two rows can be slowed down without touching the other one's ratio.
+fn are_apart(one: &RatioName, other: &RatioName) -> bool {
+    let is_same_row = one.label == other.label && one.mode == other.mode;
+    (one.what, one.regime) != (other.what, other.regime)
+        || (!is_same_row && one.to != other.label && other.to != one.label)
+}
+
 /// The slow-down that brings a ratio above its limit; `None` without such a ratio.
 fn planted(limit: &Limit, figures: &Figures) -> Option<Planted> {
     let at_most = limit.at_most?;
-    let before = *figures.figures.get(&limit.figure)?;
+    let before = figures.get(&limit.figure)?;
     let own_ns = *figures.times_ns.get(&limit.figure)?;
     let baseline_ns = own_ns / before;
     let spin_ns = (ABOVE * at_most - before).max(0.0) * baseline_ns;
@@ -78,21 +86,24 @@ pub(crate) fn run(
     limits: &Path,
     source: &str,
     runs: usize,
-) -> std::io::Result<()> {
+) -> Result<(), GuardError> {
     let row = |planted: &Planted| {
         let (row, _) = planted.figure.split_once(" / ").unwrap_or_default();
         format!("{row}={}", planted.spin_ns)
     };
     let rows: Vec<String> = trial.iter().map(row).collect();
-    let output = Command::new(std::env::current_exe()?)
+    let guard = std::env::current_exe().map_err(GuardError::Trial)?;
+    let output = Command::new(guard)
         .env(slow::VARIABLE, format!("spin:{}", rows.join(";")))
         .arg("--limits")
         .arg(limits)
         .args(["--only", source, "--json", "--attempts", "1", "--runs"])
         .arg(runs.to_string())
-        .output()?;
+        .output()
+        .map_err(GuardError::Trial)?;
     let findings: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
-        std::io::Error::other(String::from_utf8_lossy(&output.stderr).trim().to_owned())
+        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        GuardError::Trial(std::io::Error::other(said))
     })?;
     for planted in trial {
         let found = findings["limits"]
@@ -119,15 +130,15 @@ mod tests {
             )
         };
         let text: String = figures.iter().map(limit).collect();
-        Limits::parse(Path::new("limits.toml"), &text).unwrap()
+        Limits::parse(&text).unwrap()
     }
 
     fn figures(all: &[&str], ratio: f64, time_ns: f64) -> Figures {
-        let of_each = |value| all.iter().map(|name| ((*name).to_owned(), value)).collect();
+        let names = || all.iter().map(|name| (*name).to_owned());
         Figures {
             source: "path".to_owned(),
-            figures: of_each(ratio),
-            times_ns: of_each(time_ns),
+            runs: names().map(|name| (name, vec![ratio])).collect(),
+            times_ns: names().map(|name| (name, time_ns)).collect(),
             ..Figures::default()
         }
     }

@@ -14,8 +14,10 @@ use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};
 use std::path::PathBuf;
 
+use lager_ports::Clock;
 use lager_rig::process::Main;
-use lager_rig::{Cable, Parent, Refused, Shareable, Shared};
+use lager_rig::schedule::Place;
+use lager_rig::{Cable, Parent, Shareable, Shared};
 use lager_topics::bytes_of;
 use lager_wire::PACKET_LENGTH;
 use rustix::fs::{Mode as FileMode, OFlags};
@@ -23,12 +25,10 @@ use rustix::io::Errno;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde::{Deserialize, Serialize};
 
-use super::pace::{ANSWER_WITHIN, now_ns, sleep_until_due};
-use super::processes::Processes;
-use super::services::Place;
-use super::turn::Chain;
+use super::processes::{ANSWER_WITHIN, Processes};
+use super::turn::{Chain, sleep_until_due};
 use crate::baseline::memory::Lane;
-use crate::error::BenchError;
+use crate::error::{BenchError, Fault};
 use crate::sample::Block;
 
 const ENDS: &str = "path, floor's ends";
@@ -76,12 +76,16 @@ struct Setup {
     ports: [PathBuf; 2],
 }
 
-fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(setup) = parent.hear::<Setup>()? else {
-        return Ok(());
-    };
+/// What the parent says, and the lanes; the process has taken its place.
+fn told(parent: &mut Parent) -> Result<(Setup, Shared<Lanes>), Box<dyn Error>> {
+    let setup: Setup = parent.told()?;
     setup.place.take()?;
-    let lanes = Shared::<Lanes>::inherited(setup.lanes)?;
+    let lanes = Shared::inherited(setup.lanes)?;
+    Ok((setup, lanes))
+}
+
+fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    let (setup, lanes) = told(parent)?;
     let [sensor, steering] = [open(&setup.ports[0])?, open(&setup.ports[1])?];
     parent.say(&())?;
     let [first, second] = &lanes.0;
@@ -93,17 +97,13 @@ fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         let mut seen = 0;
         loop {
             let bytes = take(second, &mut seen)?;
-            rustix::io::write(&steering, &bytes).map_err(port_error)?;
+            rustix::io::write(&steering, &bytes)?;
         }
     })
 }
 
 fn middle(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(setup) = parent.hear::<Setup>()? else {
-        return Ok(());
-    };
-    setup.place.take()?;
-    let lanes = Shared::<Lanes>::inherited(setup.lanes)?;
+    let (_, lanes) = told(parent)?;
     parent.say(&())?;
     let [first, second] = &lanes.0;
     let mut seen = 0;
@@ -113,20 +113,13 @@ fn middle(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
 }
 
 /// A serial port whose `read` blocks, as one would open it without further needs.
-fn open(path: &PathBuf) -> Result<OwnedFd, Refused> {
-    let opened = || -> Result<OwnedFd, Errno> {
-        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
-        let port = rustix::fs::open(path, flags, FileMode::empty())?;
-        let mut termios = tcgetattr(&port)?;
-        termios.make_raw();
-        tcsetattr(&port, OptionalActions::Now, &termios)?;
-        Ok(port)
-    };
-    opened().map_err(port_error)
-}
-
-fn port_error(errno: Errno) -> Refused {
-    Refused::to_make("the floor's end of a pseudo terminal")(errno)
+fn open(path: &PathBuf) -> Result<OwnedFd, Errno> {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let port = rustix::fs::open(path, flags, FileMode::empty())?;
+    let mut termios = tcgetattr(&port)?;
+    termios.make_raw();
+    tcsetattr(&port, OptionalActions::Now, &termios)?;
+    Ok(port)
 }
 
 fn read_whole(port: &OwnedFd, bytes: &mut Bytes) -> Result<(), Errno> {
@@ -181,13 +174,14 @@ impl Chain for Floor {
         let mut bytes = Bytes::default();
         bytes[..8].copy_from_slice(&self.sent.to_le_bytes());
         sleep_until_due();
-        let start = now_ns();
+        let start = Clock::monotonic_ns();
         self.cables[0].write(&bytes)?;
         let mut answer = [0; 64];
         let mut have = 0;
         loop {
-            let count = self.cables[1].read_until(start + ANSWER_WITHIN, &mut answer[have..])?;
-            let end = now_ns();
+            let count = self.cables[1]
+                .read_until(start + ANSWER_WITHIN.as_nanos() as u64, &mut answer[have..])?;
+            let end = Clock::monotonic_ns();
             have += count;
             if count == 0 {
                 return Err(self.processes.fault("floor", self.sent));
@@ -195,10 +189,10 @@ impl Chain for Floor {
             if have >= PACKET_LENGTH {
                 let got = u64::from_le_bytes(answer[..8].try_into().expect("eight of eleven"));
                 if have > PACKET_LENGTH || got != self.sent {
-                    return Err(BenchError::WrongSample {
+                    return Err(BenchError::Failed {
                         contender: "floor".to_owned(),
-                        expected: self.sent,
-                        got,
+                        sample: self.sent,
+                        fault: Fault::Wrong(got),
                     });
                 }
                 return Ok(end - start);

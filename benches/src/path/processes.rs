@@ -3,12 +3,15 @@
 
 use core::time::Duration;
 
-use lager_rig::{Process, ProcessError};
-use rustix::process::{Pid, Signal, kill_process};
+use lager_ports::Clock;
+use lager_rig::{Process, ProcessError, told};
+use rustix::process::Signal;
 use serde::Serialize;
 
-use super::pace::{ANSWER_WITHIN, now_ns};
-use crate::error::BenchError;
+use crate::error::{BenchError, Fault};
+
+/// How long an answer may take before the frame counts as lost and ends the measurement.
+pub(super) const ANSWER_WITHIN: Duration = Duration::from_secs(1);
 
 /// The processes of one chain.
 pub(super) struct Processes {
@@ -52,14 +55,14 @@ impl Processes {
     pub(super) fn rest(&mut self) {
         if let Some((processor, real)) = self.began.take() {
             self.total.0 += self.processor_ns().saturating_sub(processor);
-            self.total.1 += now_ns().saturating_sub(real);
+            self.total.1 += Clock::monotonic_ns().saturating_sub(real);
         }
         self.signal(Signal::STOP);
     }
 
     /// From now on processor time is counted.
     pub(super) fn start_counting(&mut self) {
-        self.began = Some((self.processor_ns(), now_ns()));
+        self.began = Some((self.processor_ns(), Clock::monotonic_ns()));
     }
 
     /// Processor time per real time over all turns, in percent of one core.
@@ -71,63 +74,35 @@ impl Processes {
     /// Why frame `number` has no answer: what a process says, that the kernel does not let it run,
     /// or that it is silent.
     pub(super) fn fault(&mut self, contender: &str, number: u64) -> BenchError {
-        let starved = self.processes[..self.counted].iter().any(wants_to_run);
+        let starved = self.counted().any(told::wants_to_run);
         for process in &mut self.processes {
             match process.hear_within::<()>(Duration::ZERO) {
                 Ok(()) | Err(ProcessError::Silent { .. }) => {}
                 Err(said) => return said.into(),
             }
         }
-        let (contender, limit) = (contender.to_owned(), Duration::from_nanos(ANSWER_WITHIN));
-        if starved {
-            BenchError::Starved { contender, limit }
-        } else {
-            BenchError::NoSample {
-                contender,
-                expected: number,
-                limit,
-            }
+        BenchError::Failed {
+            contender: contender.to_owned(),
+            sample: number,
+            fault: match starved {
+                true => Fault::Starved(ANSWER_WITHIN),
+                false => Fault::Silent(ANSWER_WITHIN),
+            },
         }
     }
 
     fn signal(&self, signal: Signal) {
         for process in &self.processes {
-            let pid = i32::try_from(process.pid()).ok().and_then(Pid::from_raw);
-            // One that has ended is found out with the next frame.
-            let _ = pid.map(|pid| kill_process(pid, signal));
+            process.signal(signal);
         }
     }
 
-    /// Processor time of all threads of the counted processes, in ns.
-    fn processor_ns(&self) -> u64 {
-        self.processes[..self.counted]
-            .iter()
-            .map(processor_ns)
-            .sum()
+    fn counted(&self) -> impl Iterator<Item = u32> {
+        self.processes[..self.counted].iter().map(Process::pid)
     }
-}
 
-/// The kernel counts each thread's time on a processor in ns, first in its `schedstat`.
-fn processor_ns(process: &Process) -> u64 {
-    of_threads(process, "schedstat")
-        .filter_map(|text| text.split_whitespace().next()?.parse::<u64>().ok())
-        .sum()
-}
-
-/// Whether a thread of it is ready to run. Asked of a process that should have answered long ago:
-/// one that waits for a wake-up sleeps.
-fn wants_to_run(process: &Process) -> bool {
-    of_threads(process, "stat")
-        // The state follows the name, which stands in brackets.
-        .any(|stat| matches!(stat.rsplit_once(") "), Some((_, rest)) if rest.starts_with('R')))
-}
-
-/// What the kernel says of each of its threads.
-fn of_threads(process: &Process, file: &'static str) -> impl Iterator<Item = String> {
-    let threads = std::fs::read_dir(format!("/proc/{}/task", process.pid()));
-    threads
-        .into_iter()
-        .flatten()
-        .flatten()
-        .filter_map(move |thread| std::fs::read_to_string(thread.path().join(file)).ok())
+    /// Processor time of the counted processes, in ns.
+    fn processor_ns(&self) -> u64 {
+        self.counted().map(told::processor_ns).sum()
+    }
 }

@@ -16,26 +16,19 @@
 //! read, and how many they are is a row of its own (`path-overtaken`). The steering board reports
 //! that its wheels stand, so the robot drives towards its goods for as long as it is measured.
 
-mod chain;
-
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_ports::{Bus, Cause, Client, Publisher, Subscriber};
-use lager_rig::{
-    Board, Domain, Process, ProcessError, board_us, interrupted, one_square, wheels_in_the_air,
-};
-use lager_topics::{
-    Ask, AskKind, BridgeRequest, LatencyCommand, LatencyPath, LinkHealth, MissionOrder,
-    Mode as Driver, NavMap, NavStatus, Order, Phase, Role,
-};
-use lager_wire::link::BoardEvent;
+use lager_ports::{Bus, Clock};
+use lager_rig::schedule::{Place, RealTime};
+use lager_rig::{Board, Domain, Outset, Process, interrupted, wheels_in_the_air};
+use lager_topics::Role;
 use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelCommand};
 
-use super::pace::{now_ns, sleep_until_due};
-use super::processes::Processes;
-use super::services::{BRIDGE, LOGIC, OBSERVER, Place, RealTime, Setup, bus_error};
-use crate::error::BenchError;
+use super::processes::{ANSWER_WITHIN, Processes};
+use super::services::{BRIDGE, LOGIC, OBSERVER, Setup};
+use super::turn::{Chain, sleep_until_due};
+use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
 use crate::slow;
 
@@ -47,9 +40,6 @@ const REPORT_EVERY: u64 = 100_000_000;
 
 /// Frames that must be answered one after the other before a robot counts as awake.
 const IN_A_ROW: usize = 5;
-
-/// Who asks and orders here, in the sentences of errors.
-const OPERATOR: &str = "the operator of the measurement";
 
 const FOLLOW: u8 = Command::Wheel(WheelCommand::ActiveForward).code();
 
@@ -69,7 +59,7 @@ pub(super) struct Robot {
     /// go: nobody tears down a robot before the rest of the machine may run.
     urgent: Option<RealTime>,
     boards_priority: Option<i32>,
-    name: String,
+    name: &'static str,
     // The processes end first and the bus's files go last.
     processes: Processes,
     sensor: Board,
@@ -82,26 +72,31 @@ pub(super) struct Robot {
     counts: bool,
     /// The times of those that count and whose command was overtaken, in ns.
     overtaken: Vec<u64>,
-    health: Subscriber<LinkHealth>,
-    status: Subscriber<NavStatus>,
-    path_latency: Subscriber<LatencyPath>,
-    command_latency: Subscriber<LatencyCommand>,
-    map: Publisher<NavMap>,
-    orders: Publisher<MissionOrder>,
-    requests: Client<BridgeRequest>,
-    bus: Bus,
-    setup: Setup,
-    domain: Domain,
+    operator: Outset,
+    _bus: Bus,
+    _domain: Domain,
+}
+
+/// Where the processes of a robot run, and how urgent its boards are (SCHED_FIFO, while frames are
+/// counted: nobody who only looks on keeps them from reading the clock).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    pub(super) bridge: Place,
+    pub(super) logic: Place,
+    pub(super) boards: Option<i32>,
 }
 
 impl Robot {
-    /// Starts bridge and logic and lets them drive.
+    /// Starts bridge and logic and lets them drive, watched by so many observers, each a process of
+    /// its own as `lager topic echo` would be.
     pub(super) fn start(
-        name: &str,
+        name: &'static str,
         mode: Mode,
-        bridge: Place,
-        logic: Place,
+        places: Places,
+        observers: usize,
     ) -> Result<Self, BenchError> {
+        // Whether the boards may be as urgent.
+        drop(places.boards.map(RealTime::begin).transpose()?);
         let domain = Domain::new(crate::FAMILY)?;
         let [sensor, steering] = [
             Board::new(Callsign::Sensor)?,
@@ -118,12 +113,12 @@ impl Robot {
             place,
             ..setup.clone()
         };
-        let processes = Processes::start([(LOGIC, at(logic)), (BRIDGE, at(bridge))])?;
+        let services = [(LOGIC, at(places.logic)), (BRIDGE, at(places.bridge))];
         let mut robot = Self {
             urgent: None,
-            boards_priority: None,
-            name: name.to_owned(),
-            processes,
+            boards_priority: places.boards,
+            name,
+            processes: Processes::start(services)?,
             sensor,
             steering,
             last: (0, 0),
@@ -131,108 +126,44 @@ impl Robot {
             frames: 0,
             counts: false,
             overtaken: Vec::new(),
-            health: bus.subscriber().map_err(bus_error(OPERATOR))?,
-            status: bus.subscriber().map_err(bus_error(OPERATOR))?,
-            path_latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
-            command_latency: bus.subscriber().map_err(bus_error(OPERATOR))?,
-            map: bus.publisher().map_err(bus_error(OPERATOR))?,
-            orders: bus.publisher().map_err(bus_error(OPERATOR))?,
-            requests: bus.client().map_err(bus_error(OPERATOR))?,
-            bus,
-            setup,
-            domain,
+            operator: Outset::new(&bus).map_err(no_bus)?,
+            _bus: bus,
+            _domain: domain,
         };
         robot.set_out()?;
-        Ok(robot)
-    }
-
-    /// From now on the thread that plays the boards has that SCHED_FIFO priority while frames are
-    /// counted, so that nobody who only looks on keeps it from reading the clock.
-    pub(super) fn with_boards_at(&mut self, priority: i32) -> Result<(), BenchError> {
-        drop(RealTime::begin(priority)?);
-        self.boards_priority = Some(priority);
-        Ok(())
-    }
-
-    /// Attaches `count` observers, each a process of its own as `lager topic echo` would be.
-    pub(super) fn observed_by(&mut self, count: usize) -> Result<(), BenchError> {
-        let mut observers = Vec::new();
-        for _ in 0..count {
+        let start = |_| {
             let mut observer = Process::start(OBSERVER)?;
-            observer.tell(&self.setup);
-            observers.push(observer);
-        }
+            observer.tell(&setup);
+            Ok::<Process, BenchError>(observer)
+        };
+        let mut observers = (0..observers).map(start).collect::<Result<Vec<_>, _>>()?;
         // They start together; the last of them waits for the others' processor time.
         for observer in &mut observers {
             let () = observer.hear_within(2 * UP_WITHIN)?;
         }
-        self.processes.add(observers);
+        robot.processes.add(observers);
+        Ok(robot)
+    }
+
+    /// From two silent boards, which are played slowly, to a robot on its way.
+    fn set_out(&mut self) -> Result<(), BenchError> {
+        let start = Instant::now();
+        while !self.operator.goes_on().map_err(no_bus)? {
+            self.check(start)?;
+            self.play_boards()?;
+            self.sensor.send(Payload::Line(LineState::OnLine))?;
+            std::thread::sleep(Duration::from_millis(2));
+        }
         Ok(())
     }
 
-    /// From two silent boards to a robot on its way.
-    fn set_out(&mut self) -> Result<(), BenchError> {
-        self.map
-            .send(Cause::OWN, one_square())
-            .map_err(bus_error(OPERATOR))?;
-        self.until("both boards are up", |robot| {
-            let health = robot.health.latest();
-            let health = health.map_err(bus_error("reading health"))?;
-            Ok(health.is_some_and(|health| health.sensor.up != 0 && health.steering.up != 0))
-        })?;
-        let ask = Ask {
-            kind: AskKind::SetMode.into(),
-            mode: Driver::Autonomous.into(),
-            ..Ask::default()
-        };
-        self.requests
-            .call(ask, UP_WITHIN)
-            .map_err(bus_error("asking for the autonomous mode"))?;
-        let order = Order { id: 1, product: 1 };
-        let mut ordered = Instant::now();
-        self.orders
-            .send(Cause::OWN, order)
-            .map_err(bus_error(OPERATOR))?;
-        self.until("the robot is on its way", |robot| {
-            let status = robot.status.latest();
-            let status = status.map_err(bus_error("reading nav/status"))?;
-            // An order that came before logic had its place on the topic is given again.
-            if ordered.elapsed() > Duration::from_millis(500) {
-                ordered = Instant::now();
-                robot
-                    .orders
-                    .send(Cause::OWN, order)
-                    .map_err(bus_error(OPERATOR))?;
-            }
-            Ok(status.is_some_and(|status| status.phase.get() == Some(Phase::Approaching)))
-        })
-    }
-
-    /// Plays both boards, slowly, until `done`.
-    fn until(
-        &mut self,
-        what: &str,
-        mut done: impl FnMut(&mut Self) -> Result<bool, BenchError>,
-    ) -> Result<(), BenchError> {
-        let start = Instant::now();
-        while !done(self)? {
-            if interrupted() {
-                return Err(BenchError::Interrupted);
-            }
-            if start.elapsed() > UP_WITHIN {
-                return Err(match self.processes.fault(&self.name, 0) {
-                    BenchError::NoSample { .. } => ProcessError::Silent {
-                        process: format!("{}, until {what}", self.name),
-                        limit: UP_WITHIN,
-                    }
-                    .into(),
-                    said => said,
-                });
-            }
-            self.play_boards()?;
-            self.sensor.send(Payload::Line(LineState::OnLine))?;
-            self.map.tick();
-            std::thread::sleep(Duration::from_millis(2));
+    /// Whether nobody wants to stop, and there is time left of what was begun at `start`.
+    fn check(&mut self, start: Instant) -> Result<(), BenchError> {
+        if interrupted() {
+            return Err(BenchError::Interrupted);
+        }
+        if start.elapsed() > UP_WITHIN {
+            return Err(self.processes.fault(self.name, self.frames));
         }
         Ok(())
     }
@@ -248,7 +179,7 @@ impl Robot {
 
     /// Reports, if it is time: the wheels stand, and the board is one of ours.
     fn report(&mut self) -> Result<(), BenchError> {
-        let now = now_ns();
+        let now = Clock::monotonic_ns();
         if now.saturating_sub(self.reported_ns) < REPORT_EVERY || !self.steering.link.is_up() {
             return Ok(());
         }
@@ -258,34 +189,15 @@ impl Robot {
 
     /// Takes commands that nobody has asked for by a frame.
     fn drain_commands(&mut self) -> Result<(), BenchError> {
-        let mut buffer = [0; 256];
-        loop {
-            let count = self.steering.cable.read(&mut buffer)?;
-            if count == 0 {
-                return Ok(());
-            }
-            self.take(&buffer[..count]);
-        }
+        let last = &mut self.last;
+        self.steering.take(|payload| {
+            note(last, payload);
+        })?;
+        Ok(())
     }
 
-    /// Takes bytes from the bridge; the last command among them, if it is a new one.
-    fn take(&mut self, bytes: &[u8]) -> Option<u8> {
-        let mut new = None;
-        for byte in bytes {
-            if let Some(BoardEvent::Packet(packet)) = self.steering.link.push(*byte, board_us())
-                && let Payload::SteerCommand(command) = packet.payload
-            {
-                if command.seq != self.last.1 {
-                    new = Some(command.code);
-                }
-                self.last = (command.code, command.seq);
-            }
-        }
-        new
-    }
-
-    /// Sends one frame when it is due, and waits at most `limit` ns for its answer.
-    fn exchange(&mut self, limit: u64) -> Result<Answer, BenchError> {
+    /// Sends one frame when it is due, and waits at most `limit` for its answer.
+    fn exchange(&mut self, limit: Duration) -> Result<Answer, BenchError> {
         sleep_until_due();
         self.drain_commands()?;
         self.frames += 1;
@@ -298,17 +210,17 @@ impl Robot {
         let Some(packet) = self.sensor.link.encode(payload) else {
             return Ok(Answer::None);
         };
-        let start = now_ns();
+        let start = Clock::monotonic_ns();
         self.sensor.cable.write(&packet)?;
-        let give_up = start + limit;
+        let give_up = start + limit.as_nanos() as u64;
         let mut buffer = [0; 256];
         loop {
-            let look = give_up.min(now_ns() + REPORT_EVERY);
+            let look = give_up.min(Clock::monotonic_ns() + REPORT_EVERY);
             let count = self.steering.cable.read_until(look, &mut buffer)?;
             if count > 0 {
                 slow::answer();
             }
-            let end = now_ns();
+            let end = Clock::monotonic_ns();
             if count == 0 && end >= give_up {
                 return Ok(Answer::None);
             }
@@ -318,7 +230,11 @@ impl Robot {
                 self.report()?;
                 continue;
             }
-            if let Some(code) = self.take(&buffer[..count]) {
+            let (last, mut new) = (&mut self.last, None);
+            self.steering.hear(&buffer[..count], |payload| {
+                new = note(last, payload).or(new);
+            });
+            if let Some(code) = new {
                 return Ok(if (code == FOLLOW) == follows {
                     Answer::Overtaken(end - start)
                 } else {
@@ -329,13 +245,64 @@ impl Robot {
     }
 }
 
-impl core::fmt::Debug for Robot {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter
-            .debug_struct("Robot")
-            .field("name", &self.name)
-            .field("bus", &self.bus)
-            .field("domain", &self.domain)
-            .finish_non_exhaustive()
+/// Notes a command to the steering board; its code, if it is a new one.
+fn note(last: &mut (u8, u8), payload: Payload) -> Option<u8> {
+    let Payload::SteerCommand(command) = payload else {
+        return None;
+    };
+    let is_new = command.seq != last.1;
+    *last = (command.code, command.seq);
+    is_new.then_some(command.code)
+}
+
+impl Chain for Robot {
+    fn processes(&mut self) -> &mut Processes {
+        &mut self.processes
+    }
+
+    fn begin(&mut self) -> Result<(), BenchError> {
+        let start = Instant::now();
+        let mut in_a_row = 0;
+        // It may have stood still for longer than leases and links hold, and finds its way back by
+        // itself; or for nearly as long, and then the next report must not be late.
+        self.reported_ns = 0;
+        while in_a_row < IN_A_ROW {
+            self.check(start)?;
+            self.play_boards()?;
+            in_a_row = match self.exchange(Duration::from_millis(20))? {
+                Answer::After(_) => in_a_row + 1,
+                Answer::Overtaken(_) | Answer::None => 0,
+            };
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self) -> Result<u64, BenchError> {
+        let time = match self.exchange(ANSWER_WITHIN)? {
+            Answer::After(time) => time,
+            Answer::Overtaken(time) => {
+                if self.counts {
+                    self.overtaken.push(time);
+                }
+                time
+            }
+            Answer::None => return Err(self.processes.fault(self.name, self.frames)),
+        };
+        // While the robot stands: a report is news to logic too, which then looks for the line.
+        if self.last.0 != FOLLOW {
+            self.report()?;
+        }
+        Ok(time)
+    }
+
+    fn counts(&mut self, counts: bool) -> Result<(), BenchError> {
+        self.counts = counts;
+        let priority = self.boards_priority.filter(|_| counts);
+        self.urgent = priority.map(RealTime::begin).transpose()?;
+        Ok(())
+    }
+
+    fn overtaken(&self) -> Option<&[u64]> {
+        Some(&self.overtaken)
     }
 }

@@ -11,13 +11,12 @@ use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
 use lager_ports::{Bus, Shutdown, Subscriber};
 use lager_rig::process::Main;
-use lager_rig::schedule::schedule;
+use lager_rig::schedule::Place;
 use lager_rig::{Parent, bus_at};
 use lager_topics::{Role, SensorLine, SteeringCommand, Topic};
 use serde::{Deserialize, Serialize};
 
-use crate::error::BenchError;
-use crate::machine;
+use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
 
 /// The names of the processes.
@@ -30,29 +29,6 @@ pub(crate) const PROCESSES: &[(&str, Main)] =
 
 /// How often an observer looks: often enough for a person's eye.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-
-/// Where and how a process runs.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Place {
-    /// The core it is bound to; `None` = any.
-    pub(super) core: Option<usize>,
-    /// Its SCHED_FIFO priority; `None` = as any process.
-    pub(super) priority: Option<i32>,
-}
-
-impl Place {
-    /// Takes the place, with all threads that this one starts later.
-    pub(super) fn take(self) -> Result<(), BenchError> {
-        if let Some(core) = self.core {
-            machine::pin(core)?;
-        }
-        if let Some(priority) = self.priority {
-            // For the rest of the process's life.
-            core::mem::forget(RealTime::begin(priority)?);
-        }
-        Ok(())
-    }
-}
 
 /// What a process of the path is told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -67,41 +43,32 @@ pub(super) struct Setup {
 
 impl Setup {
     pub(super) fn open(&self, role: Role) -> Result<Bus, BenchError> {
-        Bus::open(&bus_at(&self.folder), role).map_err(bus_error("joining the bus"))
+        Bus::open(&bus_at(&self.folder), role).map_err(no_bus)
     }
 }
 
-/// The bus's own sentence, as the measurement's.
-pub(super) fn bus_error<E: core::fmt::Display>(what: &'static str) -> impl FnOnce(E) -> BenchError {
-    move |error| BenchError::Bus {
-        what,
-        detail: error.to_string(),
-    }
+/// What the parent says, and the bus; the process has taken its place.
+fn told(parent: &mut Parent, role: Role) -> Result<(Setup, Bus), Box<dyn Error>> {
+    let setup: Setup = parent.told()?;
+    setup.place.take()?;
+    let bus = setup.open(role)?;
+    Ok((setup, bus))
 }
 
 fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(setup) = parent.hear::<Setup>()? else {
-        return Ok(());
-    };
-    setup.place.take()?;
-    let bus = setup.open(Role::Bridge)?;
+    let (setup, bus) = told(parent, Role::Bridge)?;
     let config = BridgeConfig {
-        ports: setup.ports.clone(),
+        ports: setup.ports,
         waiting: setup.mode.policy(),
         ..BridgeConfig::default()
     };
     parent.say(&())?;
     // Ends with the process, which the parent ends.
-    lager_bridge::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running the bridge"))?;
-    Ok(())
+    Ok(lager_bridge::run(&bus, &config, &Shutdown::new())?)
 }
 
 fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(setup) = parent.hear::<Setup>()? else {
-        return Ok(());
-    };
-    setup.place.take()?;
-    let bus = setup.open(Role::Logic)?;
+    let (setup, bus) = told(parent, Role::Logic)?;
     let config = LogicConfig {
         // With it every frame makes a new order: a line frame lets the robot see and drive, any
         // other frame, a millisecond later, finds the line long unseen and lets it stand.
@@ -110,23 +77,14 @@ fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         ..LogicConfig::default()
     };
     parent.say(&())?;
-    lager_logic::run(&bus, &config, &Shutdown::new()).map_err(bus_error("running logic"))?;
-    Ok(())
+    Ok(lager_logic::run(&bus, &config, &Shutdown::new())?)
 }
 
 /// An observer: reads ten times a second all that has come, and is never woken.
 fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    let Some(setup) = parent.hear::<Setup>()? else {
-        return Ok(());
-    };
-    setup.place.take()?;
-    let bus = setup.open(Role::Observer)?;
-    let mut line = bus
-        .subscriber::<SensorLine>()
-        .map_err(bus_error("observing"))?;
-    let mut commands = bus
-        .subscriber::<SteeringCommand>()
-        .map_err(bus_error("observing"))?;
+    let (_, bus) = told(parent, Role::Observer)?;
+    let mut line = bus.subscriber::<SensorLine>()?;
+    let mut commands = bus.subscriber::<SteeringCommand>()?;
     parent.say(&())?;
     loop {
         drain(&mut line)?;
@@ -135,32 +93,7 @@ fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     }
 }
 
-fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), BenchError> {
-    while subscriber
-        .receive()
-        .map_err(bus_error("observing"))?
-        .is_some()
-    {}
+fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), Box<dyn Error>> {
+    while subscriber.receive()?.is_some() {}
     Ok(())
-}
-
-/// The calling thread comes before all that is not real time, as long as this lives; so do the
-/// threads and processes that it starts meanwhile.
-#[derive(Debug)]
-pub(super) struct RealTime(());
-
-impl RealTime {
-    pub(super) fn begin(priority: i32) -> Result<Self, BenchError> {
-        schedule(libc::SCHED_FIFO, priority).map_err(|error| BenchError::RealTime {
-            detail: error.to_string(),
-        })?;
-        Ok(Self(()))
-    }
-}
-
-impl Drop for RealTime {
-    fn drop(&mut self) {
-        // Anybody may become less urgent.
-        let _ = schedule(libc::SCHED_OTHER, 0);
-    }
 }

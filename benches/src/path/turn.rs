@@ -1,10 +1,21 @@
 //! One turn of a chain: its processes wake, answer frames and stand still again.
+//!
+//! Frames come at 1 kHz, always at the same phase of the millisecond and away from the kernel's
+//! timer tick, which comes on whole milliseconds. A chain that happened to meet the tick would look
+//! slower than one that did not.
 
-use lager_rig::interrupted;
+use lager_ports::Clock;
+use lager_rig::{interrupted, timespec};
+use rustix::thread::{ClockId, clock_nanosleep_absolute};
 
 use super::processes::Processes;
-use super::stages::Counted;
 use crate::error::BenchError;
+
+/// Time between frames, in ns.
+const PERIOD: u64 = 1_000_000;
+
+/// Where in the millisecond a frame is sent, in ns.
+const PHASE: u64 = 370_000;
 
 /// Frames of a turn that are sent and not counted: caches, learnt rates and clock frequencies are
 /// then as in the middle of a long run.
@@ -27,13 +38,10 @@ pub(super) trait Chain {
     fn counts(&mut self, _counts: bool) -> Result<(), BenchError> {
         Ok(())
     }
-    /// The times of the frames that counted and whose command was overtaken by another one, in ns.
-    fn overtaken(&self) -> &[u64] {
-        &[]
-    }
-    /// What the chain itself has counted, as of the last second, if it counts anything.
-    fn counted(&mut self) -> Result<Option<Counted>, BenchError> {
-        Ok(None)
+    /// The times of the frames that counted and whose command was overtaken by another one, in ns;
+    /// `None` of a chain where none can be.
+    fn overtaken(&self) -> Option<&[u64]> {
+        None
     }
 }
 
@@ -57,4 +65,36 @@ pub(super) fn turn(chain: &mut dyn Chain, frames: usize) -> Result<Vec<u64>, Ben
     chain.counts(false)?;
     chain.processes().rest();
     Ok(times)
+}
+
+/// Sleeps until a frame is due.
+pub(super) fn sleep_until_due() {
+    let due = next_due(Clock::monotonic_ns());
+    while clock_nanosleep_absolute(ClockId::Monotonic, &timespec(due)).is_err() {
+        if interrupted() {
+            return;
+        }
+    }
+}
+
+/// The first moment of the right phase that is at least a quarter of a period away, so that no
+/// frame is sent by one who has not slept.
+fn next_due(now: u64) -> u64 {
+    let earliest = now + PERIOD / 4;
+    let due = earliest - earliest % PERIOD + PHASE;
+    if due < earliest { due + PERIOD } else { due }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_due_once_in_a_period_at_their_phase() {
+        for now in (0..3 * PERIOD).step_by(10_000) {
+            let due = next_due(now);
+            assert_eq!(due % PERIOD, PHASE);
+            assert!(due >= now + PERIOD / 4 && due < now + PERIOD / 4 + PERIOD);
+        }
+    }
 }

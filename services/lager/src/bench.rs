@@ -10,8 +10,9 @@ mod stop;
 use std::fmt;
 
 use anyhow::{Context, Result, ensure};
-use lager_benches::chip::{self, ChipReport, Programs};
-use lager_benches::{Mode, Options, Regime, Scenario as Timed};
+use clap::ValueEnum;
+use lager_benches::chip::{self, Programs};
+use lager_benches::{Options, Scenario as Timed};
 use serde::Serialize;
 
 use crate::cli::{BenchArgs, Scenario};
@@ -30,11 +31,7 @@ pub fn run(args: &BenchArgs) -> Result<String> {
     };
     let measured = scenario.measure(&options);
     let report = measured.with_context(|| format!("`lager bench {scenario}` has no result"))?;
-    Ok(if args.json {
-        report.to_json()
-    } else {
-        report.to_string().trim_end().to_owned()
-    })
+    told(args, &report)
 }
 
 /// The boards' images in the emulator, where they are built or installed: images that the
@@ -59,13 +56,8 @@ fn run_chip(args: &BenchArgs) -> Result<String> {
         })
     });
     let failed = "`lager bench chip` has no result";
-    let traces = chip::measure([fast.context(failed)?, slow.context(failed)?]).context(failed)?;
-    let report = ChipReport::of(&traces);
-    Ok(if args.json {
-        report.to_json()
-    } else {
-        report.to_string().trim_end().to_owned()
-    })
+    let report = chip::measure([fast.context(failed)?, slow.context(failed)?]).context(failed)?;
+    told(args, &report)
 }
 
 /// How often a robot is stopped or given a command: for a first look, and in full.
@@ -109,26 +101,23 @@ fn told<R: Serialize + fmt::Display>(args: &BenchArgs, report: &R) -> Result<Str
 
 /// Everything that the flags leave open is measured in full.
 fn options(args: &BenchArgs) -> Options {
-    let or_all = |chosen: &[Mode]| {
-        let all = Mode::ALL.into_iter();
-        all.filter(|mode| chosen.is_empty() || chosen.contains(mode))
+    fn or_all<T: ValueEnum + PartialEq>(chosen: &[T]) -> Vec<T> {
+        let all = T::value_variants().iter().cloned();
+        all.filter(|one| chosen.is_empty() || chosen.contains(one))
             .collect()
-    };
-    let default = Options::default();
+    }
     Options {
-        runs: args.runs.unwrap_or(default.runs),
+        runs: args.runs.unwrap_or(Options::default().runs),
         quick: args.quick,
         modes: or_all(&args.mode),
-        regimes: Regime::ALL
-            .into_iter()
-            .filter(|regime| args.regime.is_empty() || args.regime.contains(regime))
-            .collect(),
+        regimes: or_all(&args.regime),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use lager_benches::{Mode, Regime};
 
     use super::*;
     use crate::cli::{Cli, Command};
@@ -183,8 +172,8 @@ mod tests {
                 &["leap"][..],
                 "hop, path, fanout, chip, stop, command, link",
             ),
-            (&["hop", "--mode", "busy"], "spin, adaptive or block"),
-            (&["hop", "--regime", "calm"], "plain, same-core or no-halt"),
+            (&["hop", "--mode", "busy"], "spin, adaptive, block"),
+            (&["hop", "--regime", "calm"], "plain, same-core, no-halt"),
             (&["hop", "--runs", "0"], "the least"),
         ] {
             let said = parsed(flags).expect_err("wrong").to_string();

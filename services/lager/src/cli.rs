@@ -509,10 +509,10 @@ pub struct BenchArgs {
     /// Take few samples, for a first look (not `chip`)
     #[arg(long)]
     pub quick: bool,
-    /// How the receiver waits: spin, adaptive or block [default: all]
+    /// How the receiver waits [default: all]
     #[arg(long, value_name = "MODE", value_delimiter = ',')]
     pub mode: Vec<Mode>,
-    /// Where the processes run: plain (a core each), same-core, or no-halt (a core each, kept awake) [default: all]
+    /// Where the processes run [default: all]
     #[arg(long, value_name = "REGIME", value_delimiter = ',')]
     pub regime: Vec<Regime>,
 }

@@ -66,10 +66,15 @@ impl Board {
             if count == 0 {
                 return Ok(());
             }
-            for byte in &buffer[..count] {
-                if let Some(BoardEvent::Packet(taken)) = self.link.push(*byte, board_us()) {
-                    packet(taken.payload);
-                }
+            self.hear(&buffer[..count], &mut packet);
+        }
+    }
+
+    /// Hears bytes that were read from the cable, and hands over each packet's data.
+    pub fn hear(&mut self, bytes: &[u8], mut packet: impl FnMut(Payload)) {
+        for byte in bytes {
+            if let Some(BoardEvent::Packet(heard)) = self.link.push(*byte, board_us()) {
+                packet(heard.payload);
             }
         }
     }
@@ -92,7 +97,6 @@ pub fn wheels_in_the_air(code: u8) -> Payload {
 }
 
 /// A board's clock: microseconds that wrap.
-#[must_use]
-pub fn board_us() -> u32 {
+fn board_us() -> u32 {
     (Clock::monotonic_ns() / 1_000) as u32
 }

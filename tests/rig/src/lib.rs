@@ -9,17 +9,20 @@ mod cable;
 mod domain;
 mod interrupts;
 mod map;
+mod outset;
 pub mod process;
 pub mod schedule;
 mod shared;
+pub mod told;
 
-pub use board::{Board, board_us, wheels_in_the_air};
+pub use board::{Board, wheels_in_the_air};
 pub use cable::{Cable, timespec};
 pub use domain::{Domain, NoPlace, bus_at};
 pub use interrupts::{heed_interrupts, interrupted};
 pub use map::one_square;
+pub use outset::Outset;
 pub use process::{Parent, Process, ProcessError};
-pub use shared::{Barrier, Shareable, Shared, inherit};
+pub use shared::{Barrier, Counter, Shareable, Shared, inherit};
 
 /// The kernel refused something that a test or a measurement is made of.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

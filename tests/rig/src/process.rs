@@ -20,7 +20,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::Instant;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{Signal, set_parent_process_death_signal};
+use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +160,17 @@ impl Parent {
         }
     }
 
+    /// What the parent says first. One that hears nothing has nothing to do, and ends.
+    ///
+    /// # Errors
+    /// It is not understood.
+    pub fn told<T: DeserializeOwned>(&mut self) -> Result<T, ProcessError> {
+        match self.hear()? {
+            Some(told) => Ok(told),
+            None => std::process::exit(0),
+        }
+    }
+
     /// Says `what` to the parent.
     ///
     /// # Errors
@@ -257,6 +268,11 @@ impl Process {
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Sends it a signal, if it has not ended.
+    pub fn signal(&self, signal: Signal) {
+        let _ = kill_process(Pid::from_child(&self.child), signal);
     }
 
     /// Whether it still runs.

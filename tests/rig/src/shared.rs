@@ -6,7 +6,7 @@
 use core::fmt;
 use core::marker::PhantomData;
 use core::ptr::NonNull;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use core::time::Duration;
 use std::ops::Deref;
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
@@ -146,6 +146,35 @@ impl Barrier {
     }
 }
 
+/// A number that one process sets and another waits for, in a cache line of its own.
+#[derive(Debug)]
+#[repr(C, align(64))]
+pub struct Counter(AtomicU64);
+
+impl Counter {
+    /// Sets it; who sees that also sees all that was written before.
+    pub fn set(&self, number: u64) {
+        self.0.store(number, Ordering::Release);
+    }
+
+    /// Waits without sleeping until it is `number`; false if it is not within `limit`.
+    pub fn becomes(&self, number: u64, limit: Duration) -> bool {
+        // Looking at the clock costs more than looking at a word.
+        const LOOKS: u32 = 1_000;
+        let start = Instant::now();
+        while start.elapsed() < limit {
+            for _ in 0..LOOKS {
+                if self.0.load(Ordering::Acquire) == number {
+                    return true;
+                }
+                // The other process may be on this core.
+                rustix::thread::sched_yield();
+            }
+        }
+        false
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,6 +182,7 @@ mod tests {
     #[repr(C)]
     struct Words {
         barrier: Barrier,
+        counter: Counter,
         word: AtomicU32,
     }
 
@@ -175,5 +205,14 @@ mod tests {
         let memory = Shared::<Words>::new().unwrap();
         assert!(!memory.barrier.pass(2, 1, Duration::from_millis(5)));
         assert!(memory.barrier.pass(2, 1, Duration::from_secs(60)));
+    }
+
+    #[test]
+    fn a_counter_is_waited_for() {
+        let memory = Shared::<Words>::new().unwrap();
+        let limit = Duration::from_millis(5);
+        assert!(!memory.counter.becomes(7, limit));
+        memory.counter.set(7);
+        assert!(memory.counter.becomes(7, Duration::from_secs(60)));
     }
 }

@@ -1,0 +1,40 @@
+//! Why the guard could not do its work; every message says what to do.
+
+use std::path::{Path, PathBuf};
+
+use lager_benches::{BenchError, Scenario};
+
+/// Why the guard could not do its work.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum GuardError {
+    #[error("{0} cannot be read ({1})")]
+    Unreadable(PathBuf, std::io::Error),
+    /// A file of limits or of counts.
+    #[error("{0}: {1}")]
+    Unusable(PathBuf, String),
+    #[error(
+        "`{0}` yields `{1}` twice, so a limit on it would hold one of them only; give one of the rows another name or variant"
+    )]
+    Twice(String, String),
+    #[error(
+        "`rustc -vV` does not say what it is ({0}); put the rustc that built the benches into PATH"
+    )]
+    Rustc(String),
+    #[error("{0}: {1}")]
+    Scenario(Scenario, BenchError),
+    #[error("cycles: {0}")]
+    Chip(BenchError),
+    #[error("the guard could not be started again with a slow-down: {0}")]
+    Trial(std::io::Error),
+    #[error("`--only {0}` selects nothing; the sources that have limits are: {1}")]
+    NoSuchSource(String, String),
+    #[error(
+        "there are no counts of `{0}`; run `benches/guard`, which makes them, or leave them out with --only"
+    )]
+    NoCounts(String),
+}
+
+/// What a file says.
+pub(crate) fn read(file: &Path) -> Result<String, GuardError> {
+    std::fs::read_to_string(file).map_err(|error| GuardError::Unreadable(file.to_owned(), error))
+}

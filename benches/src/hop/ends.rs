@@ -1,0 +1,280 @@
+//! What takes part in the hop: the sender times each sample's way, the receiver sends back what it
+//! receives. A row and what carries its samples stand in one table ([`ROWS`]).
+
+use core::time::Duration;
+use std::os::fd::OwnedFd;
+use std::time::Instant;
+
+use lager_ports::{Bus, Clock, Policy};
+use lager_topics::{Qos, SensorLine, Stamp, Topic};
+use serde::{Deserialize, Serialize};
+
+use crate::baseline::iceoryx::{self, Header, Member};
+#[cfg(feature = "zenoh")]
+use crate::baseline::zenoh;
+use crate::baseline::{End, LIMIT, TIME_OUT, memory, stream};
+use crate::error::{BenchError, Fault, broken, no_bus};
+use crate::group::Entry;
+use crate::pair::{self, Side};
+use crate::report::Mode;
+use crate::sample::{Ping, Pong, RECEIVER, SENDER, Sample};
+use crate::slow;
+
+/// From this line on a pipe for each of the two to write into: what to read from, what to write
+/// into.
+const PIPES: usize = 0;
+/// What each of the two rings.
+const EVENTFDS: usize = 2;
+/// The end of each of the two.
+const UDS: usize = 3;
+/// The end of each of the two.
+const TCP: usize = 4;
+
+/// What is measured in a round.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct Job {
+    /// The number of the row in [`ROWS`].
+    pub(super) row: usize,
+    /// One way is timed by itself, from the sender's clock to the receiver's, with at least so long
+    /// from one sample to the next; zero is as fast as they come back. `None` = half of the round
+    /// trip is timed, as fast as samples come back: one clock, at one end; a tail shows by half.
+    pub(super) gap: Option<Duration>,
+}
+
+type Round = pair::Round<Job>;
+
+/// What spinning rows are compared with.
+pub(super) const HEADER: &str = "iceoryx2/header";
+const TO_HEADER: &[&str] = &[HEADER];
+const TO_EVENT: &[&str] = &["iceoryx2/event"];
+
+const fn spins(label: &'static str, against: &'static [&'static str]) -> Entry {
+    Entry::new(label, Mode::Spin, against)
+}
+
+const fn sleeps(label: &'static str, against: &'static [&'static str]) -> Entry {
+    Entry::new(label, Mode::Block, against)
+}
+
+/// Exchanges the samples of a round.
+type Exchange = fn(&One) -> Result<Vec<u64>, BenchError>;
+
+/// Everything that takes part, in the order of the tables: what it is compared with, and what
+/// carries its samples.
+pub(super) const ROWS: &[(Entry, Exchange)] = &[
+    // The typed ports.
+    (
+        spins("lager", &[HEADER, "iceoryx2/bare", "iceoryx2/defaults"]),
+        |one| one.ours(Policy::Spin),
+    ),
+    // Bare iceoryx2, polled without pause, with the typed ports' header and limits.
+    (spins(HEADER, &[]), |one| {
+        one.polling::<Stamp>(Member::join(&one.side.config)?, Some(&SensorLine::QOS))
+    }),
+    // With their limits, but without header and clock.
+    (spins("iceoryx2/bare", TO_HEADER), |one| {
+        one.polling::<()>(Member::join(&one.side.config)?, Some(&SensorLine::QOS))
+    }),
+    // With its own default limits, without header and clock.
+    (spins("iceoryx2/defaults", TO_HEADER), |one| {
+        one.polling::<()>(Member::join_with_defaults(&one.side.config)?, None)
+    }),
+    // A cache line, watched without pause.
+    (spins("cacheline", TO_HEADER), |one| {
+        let [out, back] = one.lanes();
+        one.exchange(memory::cache_line(out, back))
+    }),
+    (Entry::new("lager", Mode::Adaptive, TO_HEADER), |one| {
+        // One of two cores at most is given to adaptive spinning, and it is the receiver's wait
+        // that is timed.
+        one.ours(match one.side.is_first {
+            true => Policy::Spin,
+            false => Policy::ADAPTIVE,
+        })
+    }),
+    (sleeps("lager", &["iceoryx2/event", "futex"]), |one| {
+        one.ours(Policy::Block)
+    }),
+    // Bare iceoryx2 with the typed ports' header and limits, and an event to sleep on.
+    (sleeps("iceoryx2/event", &[]), |one| {
+        let member = Member::join(&one.side.config)?;
+        one.exchange(iceoryx::listening(&member, one.names(), &SensorLine::QOS)?)
+    }),
+    // A cache line and a futex to sleep on, and the same with an eventfd.
+    (sleeps("futex", TO_EVENT), |one| {
+        let [out, back] = one.lanes();
+        one.exchange(memory::a_futex(out, back))
+    }),
+    (sleeps("eventfd", TO_EVENT), |one| {
+        let ([out, back], [own, other]) = (one.lanes(), one.places());
+        let bells = &one.side.lines[EVENTFDS];
+        one.exchange(memory::an_eventfd(
+            (out, &bells[own]),
+            (back, &bells[other]),
+        ))
+    }),
+    (sleeps("pipe", TO_EVENT), |one| {
+        let [own, other] = one.places().map(|place| &one.side.lines[PIPES + place]);
+        one.exchange(stream::end(&own[1], &other[0]))
+    }),
+    (sleeps("uds", TO_EVENT), |one| one.socket(UDS)),
+    (sleeps("tcp", TO_EVENT), |one| one.socket(TCP)),
+    // Two Zenoh peers on a Unix socket, each with a channel to sleep on.
+    #[cfg(feature = "zenoh")]
+    (sleeps("zenoh", TO_EVENT), |one| {
+        let folder = one.side.config.folder.as_deref().unwrap_or("".as_ref());
+        // A name of its own for each round: the one before may still be closing.
+        let socket = folder.join(format!("zenoh-{}", one.round.number));
+        one.exchange(zenoh::meet(&socket, one.side.is_first, one.names())?)
+    }),
+];
+
+/// One round of one of the two, with ends of its own. The sender returns the times of one way each,
+/// in ns; where only one way is timed, it returns when it sent, and the receiver when it received.
+pub(super) fn round(side: &Side, round: &Round) -> Result<Vec<u64>, BenchError> {
+    let (_, exchange) = ROWS[round.what.row];
+    exchange(&One { side, round })
+}
+
+/// One of the two in a round.
+pub(super) struct One<'a> {
+    side: &'a Side,
+    round: &'a Round,
+}
+
+impl One<'_> {
+    /// Its own place in an array of two, and the other's.
+    fn places(&self) -> [usize; 2] {
+        match self.side.is_first {
+            true => [0, 1],
+            false => [1, 0],
+        }
+    }
+
+    fn lanes(&self) -> [&memory::Lane<8>; 2] {
+        self.places().map(|place| &self.side.shared.lanes[place])
+    }
+
+    /// What bare iceoryx2 and Zenoh publish to, and what they subscribe to.
+    fn names(&self) -> (&'static str, &'static str) {
+        match self.side.is_first {
+            true => ("bench/bare-ping", "bench/bare-pong"),
+            false => ("bench/bare-pong", "bench/bare-ping"),
+        }
+    }
+
+    fn ours(&self, policy: Policy) -> Result<Vec<u64>, BenchError> {
+        if self.side.is_first {
+            let bus = self.side.bus(SENDER)?;
+            self.exchange(ours::<Ping, Pong>(&bus, policy)?)
+        } else {
+            let bus = self.side.bus(RECEIVER)?;
+            self.exchange(ours::<Pong, Ping>(&bus, policy)?)
+        }
+    }
+
+    fn polling<H: Header>(
+        &self,
+        member: Member,
+        limits: Option<&Qos>,
+    ) -> Result<Vec<u64>, BenchError> {
+        self.exchange(iceoryx::polling::<H>(&member, self.names(), limits)?)
+    }
+
+    fn socket(&self, line: usize) -> Result<Vec<u64>, BenchError> {
+        let [own, _] = self.places();
+        let socket: &OwnedFd = &self.side.lines[line][own];
+        self.exchange(stream::end(socket, socket))
+    }
+
+    /// Keeps the end until the other process is done with its own.
+    fn exchange(&self, mut end: impl End) -> Result<Vec<u64>, BenchError> {
+        self.side.together(self.round, || match self.side.is_first {
+            true => self.send_and_time(&mut end),
+            false => self.send_back(&mut end),
+        })
+    }
+
+    fn send_and_time(&self, end: &mut impl End) -> Result<Vec<u64>, BenchError> {
+        let round = self.round;
+        let mut times = Vec::with_capacity(round.all().count());
+        let gap_ns = round.what.gap.unwrap_or_default().as_nanos() as u64;
+        let mut due = Clock::monotonic_ns();
+        for number in round.all() {
+            if gap_ns > 0 {
+                due = (due + gap_ns).max(Clock::monotonic_ns());
+                while Clock::monotonic_ns() < due {}
+            }
+            let sent = Clock::monotonic_ns();
+            let sample = end
+                .send(&Sample::new(number))
+                .and_then(|()| end.receive())
+                .map_err(|fault| round.failed(number, fault))?;
+            let received = Clock::monotonic_ns();
+            self.check(number, &sample)?;
+            times.push(match round.what.gap {
+                None => (received - sent) / 2,
+                Some(_) => sent,
+            });
+        }
+        Ok(round.timed(times))
+    }
+
+    fn send_back(&self, end: &mut impl End) -> Result<Vec<u64>, BenchError> {
+        let round = self.round;
+        let one_way = round.what.gap.is_some();
+        let mut times = Vec::with_capacity(round.all().count());
+        for number in round.all() {
+            let failed = |fault| round.failed(number, fault);
+            let sample = end.receive().map_err(failed)?;
+            if one_way {
+                times.push(Clock::monotonic_ns());
+            }
+            end.send(&sample).map_err(failed)?;
+            self.check(number, &sample)?;
+        }
+        Ok(if one_way { round.timed(times) } else { times })
+    }
+
+    fn check(&self, expected: u64, sample: &Sample) -> Result<(), BenchError> {
+        if sample.number() == expected && sample.is_whole() {
+            return Ok(());
+        }
+        let got = Fault::Wrong(sample.number());
+        Err(self.round.failed(expected, got))
+    }
+}
+
+/// The typed ports as an end that publishes to `Out` and waits for `Back`: publish, wait, receive,
+/// as every service does it.
+fn ours<Out, Back>(bus: &Bus, policy: Policy) -> Result<impl End + use<Out, Back>, BenchError>
+where
+    Out: Topic<Payload = Sample>,
+    Back: Topic<Payload = Sample>,
+{
+    let mut subscriber = bus.subscriber::<Back>().map_err(no_bus)?;
+    let waiter = bus.waiter(policy).map_err(no_bus)?;
+    let publisher = bus.publisher::<Out>().map_err(no_bus)?;
+    let send = move |sample: &Sample| {
+        let mut loan = publisher.loan().map_err(broken)?;
+        *loan = *sample;
+        slow::publish(0);
+        loan.send().map_err(broken)
+    };
+    let receive = move || {
+        let mut start = None;
+        loop {
+            waiter.wait(TIME_OUT);
+            // A sample may be found before its ring, which then ends the next wait for nothing.
+            if waiter.has::<Back>()
+                && let Some(received) = subscriber.receive().map_err(broken)?
+            {
+                return Ok(*received);
+            }
+            if start.get_or_insert_with(Instant::now).elapsed() > LIMIT {
+                return Err(Fault::Silent(LIMIT));
+            }
+        }
+    };
+    Ok((send, receive))
+}

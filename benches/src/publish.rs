@@ -1,0 +1,174 @@
+//! What publishing and waking cost a writer: `publish-N` (the scenario `fanout`) and `ring-64`
+//! (a part of the scenario `hop`).
+//!
+//! ```text
+//!   writer, core 0                                 readers, core 1
+//!                         <── ready ────────────── all drained
+//!   |  publish or ring  | ── sample or ring ─────> wait, and drain
+//!   |<--- measured ---->|
+//! ```
+//!
+//! The readers live in a process of their own and are drained after each publish, so that no buffer
+//! is ever full and the writer finds its queues as readers leave them.
+//!
+//! **`publish-N`**: our typed ports and bare iceoryx2 with the same user header, the same limits and
+//! the same number of subscribers, in turn. Both fill in the whole payload from memory of their own.
+//! Rows are called `publish-64` for 64 bytes to 64 subscribers, `publish-8@1MiB`, and so on.
+//!
+//! **`ring-64`**: what it costs a writer to wake the one actor of a topic that 64 observers read,
+//! for which the writer is kept from its work. The cost of the ring alone is the difference between
+//! publishing on a topic with an actor that sleeps and publishing on one with as many readers but no
+//! actor, measured in pairs (`lager/ring`). It compares with iceoryx2 notifying without publishing
+//! anything: a listener for each reader (`notify`), or, as the typed ports do it, one listener for
+//! the actor while 64 readers poll (`notify-1`).
+
+mod readers;
+mod writer;
+
+use std::error::Error;
+
+use lager_rig::Parent;
+use lager_rig::process::Main;
+use lager_topics::{OBSERVERS, Qos, SensorLine, Topic};
+use serde::{Deserialize, Serialize};
+
+use crate::group::{Entry, Group};
+use crate::pair;
+use crate::report::{Mode, Options, Regime};
+use crate::sample::{Block, Ping, Sample};
+
+const WRITER: &str = "writer";
+const READERS: &str = "readers";
+
+pub(crate) const PROCESSES: &[(&str, Main)] = &[(WRITER, take_turns), (READERS, take_turns)];
+
+fn take_turns(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    pair::measure(parent, |side, round| match side.is_first {
+        true => writer::round(side, round),
+        false => readers::round(side, round),
+    })
+}
+
+/// Sizes of a block, in words of eight bytes.
+const SMALL: usize = 8;
+const KIB_64: usize = 1 << 13;
+const MIB_1: usize = 1 << 17;
+
+/// The topic of blocks of that size. Small ones have `sensor/line`'s depth; large ones the least
+/// there is, since a publisher keeps memory for every place that a subscriber could fill.
+struct Fan<const WORDS: usize>;
+
+impl<const WORDS: usize> Topic for Fan<WORDS> {
+    const NAME: &'static str = "bench/fan";
+    type Payload = Block<WORDS>;
+    const QOS: Qos = Qos {
+        buffer: if WORDS > 512 {
+            1
+        } else {
+            SensorLine::QOS.buffer
+        },
+        actors: &[],
+        ..SensorLine::QOS
+    };
+    const SUMMARY: &'static str = "From the publisher of a measurement to all that read.";
+}
+
+/// The same as [`Ping`], but nobody acts on it.
+struct Observed;
+
+impl Topic for Observed {
+    const NAME: &'static str = "bench/observed";
+    type Payload = Sample;
+    const QOS: Qos = Qos {
+        actors: &[],
+        ..Ping::QOS
+    };
+    const SUMMARY: &'static str = "What observers alone read, during a measurement.";
+}
+
+/// What is measured in a round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+enum Job {
+    /// Our ports publish blocks of so many words to so many readers.
+    Lager { words: usize, readers: usize },
+    /// The same with bare iceoryx2 and the same user header.
+    Iceoryx2 { words: usize, readers: usize },
+    /// Our ports ring an actor: what it takes longer than to publish where nobody is to be rung.
+    Ring,
+    /// Bare iceoryx2 notifies so many listeners.
+    Notify { listeners: usize },
+}
+
+type Round = pair::Round<Job>;
+
+/// The samples of a round; those of [`Job::Ring`] come in pairs.
+fn numbers(round: &Round) -> impl Iterator<Item = u64> + use<> {
+    let each = if round.what == Job::Ring { 2 } else { 1 };
+    round
+        .all()
+        .flat_map(move |sample| (0..each).map(move |part| each * sample + part))
+}
+
+/// The event of bare iceoryx2; a service keeps its number of listeners.
+fn event(listeners: usize) -> String {
+    format!("bench/bare-ring-{listeners}")
+}
+
+/// Bare iceoryx2's topic, which has the limits of ours.
+const BARE_FAN: &str = "bench/bare-fan";
+
+/// `publish-N` in one regime. The readers look without pause, so the only mode there is is `spin`.
+pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
+    if !options.modes.contains(&Mode::Spin) {
+        return Vec::new();
+    }
+    let sizes = |readers| {
+        [
+            ("", SMALL, [500, 2_000]),
+            ("@64KiB", KIB_64, [75, 300]),
+            ("@1MiB", MIB_1, [12, 50]),
+        ]
+        .map(|(size, words, samples)| {
+            let header = "iceoryx2/header";
+            let rows = vec![
+                (
+                    Entry::new("lager", Mode::Spin, &["iceoryx2/header"]),
+                    Job::Lager { words, readers },
+                ),
+                (
+                    Entry::new(header, Mode::Spin, &[]),
+                    Job::Iceoryx2 { words, readers },
+                ),
+            ];
+            group(format!("publish-{readers}{size}"), regime, rows, samples)
+        })
+    };
+    [1, 8, 64].into_iter().flat_map(sizes).collect()
+}
+
+/// `ring-64` in one regime. The actor sleeps when it is rung, so the only mode there is is `block`.
+pub(crate) fn ring(regime: Regime, options: &Options) -> Option<Group> {
+    let entry = |label, against| Entry::new(label, Mode::Block, against);
+    let notify = |listeners| Job::Notify { listeners };
+    let rows = vec![
+        (
+            entry("lager/ring", &["iceoryx2/notify", "iceoryx2/notify-1"]),
+            Job::Ring,
+        ),
+        (entry("iceoryx2/notify", &[]), notify(OBSERVERS + 1)),
+        (entry("iceoryx2/notify-1", &[]), notify(1)),
+    ];
+    let wanted = options.modes.contains(&Mode::Block);
+    wanted.then(|| group("ring-64".to_owned(), regime, rows, [100, 500]))
+}
+
+fn group(what: String, regime: Regime, rows: Vec<(Entry, Job)>, samples: [usize; 2]) -> Group {
+    Group {
+        what,
+        regime,
+        entries: rows.iter().map(|(entry, _)| *entry).collect(),
+        rounds: pair::ROUNDS,
+        samples,
+        open: Box::new(move || pair::open(regime, [WRITER, READERS], &[], rows.clone())),
+    }
+}
