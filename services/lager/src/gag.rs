@@ -9,8 +9,8 @@
 //! answer is refused here, with the column, and not sent.
 //!
 //! A stop drops all commands that wait and a `pickup_done` behind them (C5). It is said at once, as
-//! nobody asks for commands while a robot turns or moves its arm. It is the next answer as well, for a
-//! station that passes over what it has not asked for.
+//! nobody asks for commands while a robot turns or moves its arm. It is the next answer as well,
+//! for a station that passes over what it has not asked for.
 //!
 //! [`Desk`] is pure: lines in, lines out. The shell around it waits for the terminal and the socket.
 

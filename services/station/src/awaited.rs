@@ -1,4 +1,5 @@
-//! What other threads wait for: answers of robots, what robots say unasked, and what the disk takes.
+//! What other threads wait for: answers of robots, what robots say unasked, and what the disk
+//! takes.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;

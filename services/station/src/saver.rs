@@ -35,8 +35,8 @@ impl Changes {
         self.waits.extend(newer.waits);
     }
 
-    /// Saves it and tells who waits; where there is no `path` nothing is saved. What the disk has not
-    /// taken stays, and why is returned.
+    /// Saves it and tells who waits; where there is no `path` nothing is saved. What the disk has
+    /// not taken stays, and why is returned.
     fn save(&mut self, path: Option<&Path>) -> Vec<SaveError> {
         let mut errors = Vec::new();
         let saved = path.zip(self.warehouse.as_ref());
