@@ -1,210 +1,11 @@
-//! Driving from the page: every way to let go, what runs once, which key is which command, a gamepad,
-//! and what is held up on the way.
+//! Driving from the page: who may, what runs once, which key is which command, and what is old.
 
-use lager_ports::{Clock, Subscriber};
 use lager_tests::{pid, wait_for};
-use lager_topics::SteeringState;
 use rustix::process::{Signal, kill_process};
 use serde_json::json;
 
 use crate::Scene;
 use crate::browser::Page;
-
-/// How long a robot may drive on after a release, in ms of its clock, which at this speed is that of
-/// the stamps.
-const RELEASE_MS: f64 = 200.0;
-/// How often one way is tried until it is quick enough: this machine may be held up meanwhile. A way
-/// that does not end a hold never is.
-const TRIES: usize = 3;
-
-/// Expressions that press and let go, or a step of a test for what only the browser can do.
-enum By {
-    Script(&'static str),
-    Browser(fn(&mut Page)),
-}
-
-impl By {
-    fn go(&self, page: &mut Page) {
-        match self {
-            Self::Script(script) => drop(page.value(script)),
-            Self::Browser(go) => go(page),
-        }
-    }
-}
-
-/// A place of the page where nothing is to be pressed, in pixels.
-const AWAY: (f64, f64) = (3.0, 3.0);
-const KEY: By = By::Browser(|page| page.key_down("ArrowLeft"));
-const ENTER: By = By::Browser(|page| {
-    page.value("document.querySelector('#pad-left').focus()");
-    let params = json!({ "type": "rawKeyDown", "key": "Enter", "code": "Enter", "windowsVirtualKeyCode": 13 });
-    page.call("Input.dispatchKeyEvent", &params);
-});
-const POINTER: By = By::Browser(|page| {
-    let at = page.middle("#pad-left");
-    page.mouse("mousePressed", at);
-});
-const STICK: By = By::Script("pad.axes = [-1, 0]");
-
-/// Name, how it is held, and how it is let go.
-const WAYS: &[(&str, By, By)] = &[
-    ("key up", KEY, By::Browser(|page| page.key_up("ArrowLeft"))),
-    (
-        "another window",
-        KEY,
-        By::Script("dispatchEvent(new Event('blur'))"),
-    ),
-    (
-        "page hidden for good",
-        KEY,
-        By::Script("dispatchEvent(new Event('pagehide'))"),
-    ),
-    (
-        "another tab",
-        KEY,
-        By::Script(
-            "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); \
-             document.dispatchEvent(new Event('visibilitychange')); delete document.hidden",
-        ),
-    ),
-    (
-        "a text field",
-        KEY,
-        By::Script(
-            "document.querySelector('#filter').dispatchEvent(new FocusEvent('focusin', { bubbles: true }))",
-        ),
-    ),
-    (
-        "a key of the window",
-        KEY,
-        By::Script("dispatchEvent(new KeyboardEvent('keydown', { key: 'Tab', altKey: true }))"),
-    ),
-    (
-        "another view",
-        KEY,
-        By::Script("document.querySelector('#tab-drive').click()"),
-    ),
-    (
-        "a button's key up",
-        ENTER,
-        By::Browser(|page| page.key_up("Enter")),
-    ),
-    ("the focus leaves the button", ENTER, By::Browser(Page::tab)),
-    (
-        "the key comes up elsewhere",
-        ENTER,
-        By::Script(
-            "document.querySelector('#tab-log').dispatchEvent(new KeyboardEvent('keyup', \
-             { key: 'Enter', bubbles: true }))",
-        ),
-    ),
-    (
-        "pointer up",
-        POINTER,
-        By::Browser(|page| page.mouse("mouseReleased", AWAY)),
-    ),
-    (
-        "pointer lost",
-        POINTER,
-        By::Script(
-            "document.querySelector('#pad-left').dispatchEvent(new PointerEvent('pointercancel'))",
-        ),
-    ),
-    ("stick back", STICK, By::Script("pad.axes = [0, 0]")),
-    ("gamepad gone", STICK, By::Script("window.pad = null")),
-];
-
-/// How long after `from_ns` the board reports for the first time that the motors stand, in ms.
-fn stands(reports: &mut Subscriber<SteeringState>, from_ns: u64) -> f64 {
-    wait_for("the motors to stand", || {
-        let report = reports.receive().expect("readable")?;
-        let at = report.stamp().publish_time_ns;
-        let stand = (report.left_duty, report.right_duty) == (0, 0);
-        (at > from_ns && stand).then(|| (at - from_ns) as f64 / 1e6)
-    })
-}
-
-/// Takes all hands off.
-fn let_all_go(page: &mut Page) {
-    for key in ["ArrowLeft", "Enter"] {
-        page.key_up(key);
-    }
-    page.mouse("mouseReleased", AWAY);
-    page.value(
-        "window.pad = { mapping: 'standard', axes: [0, 0], buttons: [] }; \
-         navigator.getGamepads = () => [window.pad]; document.activeElement.blur()",
-    );
-    page.pause();
-}
-
-/// Holds until the robot moves by it: a person whose order was refused takes hold anew.
-fn take_hold(scene: &mut Scene, page: &mut Page, hold: &By) {
-    wait_for("the robot to be driven", || {
-        page.moves();
-        hold.go(page);
-        for _ in 0..100 {
-            if scene.moves() == Some(true) && page.text("#drive-said").is_empty() {
-                return Some(());
-            }
-            std::thread::sleep(std::time::Duration::from_millis(10));
-        }
-        let_all_go(page);
-        None
-    });
-}
-
-pub(crate) fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence(
-    scene: &mut Scene,
-    page: &mut Page,
-) {
-    scene.arm(page);
-    page.listen_in();
-    let mut reports = scene.bus.subscriber::<SteeringState>().expect("a topic");
-    let_all_go(page);
-    for (name, hold, release) in WAYS {
-        let mut times = Vec::new();
-        while times.len() < TRIES && times.iter().all(|ms| *ms > RELEASE_MS) {
-            take_hold(scene, page, hold);
-            while reports.receive().expect("readable").is_some() {}
-            assert!(!page.moves().is_empty(), "{name}");
-            let from = Clock::monotonic_ns();
-            release.go(page);
-            let ms = stands(&mut reports, from);
-            page.pause();
-            // What was given before the release may stand before it.
-            let mut said = page.moves();
-            said.retain(|line| line != "drive 6 200");
-            // A robot whose machine is held up refuses, which ends a hold as well.
-            if page.text("#drive-said").is_empty() {
-                assert_eq!(said, ["drive 1 200"], "{name}");
-                times.push(ms);
-            }
-            page.pause();
-            assert_eq!(page.moves(), [""; 0], "{name}: silence");
-            let_all_go(page);
-        }
-        let quickest = times.iter().copied().fold(f64::INFINITY, f64::min);
-        assert!(quickest <= RELEASE_MS, "{name}: {times:.0?} ms");
-        scene.assert_stands();
-    }
-
-    // The box that arms, and the socket itself: nobody can say zero then.
-    scene.hold(page, "ArrowLeft");
-    page.value("document.querySelector('#armed').click()");
-    scene.wait_to_stand();
-    page.key_up("ArrowLeft");
-    page.value("document.querySelector('#armed').click()");
-    page.moves();
-    scene.hold(page, "ArrowLeft");
-    let from = Clock::monotonic_ns();
-    while reports.receive().expect("readable").is_some() {}
-    page.value("window.sent = []; line.close()");
-    stands(&mut reports, from);
-    page.wait_for("#control", "Nobody drives");
-    assert_eq!(page.moves(), [""; 0]);
-    page.key_up("ArrowLeft");
-    scene.assert_stands();
-}
 
 /// Presses keys one right after the other, so that nothing can come between them.
 fn press(page: &mut Page, keys: &[&str]) {
@@ -302,7 +103,6 @@ const KEYS: &[(&str, &str)] = &[
     (",", "arm F9"),
     (".", "arm FA"),
     ("\u{f7}", "arm FA"),
-    ("/", "arm FA"),
     ("Q", "arm F3"),
 ];
 
@@ -333,6 +133,16 @@ pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fiel
         ));
         page.moves();
     }
+    // The keypad's division sign is a slash to a browser; the slash of the other keys is nothing.
+    page.value("dispatchEvent(new KeyboardEvent('keydown', { key: '/', code: 'Slash' }))");
+    page.pause();
+    assert_eq!(page.moves(), [""; 0]);
+    wait_for("the keypad's division sign", || {
+        page.value(
+            "dispatchEvent(new KeyboardEvent('keydown', { key: '/', code: 'NumpadDivide' }))",
+        );
+        (page.moves() == ["arm FA"]).then_some(())
+    });
     // Held, each is given again and again; a step is not.
     page.wait_until("document.querySelector('#drive-said').textContent === ''");
     let mut said = 0;
@@ -344,17 +154,19 @@ pub(crate) fn each_key_says_what_the_document_says_once_and_nothing_in_text_fiel
     page.value("dispatchEvent(new KeyboardEvent('keyup', { key: 'ArrowUp' }))");
     scene.wait_to_stand();
 
-    page.click("#tab-log");
-    page.value("document.querySelector('#filter').focus()");
+    page.pause();
     page.moves();
-    for (key, _) in KEYS {
-        page.value(&format!(
-            "document.querySelector('#filter').dispatchEvent(new KeyboardEvent('keydown', \
-             {{ key: {}, bubbles: true }}))",
-            json!(key)
-        ));
+    // In a field keys write, and in a list or a choice arrows choose.
+    for field in ["#filter", "#robot", "#robot option", "#where [type=radio]"] {
+        for (key, _) in KEYS {
+            page.value(&format!(
+                "document.querySelector('{field}').dispatchEvent(new KeyboardEvent('keydown', \
+                 {{ key: {}, bubbles: true }}))",
+                json!(key)
+            ));
+        }
+        assert_eq!(page.moves(), [""; 0], "{field}");
     }
-    assert_eq!(page.moves(), [""; 0]);
 }
 
 pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
@@ -367,7 +179,7 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     kill_process(comm, Signal::STOP).expect("it runs");
     page.wait_for("#link", "nothing new for");
     page.wait_until("document.body.classList.contains('stale')");
-    let grey = "['.robot path', '.good rect', '.ghost path'].every((part) => { \
+    let grey = "['.robot path', '.good rect', '.ghost path', '.unsure'].every((part) => { \
                 const style = getComputedStyle(document.querySelector(`#map ${part}`)); \
                 const quiet = getComputedStyle(document.querySelector('#history')).color; \
                 return [style.fill, style.stroke].includes(quiet); })";
@@ -383,6 +195,13 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     page.wait_for("#link", "link ");
     page.wait_until("!document.body.classList.contains('stale')");
     scene.assert_stands();
+
+    // Without the station it says since when, in sight and to a screen reader.
+    page.value("window.WebSocket = class { close() {} }; line.close()");
+    page.wait_for("#link", "no connection to the station, last heard ");
+    page.wait_for("#link-said[role=status]", "no connection to the station");
+    page.wait_until("document.body.classList.contains('stale')");
+    page.wait_until("document.querySelector('#control').disabled");
 }
 
 pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile(

@@ -8,6 +8,7 @@ mod manners;
 mod pictures;
 mod played;
 mod reasons;
+mod releases;
 mod scene;
 mod setting_up;
 mod watched;
@@ -66,6 +67,7 @@ fn while_it_drives_by_itself() {
         // It is on its way to product 1, far from where things are put.
         setting_up::the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys,
         setting_up::the_queue_is_reordered_and_what_is_taken_out_can_be_put_back,
+        setting_up::how_unsure_the_place_is_grows_until_the_next_mark,
         manners::a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button,
         manners::somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none,
         manners::the_display_on_the_robot_stops_it,
@@ -82,7 +84,7 @@ fn while_it_is_driven_by_hand() {
         setting_up::gains_are_set_and_put_back_and_a_calibration_goes_step_by_step,
         driving::whoever_lets_go_whatever_way_the_robot_stands,
         driving::two_people_do_not_drive_at_once_and_either_may_stop,
-        driving::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
+        releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
         driving::what_runs_once_is_not_cut_short_but_by_the_command_to_stand,
         driving::each_key_says_what_the_document_says_once_and_nothing_in_text_fields,
         driving::what_is_old_is_grey_with_its_time_and_drives_nothing,

@@ -1,8 +1,9 @@
 //! How the page behaves towards whoever reads, listens, has only keys or a small screen, or may not
 //! drive.
 
-use lager_tests::{Domain, wait_for};
+use lager_tests::{Domain, pid, wait_for};
 use lager_topics::LinkHealth;
+use rustix::process::{Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::Scene;
@@ -26,9 +27,13 @@ const NEAR_STOP: &str = "(() => { \
     return near; })()";
 
 pub(crate) fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop(
-    _scene: &mut Scene,
+    scene: &mut Scene,
     page: &mut Page,
 ) {
+    // With what stands beside it while it is stopped.
+    page.click("#stop");
+    page.wait_for("#stop-said", "both wheels stand");
+    page.wait_until("!document.querySelector('#resume').hidden");
     for (width, height) in [(1280, 720), (3840, 2160), (901, 700), (360, 740)] {
         page.dress("light", width, height, width < 900);
         for tab in TABS {
@@ -43,7 +48,20 @@ pub(crate) fn stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop(
             let wide = page.value("document.documentElement.scrollWidth <= innerWidth");
             assert_eq!(wide, true, "{width} x {height}, {tab} is too wide");
         }
+        // In front of a question, too.
+        page.click("#tab-drive");
+        page.click("#where-ask");
+        page.value("scrollTo(0, 0)");
+        page.pause();
+        assert_eq!(
+            page.value(NEAR_STOP),
+            json!([]),
+            "{width} x {height}, a question"
+        );
+        page.click("#where-later");
     }
+    scene.resume();
+    page.wait_until("document.querySelector('#resume').hidden");
     for (width, height) in [(1280, 720), (1366, 768)] {
         page.dress("light", width, height, false);
         for tab in TABS {
@@ -92,11 +110,20 @@ pub(crate) fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_
     let told = "(() => { const numbers = [...places].map((place) => place.match(/-?[\\d.]+/)[0]); \
                 return numbers.every((x) => x.endsWith('.0')); })()";
     assert_eq!(page.value(told), true, "poses are told in whole mm");
+    media(page, "no-preference");
+    page.value("places.clear()");
+    page.wait_until(&format!("window.places.size > 20 && !{told}"));
 }
 
 pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, page: &mut Page) {
+    page.click("#tab-setup");
     page.click("#language");
     assert_eq!(page.text("#stop"), "STOPP");
+    // What was there before is told anew.
+    let shown = "['#products option', '#map .robot title', '#map .ghost title'].map((part) => \
+                 document.querySelector(part).textContent).join()";
+    assert_eq!(page.value(shown), "vänster,robot,där den verkligen är");
+    page.wait_until("/^[0-9]+,[0-9] V$/.test(document.querySelector('#battery').textContent)");
     page.wait_for("#link", "länk ");
     assert_eq!(page.value("document.documentElement.lang"), "sv");
     page.wait_for("#map-text", "Ett lager med 2 gånger 2 rutor");
@@ -146,6 +173,54 @@ pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
     page.wait_until("document.querySelector('#resume').hidden");
     page.mouse("mouseReleased", at);
     scene.wait_to_move();
+
+    // A stop in the middle of the hold is the last word, though the button is held on.
+    page.key_down("Escape");
+    page.key_up("Escape");
+    page.wait_until(
+        "!document.querySelector('#resume').hidden && !document.querySelector('#resume').disabled",
+    );
+    let at = page.middle("#resume");
+    page.mouse("mousePressed", at);
+    page.wait_until("document.querySelector('#resume').classList.contains('held')");
+    page.key_down("Escape");
+    page.key_up("Escape");
+    page.wait_until("!document.querySelector('#resume').classList.contains('held')");
+    page.wait_for("#stop-said", "both wheels stand");
+    std::thread::sleep(std::time::Duration::from_millis(1_200));
+    assert_eq!(
+        page.value("document.querySelector('#resume').hidden"),
+        false,
+        "it is stopped still"
+    );
+    scene.assert_stands();
+    page.mouse("mouseReleased", at);
+    scene.resume();
+    scene.wait_to_move();
+
+    // Space stops in a list and on a box, too; a box is ticked by Enter.
+    for part in ["#goods", "#picks", "#load-file"] {
+        page.click("#tab-missions");
+        page.value(&format!(
+            "(() => {{ const part = document.querySelector('{part}'); \
+             document.querySelector(`#tab-${{part.closest('[role=tabpanel]').id}}`).click(); part.focus(); }})()"
+        ));
+        page.key_down(" ");
+        page.key_up(" ");
+        page.wait_for("#stop-said", "both wheels stand");
+        page.wait_until("!document.querySelector('#resume').hidden");
+        scene.resume();
+        page.wait_until("document.querySelector('#stop-said').textContent === ''");
+    }
+    page.value("document.querySelector('#armed').focus()");
+    let ticked = "document.querySelector('#armed').checked";
+    for is_ticked in [true, false] {
+        page.click("#tab-drive");
+        page.value("document.querySelector('#armed').focus()");
+        page.key_down("Enter");
+        page.key_up("Enter");
+        assert_eq!(page.value(ticked), is_ticked);
+    }
 
     // From a field, too; and by hand.
     page.click("#tab-setup");
@@ -197,6 +272,9 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     looks.click("#clear");
     looks.wait_for("#missions-said", "den här sidan får titta och stoppa");
     looks.click("#language");
+    // What was refused is among what has happened.
+    looks.click("#tab-log");
+    looks.wait_for("#entries", "not done: this page may look and stop");
     looks.click("#tab-drive");
     looks.click("#control");
     looks.wait_for("#drive-said", "this page may look and stop");
@@ -262,6 +340,15 @@ fn an_accessibility_checker_finds_nothing_serious() {
     page.wait_for("#stop-said", "both wheels stand");
     check(&mut page, "stopped");
     scene.resume();
+    let comm = pid(scene.up.service("comm").expect("it runs"));
+    kill_process(comm, Signal::STOP).expect("it runs");
+    page.wait_for("#link", "nothing new for");
+    for tab in TABS {
+        page.click(&format!("#tab-{tab}"));
+        check(&mut page, &format!("{tab}, when it is old"));
+    }
+    kill_process(comm, Signal::CONT).expect("it runs");
+    page.wait_for("#link", "link ");
     let url = format!("{}/screen", scene.url.trim_end_matches('/'));
     page.call("Page.navigate", &json!({ "url": url }));
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");

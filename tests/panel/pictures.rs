@@ -64,6 +64,14 @@ fn of_every_view() {
     scene.resume();
     page.wait_until("document.querySelectorAll('#map .blocked').length === 1");
     view(&mut page, "blocked");
+    // For eyes that see some colours alike, or none.
+    for eyes in ["protanopia", "deuteranopia", "tritanopia", "achromatopsia"] {
+        let params = serde_json::json!({ "type": eyes });
+        page.call("Emulation.setEmulatedVisionDeficiency", &params);
+        take(&mut page, &format!("blocked-laptop-{eyes}"));
+    }
+    let params = serde_json::json!({ "type": "none" });
+    page.call("Emulation.setEmulatedVisionDeficiency", &params);
     let comm = pid(scene.up.service("comm").expect("it runs"));
     kill_process(comm, Signal::STOP).expect("it runs");
     page.wait_for("#link", "nothing new for");

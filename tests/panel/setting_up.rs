@@ -25,6 +25,11 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     let folder = scene.domain.folder().to_owned();
     page.save_into(&folder);
     page.click("#tab-setup");
+    assert_eq!(
+        page.value("document.querySelector('#undo').disabled"),
+        true,
+        "nothing is to be undone yet"
+    );
     page.click("#save-file");
     let before = wait_for("the file", || {
         let text = std::fs::read_to_string(folder.join("warehouse.json")).ok()?;
@@ -51,6 +56,18 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
     page.fill("#goods-string", "7,1,0,3;8,2,1,0");
     page.wait_for("#map-text", "Goods: 7 (1, 0) down; 8 (2, 1) left.");
+    // A string that is pasted and ended by Enter is taken, and not what the form had before.
+    page.value("document.querySelector('#map-string').focus(); document.querySelector('#map-string').select()");
+    page.call("Input.insertText", &json!({ "text": "2,3,0,0" }));
+    let enter = json!({ "type": "keyDown", "key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13 });
+    page.call("Input.dispatchKeyEvent", &enter);
+    page.key_up("Enter");
+    page.wait_for("#map-text", "A warehouse of 2 by 3 squares");
+    page.pause();
+    assert!(page.text("#map-text").contains("2 by 3 squares"));
+    page.wait_until("document.querySelector('#warehouse [name=height]').value === '3'");
+    page.click("#undo");
+    page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
     page.fill("#map-string", "3,2,1,1");
     page.wait_until("document.querySelector('#setup-said').textContent.length > 5");
     assert!(page.text("#map-text").contains("3 by 2 squares"));
@@ -60,12 +77,26 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     let query = json!({ "nodeId": document["root"]["nodeId"], "selector": "#load-file" });
     let node = page.call("DOM.querySelector", &query)["nodeId"].clone();
     let file = folder.join("warehouse.json");
-    page.call(
-        "DOM.setFileInputFiles",
-        &json!({ "files": [file], "nodeId": node }),
+    // The same file once more after it was undone.
+    for is_last in [false, true] {
+        page.call(
+            "DOM.setFileInputFiles",
+            &json!({ "files": [file], "nodeId": node }),
+        );
+        page.wait_for("#map-text", "A warehouse of 2 by 2 squares");
+        page.wait_until("document.querySelectorAll('#map .good').length === 3");
+        page.wait_until("document.querySelector('#load-file').files.length === 0");
+        if !is_last {
+            page.click("#undo");
+            page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
+        }
+    }
+    // A number that is left out is no 0.
+    page.fill("#products [name=id]", "");
+    assert_eq!(
+        page.value("document.querySelector('#warehouse').checkValidity()"),
+        false
     );
-    page.wait_for("#map-text", "A warehouse of 2 by 2 squares");
-    page.wait_until("document.querySelectorAll('#map .good').length === 3");
     std::fs::remove_file(file).expect("it is there");
     drop(page);
     scene.end();
@@ -118,7 +149,7 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
         page.click("#fetch button");
     };
     // The number of each waiting order is all of its text but the buttons.
-    let waiting = "[...document.querySelectorAll('#queue li:has(button)')].map((line) => \
+    let waiting = "[...document.querySelectorAll('#queue .waiting')].map((line) => \
                    line.firstChild.textContent).join()";
     for (product, queue) in [("2", "2"), ("3", "2,3"), ("1", "2,3,1")] {
         order(page, product);
@@ -126,7 +157,7 @@ pub(crate) fn the_queue_is_reordered_and_what_is_taken_out_can_be_put_back(
     }
     let button = |line: usize, which: usize| {
         format!(
-            "#queue li:has(button):nth-of-type({}) button:nth-of-type({which})",
+            "#queue .waiting:nth-of-type({}) button:nth-of-type({which})",
             line + 2
         )
     };
@@ -165,6 +196,15 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     });
     page.wait_until("document.querySelectorAll('#history li').length === 1");
     assert!(texts(&mut page, "#history li").contains('3'));
+
+    // An order that is under way is taken back as long as its goods are not in the claw.
+    page.fill("#goods", "2");
+    page.click("#fetch button");
+    page.wait_for("#queue li", "2  under way");
+    page.click("#queue li button");
+    page.wait_for("#queue li", "Nothing waits.");
+    page.click("#queue-undo");
+    page.wait_for("#queue li", "2  under way");
     drop(page);
     scene.end();
 }
@@ -216,8 +256,35 @@ fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
     page.wait_until("document.querySelectorAll('#calibration-sensors .both').length === 2");
     let height = "document.querySelector('#calibration-sensors .stretch').style.height";
     assert_eq!(page.value(height), "78.4%", "of 255");
-    drop((page, robot));
+
+    // A robot that goes without an answer may have been stopped or not.
+    page.click("#tab-missions");
+    page.click("#stop");
+    page.wait_for("#stop-said", "not confirmed");
+    drop(robot);
+    page.wait_for("#link", "no link, last heard");
+    page.pause();
+    assert!(page.text("#stop-said").contains("not confirmed"));
+    drop(page);
     stage.end();
+}
+
+pub(crate) fn how_unsure_the_place_is_grows_until_the_next_mark(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.wait_to_move();
+    page.value(
+        "window.radii = []; new MutationObserver(([{ target }]) => \
+         radii.push(Number(target.getAttribute('r')))) \
+         .observe(document.querySelector('#map .unsure'), { attributes: true, attributeFilter: ['r'] })",
+    );
+    page.wait_until("document.querySelector('#map .trail polyline').points.numberOfItems > 1");
+    // It grows step by step, and a mark makes it small at once.
+    page.wait_until(
+        "radii.some((radius, index) => index > 3 && radius < radii[index - 1] - 3 && \
+         radii[index - 1] > radii[index - 2] && radii[index - 2] > radii[index - 3])",
+    );
 }
 
 pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put_by_keys(
@@ -231,6 +298,7 @@ pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put
         view.map(|number| number.as_f64().expect("a number"))
             .collect()
     };
+    page.click("#fit");
     let fitted = view(page);
     page.click("#zoom-in");
     let near = view(page);

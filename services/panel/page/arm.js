@@ -36,24 +36,24 @@ export class Arm {
     if (this.shown === shown) return;
     this.shown = shown;
     this.svg.replaceChildren();
+    this.svg.toggleAttribute("hidden", !servos);
     const positions = servos ? servos.split(",").map((text) => (text === "-" ? null : Number(text))) : [];
     const load = loads.split(",").map(Number);
-    if (positions.length) {
-      this.fromTheSide(positions);
-      this.fromAbove(positions);
-    }
+    if (!positions.length) return;
+    this.fromTheSide(positions);
+    this.fromAbove(positions);
     JOINTS.forEach(([word, indexes], line) => this.joint(line, word, indexes, positions, load));
     const told = ERRORS.filter((_, bit) => errors.at(-1 - bit) === "1");
-    if (told.length) make("text", { class: "wrong", x: 0, y: 212 }, this.svg, `! ${told.map((word) => say(`servo_${word}`)).join(", ")}`);
+    if (told.length) make("text", { class: "wrong", x: 0, y: 134 }, this.svg, `! ${told.map((word) => say(`servo_${word}`)).join(", ")}`);
   }
 
   fromTheSide(positions) {
     const upper = Math.PI / 2 + angle(positions[1]);
     const fore = upper - Math.PI / 2 + angle(positions[3]);
-    const side = make("g", { transform: "translate(60 100) scale(0.24 -0.24)" }, this.svg);
+    const side = make("g", { transform: "translate(36 108) scale(0.2 -0.2)" }, this.svg);
     const elbow = [UPPER_ARM * Math.cos(upper), SHOULDER_HEIGHT + UPPER_ARM * Math.sin(upper)];
     const claw = [elbow[0] + FOREARM * Math.cos(fore), elbow[1] + FOREARM * Math.sin(fore)];
-    make("path", { class: "ground", d: "M-240 0H360" }, side);
+    make("path", { class: "ground", d: "M-150 0H310" }, side);
     make("path", { class: "stand", d: `M0 0V${SHOULDER_HEIGHT}` }, side);
     make("polyline", { class: "links", points: `0,${SHOULDER_HEIGHT} ${elbow} ${claw}` }, side);
     for (const [cx, cy] of [[0, SHOULDER_HEIGHT], elbow, claw]) make("circle", { cx, cy, r: 14 }, side);
@@ -63,7 +63,7 @@ export class Arm {
   fromAbove(positions) {
     const degrees = (-angle(positions[0]) * 180) / Math.PI;
     const gap = Math.max(0, ((positions[7] ?? CLOSED) - CLOSED) * GAP) / 2;
-    const above = make("g", { transform: `translate(220 88) rotate(${degrees.toFixed(1)})` }, this.svg);
+    const above = make("g", { transform: `translate(126 88) rotate(${degrees.toFixed(1)}) scale(0.6)` }, this.svg);
     make("circle", { class: "ground", r: 8 }, above);
     make("path", { class: "links", d: "M0 0V-44" }, above);
     const half = gap / 4 + 2;
@@ -71,15 +71,15 @@ export class Arm {
   }
 
   joint(line, word, [index, ...others], positions, loads) {
-    const y = 116 + line * 15;
-    make("text", { x: 0, y: y + 4 }, this.svg, say(`servo_${word}`));
-    make("rect", { class: "track", x: 84, y: y - 3, width: 100, height: 6 }, this.svg);
+    const y = 12 + line * 19;
+    make("text", { x: 166, y: y + 4 }, this.svg, say(`servo_${word}`));
+    make("rect", { class: "track", x: 228, y: y - 3, width: 56, height: 6 }, this.svg);
     const position = positions[index] ?? null;
     if (position === null) return;
-    make("circle", { cx: 84 + (position / 1_023) * 100, cy: y, r: 5 }, this.svg);
-    make("text", { x: 192, y: y + 4 }, this.svg, String(position));
+    make("circle", { cx: 228 + (position / 1_023) * 56, cy: y, r: 5 }, this.svg);
+    make("text", { x: 294, y: y + 4 }, this.svg, String(position));
     const load = Math.max(...[index, ...others].map((servo) => Math.abs(loads[servo] || 0)));
-    const bar = make("rect", { class: "load", x: 224, y: y - 3, width: (load / 1_023) * 70, height: 6 }, this.svg);
+    const bar = make("rect", { class: "load", x: 322, y: y - 3, width: (load / 1_023) * 26, height: 6 }, this.svg);
     make("title", {}, bar, say("servo_load", Math.round((load / 1_023) * 100)));
   }
 }

@@ -3,44 +3,65 @@
 import { crossing, failure, sentence } from "./sentences.js";
 import { reason } from "./reasons.js";
 import { Stop } from "./stop.js";
-import { put, say, span } from "./words.js";
+import { decimal, put, say, span } from "./words.js";
 
 /** How long Resume is held, in ms. */
 const HOLD_MS = 1_000;
+/** A stop that began so much later than another one is a new one, in ms. */
+const NEWER_MS = 500;
 
 export class Bar {
   constructor(link, parts, robot) {
     this.link = link;
     this.parts = parts;
     this.robot = robot;
-    this.stop = new Stop(link, { button: parts.stop, said: parts.stopSaid, resume: parts.resume }, robot);
+    this.stop = new Stop(link, { button: parts.stop, said: parts.stopSaid, resume: parts.resume }, robot, () => this.letResumeGo());
+    /** The robot whose Resume is held, when its stop began, and the end of the hold. */
+    this.held = null;
     this.resume();
   }
 
-  /** Resume is held, so that nobody does it in passing. */
+  /** Resume is held, so that nobody does it in passing. A stop ends the hold, too. */
   resume() {
     const { resume } = this.parts;
-    let timer = null;
     const begin = () => {
-      if (timer) return;
+      const robot = this.robot();
+      if (this.held || !robot || resume.disabled) return;
       resume.classList.add("held");
-      timer = setTimeout(async () => {
-        end();
-        const robot = this.robot();
-        if (!robot) return;
+      const timer = setTimeout(async () => {
+        const may = this.isStillHeld(robot);
+        this.letResumeGo();
+        if (!may) return;
         const answer = await this.link.act(robot, "resume");
         this.stop.say(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
       }, HOLD_MS);
+      this.held = { robot, since: robot.stoppedSince, timer };
     };
-    const end = () => {
-      clearTimeout(timer);
-      timer = null;
-      resume.classList.remove("held");
-    };
+    const end = () => this.letResumeGo();
     resume.addEventListener("pointerdown", begin);
     for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) resume.addEventListener(name, end);
     resume.addEventListener("keydown", (event) => [" ", "Enter"].includes(event.key) && !event.repeat && begin());
     resume.addEventListener("keyup", end);
+  }
+
+  letResumeGo() {
+    clearTimeout(this.held?.timer);
+    this.held = null;
+    this.parts.resume.classList.remove("held");
+  }
+
+  /** Whether what is held would end the stop that it was held for. */
+  isStillHeld(robot) {
+    const { held } = this;
+    return held?.robot === robot && this.mayResume(robot) && robot.stoppedSince - held.since < NEWER_MS;
+  }
+
+  /** Whether this page may end the stop: a driver's, with the robot at rest and nobody else at the wheel. */
+  mayResume(robot) {
+    const { stopped, left_duty: left, right_duty: right } = robot.state;
+    const isAnothers = robot.driver && robot.driver !== this.link.me;
+    const moves = Number(left) || Number(right);
+    return stopped === "1" && this.link.mayDrive && !isAnothers && !moves && !robot.isStale(performance.now());
   }
 
   draw(robot, now) {
@@ -49,11 +70,12 @@ export class Bar {
     document.body.classList.toggle("stale", stale);
     document.body.classList.toggle("stopped", robot?.state.stopped === "1");
     put(parts.link, this.linkWords(robot, now));
+    put(parts.linkSaid, !this.link.open ? this.lostWords() : robot && stale ? say("old") : "");
     const mode = robot?.state.mode;
     put(parts.mode, mode ? say(`mode_${mode}`) : "");
     put(parts.driver, this.driverWords(robot));
     const { battery_dv: decivolts, hold } = robot?.state ?? {};
-    const volts = decivolts === undefined ? "" : (Number(decivolts) / 10).toFixed(1);
+    const volts = decivolts === undefined ? "" : decimal(Number(decivolts) / 10);
     parts.battery.classList.toggle("low", hold === "battery");
     put(parts.battery, volts && say(hold === "battery" ? "battery_low" : "volts", volts));
     put(parts.doing, doing(robot));
@@ -61,13 +83,18 @@ export class Bar {
   }
 
   linkWords(robot, now) {
-    if (!this.link.open) return say("lost");
+    const heard = robot && Number.isFinite(robot.heard) ? say("age", span(robot.age(now))) : say("unheard");
+    if (!this.link.open) return robot ? `${this.lostWords()}, ${heard}` : this.lostWords();
     if (!robot) return say("no_robot");
-    const heard = Number.isFinite(robot.heard) ? say("age", span(robot.age(now))) : say("unheard");
     if (!robot.connected) return say("no_link", heard);
     if (!robot.speaks) return say("plain");
     if (robot.isStale(now)) return say("stale", span(now - Math.max(robot.stated, 0)));
     return say("link", Math.round(robot.age(now)));
+  }
+
+  /** Why there is no connection. */
+  lostWords() {
+    return this.link.closed ? reason(this.link.closed) : say("lost");
   }
 
   driverWords(robot) {
@@ -81,13 +108,13 @@ export class Bar {
     const { resume, stopSaid } = this.parts;
     const stopped = robot?.state.stopped === "1";
     resume.hidden = !stopped;
+    if (this.held && !this.isStillHeld(robot)) this.letResumeGo();
     if (stopped) {
       const since = robot.stoppedSince;
       const age = since === null ? "" : span(Date.now() - since);
       const cause = sentence(`stop_cause_${robot.state.stop_cause}`);
       put(resume, `${say("resume")} · ${say("stopped", age, cause ? `: ${cause}` : "")}`);
-      const moves = Number(robot.state.left_duty) || Number(robot.state.right_duty);
-      resume.disabled = !this.link.mayDrive || Boolean(moves);
+      resume.disabled = !this.mayResume(robot);
       // Whoever has not stopped it himself is told once, by voice as well.
       const isNew = this.wasStopped === false && this.stopOf === robot;
       if (isNew && !stopSaid.textContent) this.stop.say("stopped_elsewhere", cause);

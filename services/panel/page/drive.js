@@ -1,13 +1,14 @@
 // Driving by hand: keys, buttons, a gamepad; one held command at a time, given again until it is let go.
 //
 //   key, finger or stick down --> armed, driver, fresh state? --> "drive code lease" every 50 ms
-//   up, blur, hidden, cancel, lost link, stale state ----------> "drive 1" once, then silence
+//   up, blur, hidden, cancel, menu, lost link, stale state ----> "drive 1" once, then silence
 //
 // A command lives 200 ms by its lease, so a page that dies lets the robot stand. Steps of the arm and
 // the eighth turns are given once a press. Nothing cuts one of them short but the command to stand:
 // what is held ends before one, and nothing is held or begun while one is under way.
 
 import { reason } from "./reasons.js";
+import { isText } from "./stop.js";
 import { say } from "./words.js";
 
 const RENEW_MS = 50;
@@ -45,7 +46,7 @@ const STEPS = [
   ["F7", "left", ["z"]],
   ["F8", "right", ["x"]],
   ["F9", "squeeze", [","]],
-  ["FA", "release", [".", "\u00f7", "/"]],
+  ["FA", "release", [".", "\u00f7"]],
 ];
 
 /** Keys whose names are long, as they are printed on keyboards. */
@@ -84,6 +85,12 @@ export class Driving {
     if (!this.parts.armed.checked) return ["not_armed", say("armed")];
     if (robot.driver !== this.link.me) return ["not_driver"];
     return null;
+  }
+
+  /** Buttons that would do nothing now look like it. */
+  draw() {
+    const isOff = this.objection() !== null;
+    for (const part of [this.parts.pad, this.parts.arm]) part.classList.toggle("off", isOff);
   }
 
   /** `source` is the key, pointer or stick that holds it; a button's hold ends with its focus, too. */
@@ -171,7 +178,7 @@ export class Driving {
     }
     button.addEventListener("contextmenu", (event) => event.preventDefault());
     button.addEventListener("keydown", (event) => {
-      if (event.key === "Enter" && !event.repeat) this.hold(code, event.key, button);
+      if (event.key === "Enter" && !event.repeat) this.hold(code, place(event), button);
     });
     // Wherever the key comes up: the focus may be elsewhere by then.
     button.addEventListener("blur", () => this.held?.button === button && this.letGo());
@@ -186,20 +193,21 @@ export class Driving {
     addEventListener("keydown", (event) => {
       // Another window may have the key's end.
       if (event.ctrlKey || event.altKey || event.metaKey) return this.letGo();
-      if (isText(event.target)) return;
+      if (ownsKeys(event.target)) return;
       const held = find(HELD, event.key);
       const once = find(ONCE, event.key);
-      const step = find(STEPS, event.key.toLowerCase());
+      // The keypad's division sign is a slash to most layouts.
+      const step = find(STEPS, event.code === "NumpadDivide" ? "\u00f7" : event.key.toLowerCase());
       if (!held && !once && !step) return;
       // Unarmed, the arrows are the page's.
       if (!this.parts.armed.checked) return;
       event.preventDefault();
       if (event.repeat) return;
-      if (held) this.hold(held[0], event.key);
+      if (held) this.hold(held[0], place(event));
       else if (once) this.once(`drive ${once[0]} 1000`);
       else this.once(`arm ${step[0]}`);
     });
-    addEventListener("keyup", (event) => this.release(event.key));
+    addEventListener("keyup", (event) => this.release(place(event)));
   }
 
   /** Whatever may have eaten the end of a press is one. */
@@ -207,7 +215,10 @@ export class Driving {
     addEventListener("blur", () => this.letGo());
     addEventListener("pagehide", () => this.letGo());
     document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
-    document.addEventListener("focusin", (event) => isText(event.target) && this.letGo());
+    document.addEventListener("focusin", (event) => ownsKeys(event.target) && this.letGo());
+    // A menu or a list of the browser's own takes the end of a key for itself.
+    addEventListener("contextmenu", (event) => event.defaultPrevented || this.letGo());
+    addEventListener("pointerdown", (event) => ownsKeys(event.target) && this.letGo(), { capture: true });
     this.parts.armed.addEventListener("change", () => this.letGo());
     this.link.addEventListener("link", () => this.link.open || this.letGo());
   }
@@ -229,9 +240,14 @@ export class Driving {
   }
 }
 
-/** Whether keys belong to a field. */
-export function isText(element) {
-  return element instanceof HTMLElement && (element.matches("input:not([type=checkbox], [type=radio]), textarea, select") || element.isContentEditable);
+/** Whether keys belong to a field: to write, or to choose with arrows. */
+function ownsKeys(element) {
+  return isText(element) || (element instanceof HTMLElement && element.closest("select, [type=radio], [type=file]") !== null);
+}
+
+/** Which key it is, however it is called: with or without Shift and Num Lock the keypad's have two names. */
+function place({ code, key }) {
+  return code || key;
 }
 
 function addButton(parent, word, keys) {

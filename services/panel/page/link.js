@@ -7,7 +7,7 @@
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
 //   past <robot> <ms> <an event or a thought of so long ago>
-//   answer <number> done | refused <reason> | stopped <ms>
+//   answer <number> done | refused <reason> | stopped <ms> | lost <reason>
 //
 // What the page says:
 //
@@ -74,6 +74,12 @@ class Robot {
     this.unreachable = new Set();
   }
 
+  /** Keeps an event, a thought or a refusal. */
+  happened(entry) {
+    this.events.push(entry);
+    if (this.events.length > 1_000) this.events.shift();
+  }
+
   /** Milliseconds since the robot was last heard. */
   age(now) {
     return now - this.heard;
@@ -92,6 +98,8 @@ export class Link extends EventTarget {
     this.me = null;
     this.mayDrive = false;
     this.open = false;
+    /** Why the station has closed the connection, if it has said so. */
+    this.closed = null;
     this.number = 0;
     this.waiting = new Map();
     this.tries = 0;
@@ -116,11 +124,16 @@ export class Link extends EventTarget {
       }
       if (message.data.includes(" state ")) this.emit("pose");
     };
-    socket.onclose = () => {
+    socket.onclose = ({ reason }) => {
       this.open = false;
-      for (const settle of this.waiting.values()) settle({ refused: "lost" });
+      if (reason) this.closed = reason;
+      for (const settle of this.waiting.values()) settle({ refused: "lost", isUnknown: true });
       this.waiting.clear();
-      for (const robot of this.robots.values()) robot.connected = false;
+      for (const robot of this.robots.values()) {
+        robot.connected = false;
+        // The wheel is left with the connection.
+        if (robot.driver === this.me) robot.driver = null;
+      }
       this.emit("link");
       const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
       setTimeout(() => this.connect(), wait);
@@ -128,16 +141,27 @@ export class Link extends EventTarget {
   }
 
   /**
-   * Gives an order, to one robot or, with `null`, to the station; resolves to {done}, {stopped: ms}
-   * or {refused: reason}.
+   * Gives an order, to one robot by its name or, with `null`, to the station; resolves to {done},
+   * {stopped: ms} or {refused: reason}, where `isUnknown` says that it was given all the same.
    */
   ask(verb, robot, rest = "") {
     const number = ++this.number;
     if (!this.open || this.socket.readyState !== WebSocket.OPEN) {
-      return Promise.resolve({ refused: "lost", unsent: true });
+      return Promise.resolve(this.noted(robot, { refused: "lost", unsent: true }));
     }
     this.send(verb, robot, number, rest);
-    return new Promise((settle) => this.waiting.set(String(number), settle));
+    return new Promise((settle) => this.waiting.set(String(number), (answer) => settle(this.noted(robot, answer))));
+  }
+
+  /** Keeps what was refused among what has happened. */
+  noted(robot, answer) {
+    const { refused } = answer;
+    const asked = refused && this.robots.get(robot);
+    // A command that is given again and again is refused as often.
+    const last = asked?.events.at(-1);
+    const isSame = last?.kind === "refused" && last.words[0] === refused;
+    if (asked && !isSame) asked.happened({ at: Date.now(), kind: "refused", words: [refused], values: null });
+    return answer;
   }
 
   act(robot, action) {
@@ -169,6 +193,7 @@ export class Link extends EventTarget {
     } else if (word === "you") {
       // All that has happened is told after this.
       for (const robot of this.robots.values()) robot.forget();
+      this.closed = null;
       this.me = rest[0];
       this.mayDrive = rest[1] === "driver";
       this.emit("link");
@@ -200,7 +225,7 @@ export class Link extends EventTarget {
     if (!settle) return;
     if (what === "done") settle({ done: true });
     else if (what === "stopped") settle({ stopped: Number(rest[0]) });
-    else settle({ refused: rest.join(" ") });
+    else settle({ refused: rest.join(" "), isUnknown: what === "lost" });
   }
 
   report(robot, word, rest, age = 0) {
@@ -242,8 +267,7 @@ export class Link extends EventTarget {
       const values = word === "thought" ? robot.thinks : null;
       robot.thinks = null;
       const entry = { at: Date.now() - age, kind: word, words: rest, values };
-      robot.events.push(entry);
-      if (robot.events.length > 1_000) robot.events.shift();
+      robot.happened(entry);
       this.dispatchEvent(new CustomEvent("event", { detail: { robot, entry } }));
     }
   }

@@ -1,6 +1,6 @@
 // What has happened, as sentences in the reader's language, and the last ten minutes as a file.
 
-import { say } from "./words.js";
+import { clock, current, say } from "./words.js";
 import { mcap } from "./mcap.js";
 import { fill, item } from "./missions.js";
 import { reason } from "./reasons.js";
@@ -10,13 +10,13 @@ import { crossing, thought } from "./sentences.js";
 const KEPT_MS = 600_000;
 /** What a recording has of one moment, as strips and trail show it. */
 const STATE = { title: "lager.panel.State", type: "object", additionalProperties: { type: ["number", "string", "null"] } };
-/** What a recording has of what happened: the words of the station, and a thought's values. */
+/** What a recording has of what happened: the words of the station, a thought's values, why not. */
 const EVENT = {
   title: "lager.panel.Event",
   type: "object",
   required: ["kind", "words", "values"],
   properties: {
-    kind: { enum: ["event", "thought"] },
+    kind: { enum: ["event", "thought", "refused"] },
     words: { type: "array", items: { type: "string" } },
     values: { type: ["object", "null"], additionalProperties: { type: "string" } },
   },
@@ -31,9 +31,17 @@ export class Log {
   }
 
   draw(robot) {
-    const wanted = this.parts.filter.value.toLowerCase();
-    const lines = (robot?.events ?? []).map(line).filter((text) => text.toLowerCase().includes(wanted));
-    fill(this.parts.entries, lines.slice(-200).reverse(), (text) => item(text));
+    const { filter, entries, csv, mcap } = this.parts;
+    csv.disabled = mcap.disabled = !robot?.past.length;
+    const events = robot?.events ?? [];
+    const shown = [robot?.name, events.length, events.at(-1)?.at, filter.value, current()].join();
+    // Nobody reads it while another view is open.
+    if (entries.parentElement.hidden || this.shown === shown) return;
+    this.shown = shown;
+    const wanted = filter.value.toLowerCase();
+    const lines = events.map(line).filter((text) => text.toLowerCase().includes(wanted));
+    if (!lines.length) lines.push(say("log_empty"));
+    fill(entries, lines.slice(-200).reverse(), (text) => item(text));
   }
 
   /** Hands the last ten minutes to the reader as a file. */
@@ -75,7 +83,8 @@ function figures({ at, wall, ...figures }) {
 
 /** One entry as a sentence with its time. */
 function line({ at, kind, words, values }) {
-  const time = new Date(at).toLocaleTimeString();
+  const time = clock(at);
+  if (kind === "refused") return `${time}  ${say("blocked", reason(words[0]))}`;
   if (kind === "thought") return `${time}  ${(values && thought(values)) ?? reason(words.join(" "))}`;
   const [what, x, y, , product] = words;
   return `${time}  ${say(`event_${what}`, product, crossing(`${x},${y}`))}`;

@@ -23,7 +23,7 @@ const link = new Link();
 const robot = () => link.robots.get(at("robot").value) ?? [...link.robots.values()][0];
 
 const bar = new Bar(link, {
-  link: at("link"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
+  link: at("link"), linkSaid: at("link-said"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
   stop: at("stop"), stopSaid: at("stop-said"), resume: at("resume"),
 }, robot);
 const map = new WarehouseMap(at("map"), at("map-text"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow"), isArmed: () => at("armed").checked }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
@@ -103,6 +103,11 @@ at("language").onclick = () => {
   translate();
   words();
 };
+
+// Space is STOP, so a box is ticked by Enter.
+for (const box of document.querySelectorAll("[type=checkbox]")) {
+  box.addEventListener("keydown", (event) => event.key === "Enter" && !event.repeat && box.click());
+}
 
 for (const tab of document.querySelectorAll("[role=tab]")) {
   tab.addEventListener("click", () => show(tab));
@@ -195,6 +200,7 @@ function drawRest(shown, time) {
   map.draw(shown, time);
   missions.draw(shown, time);
   arm.draw(shown);
+  driving.draw();
   strips.draw(shown);
   line.draw(shown);
   asked.draw(shown);
@@ -202,6 +208,7 @@ function drawRest(shown, time) {
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];
   put(at("control"), say(...seat));
+  at("control").disabled = !link.open;
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }

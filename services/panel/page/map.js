@@ -9,8 +9,12 @@ const NS = "http://www.w3.org/2000/svg";
 const BODY = { half: 90, front: 170, rear: 110 };
 /** How long a robot takes to glide to a new pose, in ms. */
 const GLIDE_MS = 100;
-/** How far the ends of the warehouse are from the view's edge, in mm. */
+/** The trail fades in so many steps. */
+const TRAIL = 6;
+/** How far the ends of the warehouse are from the view's edge at least, in mm. */
 const MARGIN = 250;
+/** How much the buttons below take of the view, in pixels. */
+const TOOLS_PX = 72;
 /** The bends of the way out in degrees, to the left; what lies before the first one and the bar, in mm. */
 const BENDS = { left: [90], right: [-90], s: [45, -45] };
 const STRAIGHT = 200;
@@ -44,7 +48,8 @@ export class WarehouseMap {
     this.floor = make("g", {}, svg);
     this.goods = make("g", {}, svg);
     this.ways = make("g", {}, svg);
-    this.trail = make("polyline", { class: "trail" }, svg);
+    this.trail = make("g", { class: "trail" }, svg);
+    for (let step = 0; step < TRAIL; step++) make("polyline", { opacity: (0.5 * (TRAIL - step)) / TRAIL }, this.trail);
     this.route = make("polyline", { class: "route" }, svg);
     this.next = make("circle", { class: "next", r: 70 }, svg);
     this.unsure = make("circle", { class: "unsure" }, svg);
@@ -96,7 +101,7 @@ export class WarehouseMap {
 
   /** Columns are numbered above, rows at the side away from the way out. */
   numbers(width, height) {
-    const size = Math.max(60, (Math.max(width, height) * this.side) / 60);
+    const size = this.letters;
     const number = (text, x, y) => make("text", { class: "axis", x, y, "font-size": size }, this.floor, text);
     for (let x = 0; x <= width; x++) number(x, x * this.side, -60 - size / 2 - height * this.side);
     const aside = this.warehouse.delivery[0] === 0 ? width * this.side + 60 + size : -60 - size;
@@ -147,17 +152,24 @@ export class WarehouseMap {
     return { x: at.x, y: -at.y, heading: pose.heading + along - outwards * 90 };
   }
 
+  /** How large letters are, in mm: they grow with the warehouse. */
+  get letters() {
+    return Math.max(60, (Math.max(...this.warehouse.size) * this.side) / 60);
+  }
+
   /** A box in its square, at the side from which it is reached. */
   good({ id, name, square, side }) {
     const [dx, dy] = SIDES[side] ?? [0, 0];
-    const reach = this.side / 2 - 110;
+    // In a large warehouse it is larger than it is, so that its number can be read.
+    const half = Math.min(Math.max(60, this.letters * 0.7), this.side / 4);
+    const reach = this.side / 2 - 50 - half;
     const x = (square[0] + 0.5) * this.side + dx * reach;
     const y = -((square[1] + 0.5) * this.side + dy * reach);
     const box = make("g", { class: "good", "data-product": id }, this.goods);
     make("title", {}, box, name ? `${id} ${name}` : String(id));
-    make("rect", { x: x - 60, y: y - 60, width: 120, height: 120, rx: 12 }, box);
-    make("text", { x, y: y + 28 }, box, String(id));
-    make("text", { class: "why", x, y: y + 130 }, box);
+    make("rect", { x: x - half, y: y - half, width: 2 * half, height: 2 * half, rx: half / 5 }, box);
+    make("text", { x, y: y + half * 0.47, "font-size": half * 1.33 }, box, String(id));
+    make("text", { class: "why", x, y: y + half + 70, "font-size": half }, box);
   }
 
   /** Moves a robot to where it is now; called before each picture. */
@@ -227,15 +239,19 @@ export class WarehouseMap {
     if (this.trailed === count && this.trailOf === robot) return;
     this.trailed = count;
     this.trailOf = robot;
-    const points = [];
+    const steps = Array.from({ length: TRAIL }, () => []);
     for (let i = robot.past.length - 1; i >= 0; i -= 4) {
       const { at, x, y } = robot.past[i];
       if (now - at > SPAN_MS) break;
       if (x === null || y === null) continue;
       const drawn = this.onWayOut({ x, y, heading: 0 });
-      points.push(`${Math.round(drawn.x)},${-Math.round(drawn.y)}`);
+      const point = `${Math.round(drawn.x)},${-Math.round(drawn.y)}`;
+      const step = Math.floor(((now - at) * TRAIL) / SPAN_MS);
+      // Each step begins where the younger one ends.
+      if (step > 0 && !steps[step]?.length) steps[step - 1].push(point);
+      steps[step]?.push(point);
     }
-    set(this.trail, "points", points.join(" "));
+    steps.forEach((points, step) => set(this.trail.children[step], "points", points.join(" ")));
   }
 
   drawWay(robot, pose) {
@@ -283,7 +299,14 @@ export class WarehouseMap {
     const [width, height] = this.warehouse.size.map((squares) => squares * this.side);
     const [left, right] = [Math.min(0, this.end.x), Math.max(width, this.end.x)];
     const [low, high] = [Math.min(0, this.end.y), Math.max(height, this.end.y)];
-    this.view = [left - MARGIN, -high - MARGIN, right - left + 2 * MARGIN, high - low + 2 * MARGIN];
+    const margin = Math.max(MARGIN, 100 + 2 * this.letters);
+    const across = right - left + 2 * margin;
+    const down = high - low + 2 * margin;
+    // Below stand the map's buttons.
+    const box = this.svg.getBoundingClientRect();
+    const scale = Math.max(across / (box.width || 1), down / (box.height || 1));
+    const below = Math.max(0, TOOLS_PX * scale - margin);
+    this.view = [left - margin, -high - margin, across, down + below];
     this.stopFollowing?.();
     this.show();
   }
@@ -412,7 +435,7 @@ function nearestSide(x, y) {
 
 function robotShape(svg, name) {
   const group = make("g", { class: name, hidden: "" }, svg);
-  make("title", {}, group, say(name === "robot" ? "robot" : "ghost"));
+  make("title", { "data-word": name }, group, say(name));
   const { half, front, rear } = BODY;
   // It looks up at 0 degrees.
   make("path", { d: `M${-half} ${rear}V${-front + 50}L${-half + 50} ${-front}H${half - 50}L${half} ${-front + 50}V${rear}Z` }, group);

@@ -2,7 +2,7 @@
 
 import { reason } from "./reasons.js";
 import { crossing, sentence } from "./sentences.js";
-import { put, say, span } from "./words.js";
+import { clock, put, say, span } from "./words.js";
 
 export class Missions {
   constructor(link, parts, robot) {
@@ -13,7 +13,7 @@ export class Missions {
     /** Number and name of goods, by number. */
     this.names = new Map();
     this.order = Date.now() % 1_000_000_000;
-    /** What was taken out of the queue last: its products, and how many waited behind. */
+    /** What was taken out of a robot's queue last: its products, and how many waited behind. */
     this.taken = null;
     parts.fetch.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -28,13 +28,12 @@ export class Missions {
     };
     parts.picked.onclick = () => this.act("picked");
     parts.pickedForce.onclick = () => this.act("picked force");
-    parts.clear.onclick = () => this.takeBack("clear", this.robot()?.queue ?? []);
+    parts.clear.onclick = () => this.takeBack("clear", waiting(this.robot()));
     parts.undo.onclick = () => this.undo();
     link.addEventListener("event", ({ detail }) => this.remember(detail));
   }
 
-  async act(action) {
-    const robot = this.robot();
+  async act(action, robot = this.robot()) {
     if (!robot) return put(this.parts.said, say("no_robot"));
     const answer = await this.link.act(robot, action);
     put(this.parts.said, answer.refused ? reason(answer.refused) : "");
@@ -43,20 +42,19 @@ export class Missions {
 
   /** Takes orders out of the queue; `gone` are those, `behind` those that wait behind them. */
   async takeBack(action, gone, behind = 0) {
-    const orders = gone.filter(({ order }) => order !== this.robot()?.state.order);
-    if (!(await this.act(action)) || !orders.length) return;
-    this.taken = { products: orders.map(({ product }) => product), behind };
-    this.parts.undo.hidden = false;
+    const robot = this.robot();
+    if (!(await this.act(action)) || !gone.length) return;
+    this.taken = { robot, products: gone.map(({ product }) => product), behind };
   }
 
   /** Orders anew what was taken out, and moves it to where it was. */
   async undo() {
-    const { products, behind } = this.taken;
-    this.parts.undo.hidden = true;
+    const { robot, products, behind } = this.taken;
+    this.taken = null;
     for (const product of products) {
       const order = ++this.order;
-      if (!(await this.act(`order ${order} ${product}`))) return;
-      for (let step = 0; step < behind; step++) await this.act(`up ${order}`);
+      if (!(await this.act(`order ${order} ${product}`, robot))) return;
+      for (let step = 0; step < behind; step++) await this.act(`up ${order}`, robot);
     }
   }
 
@@ -86,43 +84,57 @@ export class Missions {
 
   draw(robot, now) {
     this.drawQueue(robot);
-    const { picks } = this.parts;
+    const { picks, undo } = this.parts;
+    undo.hidden = !this.taken || this.taken.robot !== robot;
     const pick = robot?.isStale(now) ? undefined : robot?.state.pick;
     picks.checked = robot?.state.pick === "auto";
     picks.disabled = pick === undefined || !this.link.mayDrive;
     const lines = (robot?.history ?? []).map((one) => delivered(one, this.names));
+    if (!lines.length) lines.push(say("history_empty"));
     fill(this.parts.history, lines, (line) => item(line));
   }
 
   drawQueue(robot) {
     const { queue } = this.parts;
-    const current = robot?.state.product;
-    const orders = (robot?.queue ?? []).filter(({ order }) => order !== robot.state.order);
-    const shown = JSON.stringify([current, orders, [...this.names], document.documentElement.lang]);
+    const { product: current, order: number } = robot?.state ?? {};
+    const orders = waiting(robot);
+    const shown = JSON.stringify([robot?.name, current, number, orders, [...this.names], document.documentElement.lang]);
     if (this.shown === shown) return;
     this.shown = shown;
     queue.replaceChildren();
-    if (current !== undefined) queue.append(item(`${this.names.get(current) ?? current}  ${say("under_way")}`));
+    const cancel = (order, product, behind) =>
+      button(say("cancel"), say("cancel_order", product), () => this.takeBack(`cancel ${order}`, [{ order, product }], behind));
+    if (current !== undefined) {
+      const line = item(`${this.names.get(current) ?? current}  ${say("under_way")}`);
+      // Ordered anew it comes before all that wait but the first, which is under way by then.
+      if (number !== undefined) line.append(cancel(number, current, Math.max(0, orders.length - 1)));
+      queue.append(line);
+    }
     orders.forEach(({ order, product }, index) => {
       const line = item(this.names.get(product) ?? product);
+      line.className = "waiting";
       const after = orders[index + 1];
       const [up, down] = [
         button("\u2191", say("move_up", product), () => this.act(`up ${order}`)),
         button("\u2193", say("move_down", product), () => this.act(`up ${after.order}`)),
       ];
       [up.disabled, down.disabled] = [index === 0, !after];
-      const cancel = () => this.takeBack(`cancel ${order}`, [{ order, product }], orders.length - 1 - index);
-      line.append(up, down, button(say("cancel"), say("cancel_order", product), cancel));
+      line.append(up, down, cancel(order, product, orders.length - 1 - index));
       queue.append(line);
     });
     if (!queue.children.length) queue.append(item(say("queue_empty")));
   }
 }
 
+/** The orders that wait; the one under way may be listed with them. */
+function waiting(robot) {
+  return (robot?.queue ?? []).filter(({ order }) => order !== robot.state.order);
+}
+
 /** One delivery as a line: when, what, how long it took, and which ways were blocked on it. */
 function delivered({ product, at, took, detours }, names) {
   const name = names.get(product) ?? product;
-  const words = [new Date(at).toLocaleTimeString(), took ? say("took", name, took) : name];
+  const words = [clock(at), took ? say("took", name, took) : name];
   const ways = detours.map(({ node, looks }) => `${crossing(node)} ${sentence(`looks_${looks}`) ?? ""}`.trim());
   if (ways.length) words.push(say("detours", ways.join("; ")));
   return words.join("  ");

@@ -4,7 +4,7 @@
 import { doing } from "./bar.js";
 import { Link } from "./link.js";
 import { Stop } from "./stop.js";
-import { current, put, say, span } from "./words.js";
+import { current, decimal, put, say, span } from "./words.js";
 
 const at = (id) => document.getElementById(id);
 current();
@@ -25,7 +25,7 @@ function picture() {
   put(at("robot"), robot?.name ?? say("no_robot"));
   put(at("doing"), robot?.state.stopped === "1" ? say("stopped_short") : doing(robot));
   const { mode, battery_dv } = robot?.state ?? {};
-  const volts = battery_dv === undefined ? "" : `${(Number(battery_dv) / 10).toFixed(1)} V`;
+  const volts = battery_dv === undefined ? "" : say("volts", decimal(Number(battery_dv) / 10));
   put(at("figures"), [mode ? say(`mode_${mode}`) : "", volts].filter(Boolean).join(" \u00b7 "));
   const heard = robot && Number.isFinite(robot.heard) ? say("age", span(robot.age(now))) : say("unheard");
   put(at("link"), !link.open ? say("lost") : stale ? say("no_link", heard) : "");

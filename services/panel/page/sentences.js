@@ -2,7 +2,7 @@
 // the names and values that it tells (bus/lines, `thinks` and `state`). A test holds them to the
 // names that the robot knows.
 
-import { current } from "./words.js";
+import { current, decimal } from "./words.js";
 
 const TABLE = {
   en: {
@@ -332,7 +332,7 @@ export function thought(fields) {
     looks: sentence(`looks_${looks}`),
     joint: sentence(`joint_${joint}`),
     sides: sentence(`sides_${sides & 3}`),
-    volts: (seen / 10).toFixed(1),
+    volts: decimal(seen / 10),
     failure: failure(fields),
     remedy: sentence(`remedy_${remedy}`),
   });

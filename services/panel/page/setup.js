@@ -1,7 +1,7 @@
 // Setting up: the warehouse by form, file and strings, with checks as one types.
 
 import { reason } from "./reasons.js";
-import { put, say } from "./words.js";
+import { put, say, translate } from "./words.js";
 
 const SIDES = ["left", "up", "right", "down"];
 
@@ -28,11 +28,30 @@ export class Setup {
       this.row({ id: this.freeNumber(), square: [0, 0], side: "down" });
       this.check();
     };
-    parts.undo.onclick = () => this.past.length && this.save(this.past.pop(), false);
+    parts.undo.onclick = () => this.undo();
     parts.saveFile.onclick = () => this.saveFile();
     parts.loadFile.onchange = () => parts.loadFile.files.length && this.loadFile(parts.loadFile.files[0]);
     parts.mapString.onchange = () => parts.mapString.value && this.pasteMap(parts.mapString.value);
     parts.goodsString.onchange = () => parts.goodsString.value && this.pasteGoods(parts.goodsString.value);
+    for (const field of [parts.mapString, parts.goodsString]) {
+      field.addEventListener("keydown", (event) => {
+        if (event.key !== "Enter") return;
+        // It takes the string, where the form would save what stands in its other fields.
+        event.preventDefault();
+        field.blur();
+      });
+    }
+    this.drawUndo();
+  }
+
+  async undo() {
+    const before = this.past.at(-1);
+    if (before && (await this.save(before, false))) this.past.pop();
+    this.drawUndo();
+  }
+
+  drawUndo() {
+    this.parts.undo.disabled = !this.past.length;
   }
 
   /** Puts goods at the side of a square, with the next number. */
@@ -59,6 +78,8 @@ export class Setup {
       // It is no JSON, or something else than this.
       put(this.parts.said, `${file.name}: ${say("no_warehouse")}`);
     }
+    // The same file can be chosen again.
+    this.parts.loadFile.value = "";
   }
 
   /** The map as the document writes it, "X,Y,x,y" (M1). */
@@ -82,15 +103,19 @@ export class Setup {
     this.save({ ...this.read(), product });
   }
 
+  /** Whether it is saved; what is wrong is told. */
   async save(warehouse, undoable = true) {
-    const why = this.wrong(warehouse);
-    if (why) return put(this.parts.said, why);
     const before = this.link.warehouse;
-    const answer = await this.link.ask("warehouse", null, JSON.stringify(warehouse));
-    if (answer.refused) return put(this.parts.said, reason(answer.refused));
+    const why = this.wrong(warehouse);
+    const answer = why ? {} : await this.link.ask("warehouse", null, JSON.stringify(warehouse));
+    const refused = why ?? (answer.refused && reason(answer.refused));
+    put(this.parts.said, refused ?? say("saved"));
+    if (refused) return false;
     if (undoable && before) this.past.push(before);
+    this.drawUndo();
     this.dirty = false;
-    put(this.parts.said, say("saved"));
+    this.setWarehouse(warehouse);
+    return true;
   }
 
   /** Fills the form in, unless somebody is at work in it. */
@@ -119,18 +144,20 @@ export class Setup {
     const field = (type, value, key, size) => {
       const input = document.createElement("input");
       Object.assign(input, { type, value, name: key });
+      // What is left empty is no 0.
+      if (type === "number") Object.assign(input, { min: 0, required: true });
       input.className = size;
-      input.setAttribute("aria-label", say(key === "id" ? "number" : key === "name" ? "name" : "square"));
+      input.dataset.label = { id: "number", name: "name", x: "column", y: "row" }[key];
       return input;
     };
     const sides = document.createElement("select");
     sides.name = "from";
-    sides.setAttribute("aria-label", say("reached_from"));
-    sides.append(...SIDES.map((word) => new Option(say(word), word)));
+    sides.dataset.label = "reached_from";
+    for (const word of SIDES) sides.appendChild(new Option(word, word)).dataset.word = word;
     sides.value = side;
     const remove = document.createElement("button");
-    Object.assign(remove, { type: "button", textContent: "×", title: say("remove") });
-    remove.setAttribute("aria-label", say("remove"));
+    Object.assign(remove, { type: "button", textContent: "×" });
+    remove.dataset.title = "remove";
     remove.onclick = () => {
       line.remove();
       this.dirty = true;
@@ -142,6 +169,7 @@ export class Setup {
       cell.append(...parts);
       line.append(cell);
     }
+    translate(line);
     this.parts.products.append(line);
   }
 

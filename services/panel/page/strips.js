@@ -4,7 +4,7 @@
 // shifted by the pixels that time has passed, and what is new is drawn at its end.
 
 import { SPAN_MS } from "./link.js";
-import { put, say } from "./words.js";
+import { decimal, put, say } from "./words.js";
 
 /** Word, unit, least and most value, keys of the past. */
 const STRIPS = [
@@ -62,9 +62,10 @@ export class Strips {
 
 /** Figures with their unit, short enough for a caption. */
 function told(figures, unit) {
-  if (unit === "µs" && Math.max(...figures) >= 1000) return `${figures.map((us) => (us / 1000).toFixed(1)).join(" / ")} ms`;
+  if (unit === "µs" && Math.max(...figures) >= 1000) return `${figures.map((us) => decimal(us / 1000)).join(" / ")} ms`;
   // A duty is told in parts of 255.
   if (unit === "%") return `${figures.map((duty) => Math.round(duty / 2.55)).join(" / ")} %`;
+  if (unit === "V") return `${figures.map((volts) => decimal(volts)).join(" / ")} V`;
   return `${figures.join(" / ")} ${unit}`.trim();
 }
 

@@ -4,20 +4,20 @@ const TABLE = {
   en: {
     add_product: "Add goods", age: "last heard {0} ago", arm: "Arm", arm_waits: "The robot drives: stop it first, then move the arm.",
     armed: "Armed to drive", autonomous: "Autonomous", backward: "back", battery: "battery",
-    blocked: "not possible: {0}", board_lost: "{0} is not heard", calibrate: "Calibrate (5 s)", calibrated: "Calibrated: all eleven sensors saw tape and floor.",
+    blocked: "not done: {0}", board_lost: "{0} is not heard", calibrate: "Calibrate (5 s)", calibrated: "Calibrated: all eleven sensors saw tape and floor.",
     calibrating: "Calibrating: a sensor is underlined once it has seen tape and floor.", calibration: "Line sensor",
     calibration_end: "Read here how it went.", calibration_how: "Press Calibrate, then move it slowly to and fro over tape and floor for five seconds.", calibration_put: "Put the robot over the tape.", sensors_read: "the line sensors read {0}; {1} of them have seen tape and floor", sensors_seen: "line sensors {0}", sensors_unheard: "the line sensors are not heard",
     cancel: "cancel", clear: "Clear queue", clockwise: "claw cw", control_free: "Nobody drives. Take the wheel",
     control_mine: "You drive. Let go", control_other: "{0} drives. Ask for the wheel", counterclockwise: "claw ccw", delivery: "Delivery corner", detours: "round what was blocked: {0}",
-    distance: "distance", down: "down", drive: "Drive", duty: "duty",
+    distance: "distance", down: "down", drive: "Drive", duty: "duty L / R",
     duplicate: "two goods have the number {0}", event_failed: "cannot go on at {1}", event_getting_item: "fetches {0}",
     event_in_position: "stands at goods {0}", event_item_delivered: "has delivered {0}", event_next_node: "goes to {1}",
     event_pickup_refused: "does not feel the goods {0}", event_refused: "does not fetch {0}", event_way_blocked: "finds the way from {1} blocked",
     fetch: "Fetch", fetches: "fetches {0}", filter: "filter", fit: "Fit", follow: "Follow", follow_back: "follow line back",
     follow_forward: "follow line", forward: "forward", full: "wait: the link does not keep up", gains: "Line control", gains_now: "now {0} and {1}", gains_unset: "as the board has them", put_back: "Put back {0} and {1}", goods: "goods", goods_string: "Goods as a string", goods_string_how: "write number,x,y,side with semicolons between, side 0 left, 1 up, 2 right, 3 down; this is not: {0}",
-    history: "Delivered", in: "in", language: "Svenska", left: "left", left_diag: "45° left",
+    history: "Delivered", history_empty: "Nothing yet.", in: "in", language: "Svenska", left: "left", left_diag: "45° left",
     load_file: "Load a file", map_string: "Map as a string", map_string_how: "write four numbers: squares in x and y, then the delivery corner, such as 4,3,0,3", no_warehouse: "this is no warehouse", no_way: "no way there", line: "Line", line_error: "line error", line_sensors: "line sensors", link: "link {0} ms", log: "Log", lost: "there is no connection to the station",
-    losses: "lost", manual: "By hand", map: "map", missions: "Missions", mode_autonomous: "AUTONOMOUS", mode_manual: "BY HAND",
+    log_empty: "Nothing that fits has happened.", losses: "lost", manual: "By hand", map: "map", missions: "Missions", mode_autonomous: "AUTONOMOUS", mode_manual: "BY HAND",
     name: "name", no_link: "no link, {0}", no_map: "The station knows no warehouse yet. Describe one under Set up.",
     no_robot: "No robot has connected yet. It does so by itself once it is up.", not_armed: "tick “{0}” first", not_driver: "take the wheel first",
     nobody: "nobody drives", number: "number", obstacle_put: "obstacle put; click again to take it away", obstacle_taken: "obstacle taken away",
@@ -25,7 +25,7 @@ const TABLE = {
     picked_force: "Pick-up done, not felt", picks: "The robot picks goods up by itself", plain: "speaks only the document's language: no live picture",
     queue_empty: "Nothing waits.", reached_from: "from", refused: "{0}", release: "release", remove: "remove", reset: "It stands at the delivery, looking in",
     resume: "Hold to resume", right: "right", right_diag: "45° right", robot: "robot",
-    route: "way", save: "Save", save_csv: "Save CSV", save_file: "Save as a file", save_mcap: "Save MCAP", saved: "saved", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
+    save: "Save", save_csv: "Save CSV", save_file: "Save as a file", save_mcap: "Save MCAP", saved: "saved", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
     servo_voltage: "input voltage", servo_angle: "angle limit", servo_heat: "too hot", servo_range: "value out of range", servo_checksum: "checksum", servo_overload: "overload", servo_instruction: "unknown instruction",
     set: "Set", setup: "Set up",
     side: "Side", size: "Squares", square: "square", squeeze: "squeeze", stale: "nothing new for {0}", stand: "stand", stands: "both wheels stand, {0} ms",
@@ -43,20 +43,20 @@ const TABLE = {
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
     armed: "Klar att köra", autonomous: "Autonom", backward: "bakåt", battery: "batteri",
-    blocked: "går inte: {0}", board_lost: "{0} hörs inte", calibrate: "Kalibrera (5 s)", calibrated: "Kalibrerad: alla elva sensorer såg tejp och golv.",
+    blocked: "inte gjort: {0}", board_lost: "{0} hörs inte", calibrate: "Kalibrera (5 s)", calibrated: "Kalibrerad: alla elva sensorer såg tejp och golv.",
     calibrating: "Kalibrerar: en sensor stryks under när den har sett tejp och golv.", calibration: "Linjesensor",
     calibration_end: "Läs här hur det gick.", calibration_how: "Tryck på Kalibrera och för den sedan långsamt fram och tillbaka över tejp och golv i fem sekunder.", calibration_put: "Ställ roboten över tejpen.", sensors_read: "linjesensorerna läser {0}; {1} av dem har sett tejp och golv", sensors_seen: "linjesensorer {0}", sensors_unheard: "linjesensorerna hörs inte",
     cancel: "ta bort", clear: "Töm kön", clockwise: "klo medurs", control_free: "Ingen kör. Ta ratten",
     control_mine: "Du kör. Släpp ratten", control_other: "{0} kör. Be om ratten", counterclockwise: "klo moturs", delivery: "Leveranshörn", detours: "runt det som var spärrat: {0}",
-    distance: "avstånd", down: "ner", drive: "Kör", duty: "pådrag",
+    distance: "avstånd", down: "ner", drive: "Kör", duty: "pådrag V / H",
     duplicate: "två varor har numret {0}", event_failed: "kommer inte vidare vid {1}", event_getting_item: "hämtar {0}",
     event_in_position: "står vid vara {0}", event_item_delivered: "har levererat {0}", event_next_node: "kör till {1}",
     event_pickup_refused: "känner inte vara {0}", event_refused: "hämtar inte {0}", event_way_blocked: "finner vägen från {1} spärrad",
     fetch: "Hämta", fetches: "hämtar {0}", filter: "filter", fit: "Allt", follow: "Följ", follow_back: "följ linje bakåt",
     follow_forward: "följ linje", forward: "framåt", full: "vänta: länken hinner inte med", gains: "Linjereglering", gains_now: "nu {0} och {1}", gains_unset: "som kortet har dem", put_back: "Återställ {0} och {1}", goods: "varor", goods_string: "Varor som sträng", goods_string_how: "skriv nummer,x,y,sida med semikolon emellan, sida 0 vänster, 1 upp, 2 höger, 3 ner; detta är det inte: {0}",
-    history: "Levererat", in: "in", language: "English", left: "vänster", left_diag: "45° vänster",
+    history: "Levererat", history_empty: "Inget ännu.", in: "in", language: "English", left: "vänster", left_diag: "45° vänster",
     load_file: "Läs in fil", map_string: "Karta som sträng", map_string_how: "skriv fyra tal: rutor i x och y, sedan leveranshörnet, som 4,3,0,3", no_warehouse: "detta är inget lager", no_way: "ingen väg dit", line: "Linje", line_error: "linjefel", line_sensors: "linjesensorer", link: "länk {0} ms", log: "Logg", lost: "ingen förbindelse med stationen",
-    losses: "förlorat", manual: "För hand", map: "karta", missions: "Uppdrag", mode_autonomous: "AUTONOM", mode_manual: "FÖR HAND",
+    log_empty: "Inget sådant har hänt.", losses: "förlorat", manual: "För hand", map: "karta", missions: "Uppdrag", mode_autonomous: "AUTONOM", mode_manual: "FÖR HAND",
     name: "namn", no_link: "ingen länk, {0}", no_map: "Stationen känner inget lager än. Beskriv ett under Ställ in.",
     no_robot: "Ingen robot har anslutit än. Den gör det själv när den är igång.", not_armed: "kryssa i ”{0}” först", not_driver: "ta ratten först",
     nobody: "ingen kör", number: "nummer", obstacle_put: "hinder utställt; klicka igen för att ta bort det", obstacle_taken: "hinder borttaget",
@@ -64,7 +64,7 @@ const TABLE = {
     picked_force: "Upplockning klar, känns ej", picks: "Roboten plockar upp varorna själv", plain: "talar bara dokumentets språk: ingen levande bild",
     queue_empty: "Inget väntar.", reached_from: "från", refused: "{0}", release: "släpp", remove: "ta bort", reset: "Den står vid leveransen och ser in i lagret",
     resume: "Håll för att fortsätta", right: "höger", right_diag: "45° höger", robot: "robot",
-    route: "väg", save: "Spara", save_csv: "Spara CSV", save_file: "Spara som fil", save_mcap: "Spara MCAP", saved: "sparat", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
+    save: "Spara", save_csv: "Spara CSV", save_file: "Spara som fil", save_mcap: "Spara MCAP", saved: "sparat", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
     servo_voltage: "matningsspänning", servo_angle: "vinkelgräns", servo_heat: "för varm", servo_range: "värde utanför området", servo_checksum: "kontrollsumma", servo_overload: "överlast", servo_instruction: "okänd instruktion",
     set: "Sätt", setup: "Ställ in",
     side: "Sida", size: "Rutor", square: "ruta", squeeze: "kläm", stale: "inget nytt på {0}", stand: "stå", stands: "båda hjulen står, {0} ms",
@@ -107,10 +107,21 @@ export function say(key, ...values) {
   return text.replace(/\{(\d)\}/g, (_, index) => values[index] ?? "");
 }
 
+/** A number with one decimal, as the language writes it. */
+export function decimal(value) {
+  const text = value.toFixed(1);
+  return current() === "sv" ? text.replace(".", ",") : text;
+}
+
+/** The time of day of a moment in ms since 1970. */
+export function clock(at) {
+  return new Date(at).toLocaleTimeString(current());
+}
+
 /** A time in ms, in words. */
 export function span(ms) {
   if (ms < 1_000) return `${Math.max(0, Math.round(ms))} ms`;
-  if (ms < 60_000) return `${(ms / 1_000).toFixed(1)} s`;
+  if (ms < 60_000) return `${decimal(ms / 1_000)} s`;
   if (ms < 3_600_000) return `${Math.floor(ms / 60_000)} min`;
   return `${Math.floor(ms / 3_600_000)} h`;
 }
