@@ -2,6 +2,7 @@
 //! be published, and that a topic that loses samples is seen at once.
 
 mod listened;
+mod screen;
 
 use std::io::Write;
 use std::process::{Output, Stdio};

@@ -1,7 +1,7 @@
 //! The screen of `lager top`: the model as text in a buffer, for any size from 80 x 24 on.
 //!
 //! ```text
-//!  robot, mode, clock, load, how many topics are in trouble
+//!  robot, mode, how many topics are in trouble, clock, load
 //!  stop, both links, mission                    (four lines)
 //!  the way of frames to logic's decision, or with room each stage
 //!  the table: the most telling columns first, the others where there is room
@@ -135,8 +135,9 @@ fn head(model: &Model, page: &mut Page<'_>) {
     };
     page.spans(&[
         (format!("lager top  {}  ", head.robot), bold()),
-        (format!("{}{pace}  {of}  ", head.mode()), plain()),
+        (format!("{}  ", head.mode()), plain()),
         (words, style),
+        (format!("{pace}  {of}"), plain()),
     ]);
     match head.stopped(now) {
         None => page.put("stop      none", plain()),
@@ -202,6 +203,9 @@ fn bars(shares: &[f64]) -> String {
     shares.iter().map(bar).collect()
 }
 
+/// Letters for who writes a topic.
+const WRITER: usize = 15;
+
 /// A column: its head, its width, what it shows, and what it sorts by.
 struct Column {
     head: &'static str,
@@ -216,7 +220,7 @@ const COLUMNS: &[(u8, Column)] = &[
         9,
         column("TOPIC", 17, Some(Sort::Name), |row, _| row.name.clone()),
     ),
-    (9, column("WRITER", 15, None, |row, _| writer(row))),
+    (9, column("WRITER", WRITER, None, |row, _| writer(row))),
     (2, column("STATE", 6, None, |row, _| state(row))),
     (8, column("READERS", 7, None, |row, _| readers(row))),
     (
@@ -411,7 +415,10 @@ fn writer(row: &Row) -> String {
         1 => String::new(),
         n => format!(" +{}", n - 1),
     };
-    format!("{role} {}{more}", first.pid)
+    // A long role is cut, since a process is known by its whole number only.
+    let process = format!(" {}{more}", first.pid);
+    let room = WRITER.saturating_sub(process.len());
+    role.chars().take(room).collect::<String>() + &process
 }
 
 fn state(row: &Row) -> String {

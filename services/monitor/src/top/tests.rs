@@ -309,6 +309,23 @@ fn a_narrow_screen_shows_every_column_page_by_page() {
 }
 
 #[test]
+fn the_number_of_a_writer_and_what_is_wrong_are_never_cut() {
+    let mut model = driving();
+    model.head.load.minute = 123.45;
+    let role = Some(Role::Supervisor);
+    let pid = 4_194_304;
+    let writers = vec![Peer { role, pid }, Peer { role, pid: 7 }];
+    model.take_ends(&[info("sensor/line", writers)], |_| Life::Alive);
+    let text = picture(&model, 80, 24);
+    let line = text.lines().find(|line| line.contains("sensor/line"));
+    assert!(
+        line.is_some_and(|line| line.contains(" supe 4194304 +1 ")),
+        "{text}"
+    );
+    assert!(text.contains("1 topic IN TROUBLE  "), "{text}");
+}
+
+#[test]
 fn a_topic_that_cannot_be_read_says_so() {
     let mut model = driving();
     let mut maps = info("nav/map", Vec::new());
