@@ -194,7 +194,7 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     wait_for("it to leave", || {
         (!page.text("#doing").contains("stands at the goods")).then_some(())
     });
-    page.wait_until("document.querySelectorAll('#history li').length === 1");
+    page.wait_for("#history li", " in ");
     assert!(texts(&mut page, "#history li").contains('3'));
 
     // An order that is under way is taken back as long as its goods are not in the claw.
