@@ -303,7 +303,7 @@ pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, p
     let station = scene.up.service("station").expect("it runs");
     kill_process(pid(station), Signal::KILL).expect("it runs");
     scene.wait_to_stand();
-    page.wait_for("#link", " ms");
+    page.wait_for("#link", "link ");
     scene.assert_stands();
     page.key_up("ArrowUp");
 

@@ -58,14 +58,14 @@ fn a_warehouse_is_described_by_form_by_file_and_by_strings() {
     page.wait_for("#map-text", "Goods: 7 (1, 0) down; 8 (2, 1) left.");
     // A string that is pasted and ended by Enter is taken, and not what the form had before.
     page.value("document.querySelector('#map-string').focus(); document.querySelector('#map-string').select()");
-    page.call("Input.insertText", &json!({ "text": "2,3,0,0" }));
+    page.call("Input.insertText", &json!({ "text": "3,4,0,4" }));
     let enter = json!({ "type": "keyDown", "key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13 });
     page.call("Input.dispatchKeyEvent", &enter);
     page.key_up("Enter");
-    page.wait_for("#map-text", "A warehouse of 2 by 3 squares");
+    page.wait_for("#map-text", "A warehouse of 3 by 4 squares");
     page.pause();
-    assert!(page.text("#map-text").contains("2 by 3 squares"));
-    page.wait_until("document.querySelector('#warehouse [name=height]').value === '3'");
+    assert!(page.text("#map-text").contains("3 by 4 squares"));
+    page.wait_until("document.querySelector('#warehouse [name=height]').value === '4'");
     page.click("#undo");
     page.wait_for("#map-text", "A warehouse of 3 by 2 squares");
     page.fill("#map-string", "3,2,1,1");
@@ -194,7 +194,7 @@ fn a_person_picks_and_insists_where_the_claw_feels_nothing() {
     wait_for("it to leave", || {
         (!page.text("#doing").contains("stands at the goods")).then_some(())
     });
-    page.wait_until("document.querySelectorAll('#history li').length === 1");
+    page.wait_for("#history li", " in ");
     assert!(texts(&mut page, "#history li").contains('3'));
 
     // An order that is under way is taken back as long as its goods are not in the claw.
