@@ -129,11 +129,7 @@ export class Link extends EventTarget {
       if (reason) this.closed = reason;
       for (const settle of this.waiting.values()) settle({ refused: "lost", isUnknown: true });
       this.waiting.clear();
-      for (const robot of this.robots.values()) {
-        robot.connected = false;
-        // The wheel is left with the connection.
-        if (robot.driver === this.me) robot.driver = null;
-      }
+      for (const robot of this.robots.values()) robot.connected = false;
       this.emit("link");
       const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
       setTimeout(() => this.connect(), wait);

@@ -208,7 +208,8 @@ function drawRest(shown, time) {
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];
   put(at("control"), say(...seat));
-  at("control").disabled = !link.open;
+  // Who has the wheel is not known until the robot is heard again.
+  at("control").disabled = !link.open || !shown?.connected;
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }
