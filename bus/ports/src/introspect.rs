@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
+use std::io;
 use std::os::unix::fs::MetadataExt;
 
 use iceoryx2::config::Config;
@@ -161,9 +162,13 @@ impl ServiceWatch {
 /// The file that describes a service: its name, its number and when it last changed.
 type DescriptionFile = (OsString, u64, (i64, i64));
 
-fn descriptions(bus: &Bus) -> std::io::Result<BTreeSet<DescriptionFile>> {
-    let files = fs::read_dir(bus.place().transport_folder().join("services"))?;
-    let described = |file: std::io::Result<fs::DirEntry>| {
+fn descriptions(bus: &Bus) -> io::Result<BTreeSet<DescriptionFile>> {
+    let files = match fs::read_dir(bus.place().transport_folder().join("services")) {
+        // The first service makes the folder.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
+        files => files?,
+    };
+    let described = |file: io::Result<fs::DirEntry>| {
         let file = file?;
         let data = file.metadata()?;
         Ok((
