@@ -97,7 +97,7 @@ impl Sender {
         let sent = self.publisher.replay(Weather::default(), stamp);
         sent.expect("a sample");
         self.next += 1;
-        self.next += u64::from(self.loses && self.next % 10 == 0);
+        self.next += u64::from(self.loses && self.next.is_multiple_of(10));
     }
 
     /// Goes on until the screen is as it should be, and returns what is on it.
