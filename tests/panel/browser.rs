@@ -355,15 +355,15 @@ impl Page {
         self.key_up("Tab");
     }
 
-    /// Keeps what the page says to the panel, as `sent`, and its socket, as `line`.
+    /// Keeps what the page says to the panel, as `sent`, and its socket, as `tapped`.
     pub(crate) fn listen_in(&mut self) {
         self.value(
             "window.sent = []; (() => { const send = WebSocket.prototype.send; \
              WebSocket.prototype.send = function (text) { \
-               window.line = this; sent.push(text); return send.call(this, text); \
+               window.tapped = this; sent.push(text); return send.call(this, text); \
              }; })()",
         );
-        self.wait_until("window.line !== undefined");
+        self.wait_until("window.tapped !== undefined");
     }
 
     /// What the page has told wheels and arm since this was asked last, without numbers and times.

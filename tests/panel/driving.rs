@@ -197,7 +197,7 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     scene.assert_stands();
 
     // Without the station it says since when, in sight and to a screen reader.
-    page.value("window.WebSocket = class { close() {} }; line.close()");
+    page.value("window.WebSocket = class { close() {} }; tapped.close()");
     page.wait_for("#link", "no connection to the station, last heard ");
     page.wait_for("#link-said[role=status]", "no connection to the station");
     page.wait_until("document.body.classList.contains('stale')");

@@ -252,7 +252,7 @@ pub(crate) fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence(
         take_hold(scene, page, &KEY);
         while reports.receive().expect("readable").is_some() {}
         let from = Clock::monotonic_ns();
-        page.value("window.sent = []; line.close()");
+        page.value("window.sent = []; tapped.close()");
         let ms = stands(&mut reports, from);
         page.wait_for("#control", "Nobody drives");
         page.wait_until("!document.querySelector('#control').disabled");
