@@ -233,14 +233,14 @@ pub(crate) fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence(
         take_hold(scene, page, &KEY);
         while reports.receive().expect("readable").is_some() {}
         let from = Clock::monotonic_ns();
-        page.value("window.hears = line.onmessage; line.onmessage = null; window.sent = []");
+        page.value("window.hears = tapped.onmessage; tapped.onmessage = null; window.sent = []");
         let ms = stands(&mut reports, from);
         assert!(ms > STALE_MS - 100.0, "it was not old yet: {ms:.0} ms");
         page.pause();
         let mut said = page.moves();
         said.retain(|line| line != "drive 6 200");
         assert_eq!(said, ["drive 1 200"]);
-        page.value("line.onmessage = hears");
+        page.value("tapped.onmessage = hears");
         page.wait_until("!document.body.classList.contains('stale')");
         let_all_go(page);
         ms
