@@ -74,9 +74,9 @@
 //! queue <int> {<order> <prodid>}       what is fetched next, likewise
 //! event <event> <coord> <order> <prodid> [<text>]
 //!                                      at that node; `-` where there is no order or product
-//! latency <int> <int> <int> <int> <int> <int>
-//!                                      sensor frames measured; half, 90 %, 99 %, 99.9 %, all of
-//!                                      them took at most so many microseconds to logic's decision
+//! latency <int> {<int> <int>}          how long sensor frames took to logic's decision: the longest
+//!                                      in microseconds, and for each bucket that is not empty its
+//!                                      number from 0 to 89 and how many frames it holds; see below
 //! truth <int> <int> <int> <prodid>     of a simulated robot: x and y in mm, heading in degrees,
 //!                                      what it holds or `-`
 //! sensors {<int> <int> <int> <int>}    while the line sensors are calibrated, of each of the
@@ -89,6 +89,11 @@
 //! <event> ::= in_position | getting_item | item_delivered | next_node | refused
 //!           | pickup_refused | failed | way_blocked
 //! ```
+//!
+//! Bucket 0 of `latency` holds times up to 256 ns, and bucket i from 1 to 88 times up to
+//! `(5 + (i - 1) % 4) << (6 + (i - 1) / 4)` ns, above those of the bucket before it: each doubling
+//! is divided into four equal parts. Bucket 89 holds what took longer than 2^30 ns. A bucket
+//! counts the frames since the robot made such a line before, at most 999999.
 //!
 //! Here a list may be empty, and `route`, `blocked`, `queue` and `sensors` are sent when they have
 //! changed. A line that cannot be read changes nothing; if it has a number the robot answers

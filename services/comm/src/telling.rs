@@ -363,15 +363,12 @@ fn sensors(health: &Health) -> Option<Report> {
 }
 
 fn latency(counted: &Durations) -> Report {
-    let us = |ns: u64| u32::try_from(ns.div_ceil(1_000)).unwrap_or(u32::MAX);
-    Report::Latency(Latency {
-        count: u32::try_from(counted.count).unwrap_or(u32::MAX),
-        p50_us: us(counted.quantile_ns(0.5)),
-        p90_us: us(counted.quantile_ns(0.9)),
-        p99_us: us(counted.quantile_ns(0.99)),
-        p999_us: us(counted.quantile_ns(0.999)),
-        max_us: us(counted.max_ns),
-    })
+    let most =
+        |count: u64| u32::try_from(count).map_or(Latency::MOST, |count| count.min(Latency::MOST));
+    Report::Latency(Box::new(Latency {
+        max_us: u32::try_from(counted.max_ns.div_ceil(1_000)).unwrap_or(u32::MAX),
+        buckets: counted.buckets.map(most),
+    }))
 }
 
 fn truth(truth: &Truth) -> Report {

@@ -23,7 +23,7 @@ use crate::config::{Body, Config};
 use crate::hands::Hands;
 use crate::keepers::Keepers;
 use crate::map::bus_map;
-use crate::mission::{Charger, Mission, Watch};
+use crate::mission::{Helper, Mission, Watch};
 use crate::report::Narrator;
 use crate::supervisor;
 use crate::words::{Begin, Line, Pulse, Request, Sweep, Word};
@@ -113,10 +113,10 @@ fn tell_warehouse(config: &Config, bus: &Bus) -> Result<Publisher<NavMap>> {
     Ok(map)
 }
 
-fn charger(body: Body) -> Charger {
+fn helper(body: Body) -> Helper {
     match body {
-        Body::Serial => Charger::Person,
-        Body::Sim | Body::Chip => Charger::Nobody,
+        Body::Serial => Helper::Person,
+        Body::Sim | Body::Chip => Helper::Nobody,
     }
 }
 
@@ -167,7 +167,7 @@ impl Attendant {
             map,
             watch: begin
                 .mission
-                .map(|mission| Watch::new(mission, charger(config.body))),
+                .map(|mission| Watch::new(mission, helper(config.body))),
             told: None,
             ears: Ears::default(),
             inventory: Inventory::default(),

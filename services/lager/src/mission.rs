@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 
 use lager_topics::{
     Ask, AskKind, Failure, FailureKind, Health, Hold, Mode, NavigatorStatus, Order, OrderQueue,
-    Phase, Remedy, Tag,
+    Phase, Pick, Remedy, Tag,
 };
 use serde::{Deserialize, Serialize};
 
@@ -50,12 +50,12 @@ pub struct Seen {
     pub refused: Option<(u32, i32, Failure)>,
 }
 
-/// Who charges a robot whose battery is low.
+/// Who helps a robot whose battery is low or whose arm is in its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Charger {
+pub enum Helper {
     /// A person, some time.
     Person,
-    /// Nobody: the battery is simulated.
+    /// Nobody: the robot is simulated.
     Nobody,
 }
 
@@ -161,10 +161,10 @@ impl Mission {
 #[derive(Debug)]
 pub struct Watch {
     mission: Mission,
-    charger: Charger,
+    helper: Helper,
     acted: Option<Duration>,
     stuck_since: Option<Duration>,
-    uncharged_since: Option<Duration>,
+    unhelped_since: Option<Duration>,
     idle_since: Option<Duration>,
     /// The number of the refused order that has been judged.
     judged: Option<u32>,
@@ -196,13 +196,13 @@ impl Hopeless {
 
 impl Watch {
     /// Sees to what is left of `mission`.
-    pub fn new(mission: Mission, charger: Charger) -> Self {
+    pub fn new(mission: Mission, helper: Helper) -> Self {
         Self {
             mission,
-            charger,
+            helper,
             acted: None,
             stuck_since: None,
-            uncharged_since: None,
+            unhelped_since: None,
             idle_since: None,
             judged: None,
         }
@@ -271,14 +271,17 @@ impl Watch {
             let why = "logic waits for a person";
             return Some(Hopeless::of_logic(why, &status.failure));
         }
-        if self.is_uncharged(now, status) {
-            let (x, y, remedy) = (status.x, status.y, Hold::Battery.remedy());
-            let why = format!(
-                "the battery is low, and the robot stands at crossing ({x}, {y}): {remedy}"
-            );
+        if let Some(hold) = self.unhelped(now, status) {
+            let (x, y, remedy) = (status.x, status.y, hold.remedy());
+            let what = match hold {
+                Hold::Arm => "the arm is not where it is carried",
+                _ => "the battery is low",
+            };
             return Some(Hopeless {
                 hold: Some(status.hold),
-                ..Hopeless::new(why)
+                ..Hopeless::new(format!(
+                    "{what}, and the robot stands at crossing ({x}, {y}): {remedy}"
+                ))
             });
         }
         let phase = status.phase.get()?;
@@ -331,13 +334,17 @@ impl Watch {
         now - *self.stuck_since.get_or_insert(now) >= patience
     }
 
-    /// Whether the robot has stood for too long with a battery that nobody charges.
-    fn is_uncharged(&mut self, now: Duration, status: &NavigatorStatus) -> bool {
-        if self.charger == Charger::Person || status.hold != Hold::Battery {
-            self.uncharged_since = None;
-            return false;
+    /// For what the robot has stood too long, where nobody ends it. Who picks by hand moves the arm.
+    fn unhelped(&mut self, now: Duration, status: &NavigatorStatus) -> Option<Hold> {
+        let hold = status.hold.get().filter(|hold| match hold {
+            Hold::Battery => self.helper == Helper::Nobody,
+            Hold::Arm => self.helper == Helper::Nobody && status.pick == Pick::Auto,
+            Hold::None | Hold::Blind | Hold::Unheard | Hold::Link => false,
+        });
+        if hold.is_none() {
+            self.unhelped_since = None;
         }
-        now - *self.uncharged_since.get_or_insert(now) >= STUCK
+        hold.filter(|_| now - *self.unhelped_since.get_or_insert(now) >= STUCK)
     }
 }
 

@@ -25,7 +25,7 @@ use crate::cli::SimulateArgs;
 use crate::config::{self, Config, PickBy};
 use crate::exit;
 use crate::map::bus_map;
-use crate::mission::{Act, Charger, Mission, Seen, Watch};
+use crate::mission::{Act, Helper, Mission, Seen, Watch};
 use crate::up::mission;
 
 /// How far time moves at each turn of the loop.
@@ -218,7 +218,7 @@ impl Whole {
                 pick: Pick::Auto,
                 ..config.navigator()
             }),
-            watch: Watch::new(Mission::of_robot(mission, 1), Charger::Nobody),
+            watch: Watch::new(Mission::of_robot(mission, 1), Helper::Nobody),
             seen: Seen::default(),
             renewed: Duration::ZERO,
             looked: Duration::ZERO,
@@ -517,7 +517,7 @@ mod tests {
                 let failure = whole.run(due);
                 due += every;
                 assert!(due < Duration::from_secs(600), "{failure:?}");
-                whole.watch = Watch::new(whole.watch.mission().clone(), Charger::Nobody);
+                whole.watch = Watch::new(whole.watch.mission().clone(), Helper::Nobody);
             }
             let taken_over = whole.watch.mission();
             assert_eq!(taken_over.outcome(), Some(Ok(())), "every {every:?}");

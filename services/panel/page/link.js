@@ -248,9 +248,9 @@ export class Link extends EventTarget {
       const [x, y, heading, carrying] = rest;
       robot.truth = { x: Number(x), y: Number(y), heading: Number(heading), carrying };
     } else if (word === "latency") {
-      const [count, p50, p90, p99] = rest.map(Number);
+      const [longest, ...counted] = rest.map(Number);
       // Without a frame measured there is no new figure.
-      if (count > 0) robot.latency = { p50, p90, p99 };
+      if (counted.length > 0) robot.latency = { p50: quantile(0.5, counted, longest), p99: quantile(0.99, counted, longest) };
     } else if (word === "sensors") {
       robot.sensors = Array.from({ length: rest.length / 4 }, (_, sensor) => {
         const [reading, lowest, highest, both] = rest.slice(4 * sensor, 4 * sensor + 4).map(Number);
@@ -291,6 +291,26 @@ const SAVED = ["heading_deg", "looks", "mode", "phase", "node", "next", "code", 
 
 /** A number where it is one; rows of digits stay what they are. */
 const plain = (text = null) => (/^-?\d{1,5}$/.test(text) ? Number(text) : text);
+
+/**
+ * The time that this part of all frames did not exceed, in us, interpolated within its bucket. `counted` has the
+ * number and the count of each bucket in turn.
+ */
+function quantile(part, counted, longest) {
+  const upper = (bucket) => (bucket < 1 ? 256 * (bucket + 1) : (5 + ((bucket - 1) % 4)) * 2 ** (6 + Math.floor((bucket - 1) / 4))) / 1_000;
+  const frames = counted.reduce((sum, count, i) => (i % 2 === 1 ? sum + count : sum), 0);
+  let left = Math.max(1, Math.ceil(part * frames));
+  for (let i = 0; i < counted.length; i += 2) {
+    const [bucket, count] = [counted[i], counted[i + 1]];
+    if (left <= count) {
+      const lower = upper(bucket - 1);
+      const end = bucket === 89 ? longest : upper(bucket);
+      return Math.round(Math.min(longest, lower + ((end - lower) * left) / count));
+    }
+    left -= count;
+  }
+  return longest;
+}
 
 /** Keeps what the strips and the trail show. */
 function remember(robot, now) {

@@ -393,7 +393,7 @@ impl Visit {
             tell(4, seen.at, &|| Report::Queue(seen.value.clone()));
         }
         if let Some(seen) = &shown.latency {
-            tell(5, seen.at, &|| Report::Latency(seen.value));
+            tell(5, seen.at, &|| Report::Latency(seen.value.clone()));
         }
         if let Some(seen) = &shown.sensors {
             tell(6, seen.at, &|| Report::Sensors(seen.value));

@@ -38,7 +38,7 @@ pub struct Shown {
     /// What it fetches next by itself, after what it is on.
     pub queue: Option<Seen<Listed<Queued>>>,
     /// How long it takes to react, about once a second.
-    pub latency: Option<Seen<Latency>>,
+    pub latency: Option<Seen<Box<Latency>>>,
     /// What each line sensor has read in the last calibration, the leftmost first.
     pub sensors: Option<Seen<[LineReading; 11]>>,
 }

@@ -50,7 +50,7 @@ pub enum Report {
     /// The thought that comes next, in values.
     Thinks(Box<Thinks>),
     /// How long it takes to react.
-    Latency(Latency),
+    Latency(Box<Latency>),
     /// Where a simulated robot really is.
     Truth(TruePose),
     /// What each line sensor has read in the calibration that runs, the leftmost first.
@@ -125,21 +125,42 @@ impl EventKind {
     }
 }
 
-/// How long it takes from the reading of a sensor's frame until logic has decided.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How long it takes from the reading of a sensor's frame until logic has decided, as a histogram
+/// of the frames since such a report was made before.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Latency {
-    /// Frames measured since the last such line.
-    pub count: u32,
-    /// Half of them took at most this long, in us.
-    pub p50_us: u32,
-    /// Nine in ten took at most this long, in us.
-    pub p90_us: u32,
-    /// All but one in a hundred took at most this long, in us.
-    pub p99_us: u32,
-    /// All but one in a thousand took at most this long, in us.
-    pub p999_us: u32,
     /// The longest, in us.
     pub max_us: u32,
+    /// How many frames fell into each bucket, from 0 to [`MOST`](Self::MOST). The counts are not
+    /// cumulative.
+    pub buckets: [u32; Self::BUCKETS],
+}
+
+impl Latency {
+    /// How many buckets there are.
+    pub const BUCKETS: usize = 90;
+
+    /// The most that a bucket counts. So all of them fit in a line, whatever they count.
+    pub const MOST: u32 = 999_999;
+
+    /// The longest time that counts in a bucket, in ns; `None` for the last bucket, which has no
+    /// end. These are the buckets of the topic `latency/path`.
+    pub const fn upper_ns(bucket: usize) -> Option<u64> {
+        match bucket {
+            0 => Some(256),
+            1..89 => Some((5 + (bucket as u64 - 1) % 4) << (6 + (bucket - 1) / 4)),
+            _ => None,
+        }
+    }
+}
+
+impl Default for Latency {
+    fn default() -> Self {
+        Self {
+            max_us: 0,
+            buckets: [0; Self::BUCKETS],
+        }
+    }
 }
 
 /// Where a simulated robot really is.
@@ -183,7 +204,9 @@ impl Report {
             }
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
-            "latency" => |reader: &mut Reader<'_>| Latency::read(reader).map(Self::Latency),
+            "latency" => {
+                |reader: &mut Reader<'_>| Ok(Self::Latency(Box::new(Latency::read(reader)?)))
+            }
             "truth" => |reader: &mut Reader<'_>| TruePose::read(reader).map(Self::Truth),
             "sensors" => |reader: &mut Reader<'_>| read_sensors(reader).map(Self::Sensors),
             _ => return None,
@@ -245,16 +268,20 @@ impl Event {
 
 impl Latency {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
-        let mut next = |wanted| reader.word().number(wanted, 0, i64::from(u32::MAX));
         let time = "a time from 0 to 4294967295 us";
-        Ok(Self {
-            count: next("the number of frames measured, 0 to 4294967295")?,
-            p50_us: next(time)?,
-            p90_us: next(time)?,
-            p99_us: next(time)?,
-            p999_us: next(time)?,
-            max_us: next(time)?,
-        })
+        let mut latency = Self {
+            max_us: reader.word().number(time, 0, i64::from(u32::MAX))?,
+            ..Self::default()
+        };
+        let mut least = 0;
+        while !reader.ahead().text.is_empty() {
+            let wanted = "a bucket from 0 to 89, above the one before it";
+            let bucket: usize = reader.word().number(wanted, least, 89)?;
+            let wanted = "how many frames it holds, 1 to 999999";
+            latency.buckets[bucket] = reader.word().number(wanted, 1, i64::from(Self::MOST))?;
+            least = bucket as i64 + 1;
+        }
+        Ok(latency)
     }
 }
 
@@ -337,18 +364,11 @@ impl fmt::Display for Event {
 
 impl fmt::Display for Latency {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            count,
-            p50_us,
-            p90_us,
-            p99_us,
-            p999_us,
-            max_us,
-        } = self;
-        write!(
-            formatter,
-            "{count} {p50_us} {p90_us} {p99_us} {p999_us} {max_us}"
-        )
+        write!(formatter, "{}", self.max_us)?;
+        let counted = self.buckets.iter().enumerate();
+        counted
+            .filter(|(_, count)| **count > 0)
+            .try_for_each(|(bucket, count)| write!(formatter, " {bucket} {count}"))
     }
 }
 

@@ -66,6 +66,8 @@ fn no_label(column: usize, label: &str) -> String {
 }
 
 const TWICE: &str = "product 7 is listed twice; every product needs a number of its own";
+const BUCKET: &str = "a bucket from 0 to 89, above the one before it";
+const FRAMES: &str = "how many frames it holds, 1 to 999999";
 const END: &str = "the end of the line";
 const PRODUCT: &str = "a product's number from 0 to 2147483647";
 const NUMBER: &str = "a number from 0 to 4294967295";
@@ -319,10 +321,12 @@ fn lines_of_the_robot_that_are_none() {
             ("event lunch 1 0 - -", word(7, "lunch", EVENT)),
             ("event failed 1 0", ends(17, NUMBER)),
             ("event failed 1 0 -", ends(19, PRODUCT)),
-            (
-                "latency 1 2 3 4 5",
-                ends(18, "a time from 0 to 4294967295 us"),
-            ),
+            ("latency", ends(8, "a time from 0 to 4294967295 us")),
+            ("latency 1 90 1", word(11, "90", BUCKET)),
+            ("latency 1 7 2 7 1", word(15, "7", BUCKET)),
+            ("latency 1 7", ends(12, FRAMES)),
+            ("latency 1 7 0", word(13, "0", FRAMES)),
+            ("latency 1 7 1000000", word(13, "1000000", FRAMES)),
             ("truth 1 2 360 -", word(11, "360", ANGLE)),
             ("truth 1 2 3", ends(12, PRODUCT)),
             ("sensors", ends(8, "a reading from 0 to 255")),

@@ -246,16 +246,14 @@ fn report() -> impl Strategy<Value = Report> {
                     text,
                 })
             }),
-        any::<[u32; 6]>().prop_map(|[count, p50_us, p90_us, p99_us, p999_us, max_us]| {
-            Report::Latency(Latency {
-                count,
-                p50_us,
-                p90_us,
-                p99_us,
-                p999_us,
-                max_us,
-            })
-        }),
+        (
+            any::<u32>(),
+            prop::collection::vec(0..=Latency::MOST, Latency::BUCKETS)
+        )
+            .prop_map(|(max_us, counts)| {
+                let buckets = counts.try_into().expect("as many as there are buckets");
+                Report::Latency(Box::new(Latency { max_us, buckets }))
+            }),
         any::<[(u8, u8, u8, bool); 11]>().prop_map(|read| {
             let mut sensors = [LineReading::default(); 11];
             for (sensor, (reading, lowest, highest, tells_apart)) in (0..).zip(read) {

@@ -31,7 +31,7 @@ fn delivered(count: u32, product: i32) -> NavigatorStatus {
 
 /// Sees to a mission of a simulated robot.
 fn simulated(mission: Mission) -> Watch {
-    Watch::new(mission, Charger::Nobody)
+    Watch::new(mission, Helper::Nobody)
 }
 
 fn seconds(count: u64) -> Duration {
@@ -147,16 +147,16 @@ fn a_low_battery_that_nobody_charges_ends_the_mission_and_is_named() {
         ..NavigatorStatus::default()
     };
     let [low, charged] = [low, delivered(0, 0)].map(|status| seen(Phase::Driving, status));
-    for charger in [Charger::Person, Charger::Nobody] {
-        let mut watch = Watch::new(Mission::of_station(&[5]), charger);
+    for helper in [Helper::Person, Helper::Nobody] {
+        let mut watch = Watch::new(Mission::of_station(&[5]), helper);
         // A while ends with the charge.
         for (second, seen) in [(1, &low), (9, &charged), (10, &low), (19, &low)] {
             watch.step(seconds(second), seen);
-            assert_eq!(watch.mission().outcome(), None, "{charger:?}");
+            assert_eq!(watch.mission().outcome(), None, "{helper:?}");
         }
         watch.step(seconds(20), &low);
         let (outcome, hold) = (watch.mission().outcome(), watch.mission().hold());
-        if charger == Charger::Person {
+        if helper == Helper::Person {
             assert_eq!((outcome, hold), (None, None), "somebody may come");
             continue;
         }
@@ -164,5 +164,24 @@ fn a_low_battery_that_nobody_charges_ends_the_mission_and_is_named() {
         assert!(why.contains("stands at crossing (2, 1)"), "{why}");
         assert_eq!(hold, Some(Hold::Battery.into()));
         assert_eq!(watch.mission().failure_kind(), None, "it would go on");
+    }
+}
+
+#[test]
+fn an_arm_in_the_way_ends_the_mission_unless_a_person_picks() {
+    for (pick, gives_up) in [(Pick::Auto, true), (Pick::Manual, false)] {
+        let held = NavigatorStatus {
+            hold: Hold::Arm.into(),
+            pick: pick.into(),
+            ..NavigatorStatus::default()
+        };
+        let held = seen(Phase::Driving, held);
+        let mut watch = simulated(Mission::of_station(&[5]));
+        watch.step(seconds(1), &held);
+        watch.step(seconds(11), &held);
+        let told = watch.mission().outcome();
+        assert_eq!(told.is_some(), gives_up, "{pick:?}: {told:?}");
+        let hold = watch.mission().hold();
+        assert_eq!(hold, gives_up.then(|| Hold::Arm.into()));
     }
 }

@@ -8,7 +8,7 @@ use lager_topics::{FailureKind, Hold, Remedy};
 
 use super::Whole;
 use crate::config::Config;
-use crate::mission::{Charger, Watch};
+use crate::mission::{Helper, Watch};
 
 /// Virtual time in which a mission must be over.
 const LIMIT: Duration = Duration::from_secs(600);
@@ -46,7 +46,7 @@ fn worn_tape_asks_for_calibration_and_is_followed_after_it() {
 fn a_battery_that_runs_low_is_charged_at_a_crossing_and_the_mission_goes_on() {
     for seed in 1..=5 {
         let mut whole = robot(Floor::default(), seed);
-        whole.watch = Watch::new(whole.watch.mission().clone(), Charger::Person);
+        whole.watch = Watch::new(whole.watch.mission().clone(), Helper::Person);
         whole.robot.world_mut().set_battery_charge(0.04);
         while whole.navigator.status().hold.get() != Some(Hold::Battery) {
             assert_eq!(whole.turn(), None, "seed {seed}");

@@ -1,6 +1,7 @@
 //! What such a station is told of the robot, and no other peer is.
 
 use lager_comm::Senses;
+use lager_lines::extension::Latency;
 use lager_topics::{
     BlockedWay, BlockedWays, DistanceFrame, Durations, Event, EventKind, Failure, FailureKind,
     Heading, LineFrame, Mode, NavigatorStatus, Phase, Remedy, Role, Route, RouteNode,
@@ -121,8 +122,11 @@ fn what_the_boards_do_what_is_lost_and_where_it_goes_are_told() {
         assert!(state.contains(field), "{field}: {state}");
     }
     assert_eq!(told("route "), "route 2 1 0 1 1");
-    // Half of them took some 20 us, and one 900.
-    assert_eq!(told("latency "), "latency 4 20 900 900 900 900");
+    // Three took from 16.384 to 20.48 us, and one 900 us.
+    assert_eq!(told("latency "), "latency 900 25 3 47 1");
+    for bucket in 0..Latency::BUCKETS {
+        assert_eq!(Latency::upper_ns(bucket), Durations::upper_ns(bucket));
+    }
     // What is old is told no more.
     robot.reports(&SteeringReport {
         left_duty: 104,
