@@ -17,8 +17,8 @@
 //!
 //! **`ring-64`**: what it costs a writer to wake the one actor of a topic that 64 observers read,
 //! for which the writer is kept from its work. The cost of the ring alone is the difference between
-//! publishing on a topic with an actor that sleeps and publishing on one with as many readers but no
-//! actor, measured in pairs (`lager/ring`). It compares with iceoryx2 notifying without publishing
+//! publishing while the actor waits for a ring and publishing on the same ports while it sleeps for
+//! something else, measured in pairs (`lager/ring`). It compares with iceoryx2 notifying without publishing
 //! anything: a listener for each reader (`notify`), or, as the typed ports do it, one listener for
 //! the actor while 64 readers poll (`notify-1`).
 
@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 use crate::group::{Entry, Group};
 use crate::pair;
 use crate::report::{Mode, Options, Regime};
-use crate::sample::{Block, Ping, Sample};
+use crate::sample::Block;
 
 const WRITER: &str = "writer";
 const READERS: &str = "readers";
@@ -73,19 +73,6 @@ impl<const WORDS: usize> Topic for Fan<WORDS> {
     const SUMMARY: &'static str = "From the publisher of a measurement to all that read.";
 }
 
-/// The same as [`Ping`], but nobody acts on it.
-struct Observed;
-
-impl Topic for Observed {
-    const NAME: &'static str = "bench/observed";
-    type Payload = Sample;
-    const QOS: Qos = Qos {
-        actors: &[],
-        ..Ping::QOS
-    };
-    const SUMMARY: &'static str = "What observers alone read, during a measurement.";
-}
-
 /// What is measured in a round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum Job {
@@ -93,7 +80,7 @@ enum Job {
     Lager { words: usize, readers: usize },
     /// The same with bare iceoryx2 and the same user header.
     Iceoryx2 { words: usize, readers: usize },
-    /// Our ports ring an actor: what it takes longer than to publish where nobody is to be rung.
+    /// Our ports ring an actor: what it takes longer to publish where it waits for that.
     Ring,
     /// Bare iceoryx2 notifies so many listeners.
     Notify { listeners: usize },
@@ -107,6 +94,11 @@ fn numbers(round: &Round) -> impl Iterator<Item = u64> + use<> {
     round
         .all()
         .flat_map(move |sample| (0..each).map(move |part| each * sample + part))
+}
+
+/// Whether the actor of [`Job::Ring`] waits for the ring of this sample.
+fn rings(number: u64) -> bool {
+    !number.is_multiple_of(2)
 }
 
 /// The event of bare iceoryx2; a service keeps its number of listeners.

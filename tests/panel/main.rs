@@ -84,11 +84,17 @@ fn while_it_is_driven_by_hand() {
         setting_up::gains_are_set_and_put_back_and_a_calibration_goes_step_by_step,
         driving::whoever_lets_go_whatever_way_the_robot_stands,
         driving::two_people_do_not_drive_at_once_and_either_may_stop,
-        releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
         driving::what_runs_once_is_not_cut_short_but_by_the_command_to_stand,
         driving::each_key_says_what_the_document_says_once_and_nothing_in_text_fields,
         driving::what_is_old_is_grey_with_its_time_and_drives_nothing,
         driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
+    ]);
+}
+
+#[test]
+fn while_hands_let_go() {
+    in_turn(parts![
+        releases::each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence,
     ]);
 }
 

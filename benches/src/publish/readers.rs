@@ -5,7 +5,7 @@ use std::time::Instant;
 use lager_ports::{Bus, Policy, Subscriber};
 use lager_topics::{OBSERVERS, Role, Stamp, Topic};
 
-use super::{BARE_FAN, Fan, Job, KIB_64, MIB_1, Observed, Round, SMALL, event, numbers};
+use super::{BARE_FAN, Fan, Job, KIB_64, MIB_1, Round, SMALL, event, numbers, rings};
 use crate::baseline::iceoryx::{self, Member};
 use crate::baseline::{LIMIT, TIME_OUT};
 use crate::error::{BenchError, Fault, broken, no_bus};
@@ -22,20 +22,21 @@ pub(super) fn round(side: &Side, round: &Round) -> Result<Vec<u64>, BenchError> 
         },
         Job::Ring => {
             let (actor, observer) = (side.bus(RECEIVER)?, side.bus(Role::Observer)?);
-            // As many readers as the other topic has; one of them is not an observer.
-            let mut quiet = subscribers::<Observed>(&observer, OBSERVERS)?;
-            quiet.extend(subscribers(&actor, 1)?);
             let mut acting = actor.subscriber::<Ping>().map_err(no_bus)?;
             let waiter = actor.waiter(Policy::Block).map_err(no_bus)?;
-            let mut loud = subscribers::<Ping>(&observer, OBSERVERS)?;
-            let is_rung = || {
-                waiter.wait(TIME_OUT);
+            let mut observing = subscribers::<Ping>(&observer, OBSERVERS)?;
+            let elsewhere = &side.shared.lanes[0].word;
+            let mut heard = elsewhere.count();
+            let is_rung = |number| {
+                if rings(number) {
+                    waiter.wait(TIME_OUT);
+                } else {
+                    elsewhere.sleep(heard)?;
+                    heard = elsewhere.count();
+                }
                 Ok(acting.receive().map_err(broken)?.is_some())
             };
-            let all = |_| {
-                loud.iter_mut().try_for_each(drain)?;
-                quiet.iter_mut().try_for_each(drain)
-            };
+            let all = |_| observing.iter_mut().try_for_each(drain);
             in_turns(side, round, until(is_rung), all)
         }
         Job::Notify { listeners } => {
@@ -43,7 +44,7 @@ pub(super) fn round(side: &Side, round: &Round) -> Result<Vec<u64>, BenchError> 
             let name = event(listeners);
             let all = (0..listeners).map(|_| member.listener(&name, listeners));
             let all = all.collect::<Result<Vec<_>, _>>()?;
-            let is_rung = || {
+            let is_rung = |_| {
                 let rings = all[0].timed_wait(|_| (), TIME_OUT);
                 Ok(rings.map_err(iceoryx::broken)? > 0)
             };
@@ -124,10 +125,12 @@ fn in_turns(
 }
 
 /// Waits as the actor, until it is rung.
-fn until(mut is_rung: impl FnMut() -> Result<bool, Fault>) -> impl FnMut(u64) -> Result<(), Fault> {
-    move |_| {
+fn until(
+    mut is_rung: impl FnMut(u64) -> Result<bool, Fault>,
+) -> impl FnMut(u64) -> Result<(), Fault> {
+    move |number| {
         let start = Instant::now();
-        while !is_rung()? {
+        while !is_rung(number)? {
             if start.elapsed() > LIMIT {
                 return Err(Fault::Silent(LIMIT));
             }

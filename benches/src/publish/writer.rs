@@ -3,10 +3,10 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_ports::{Clock, Publisher};
-use lager_topics::{OBSERVERS, Role, Stamp, Topic};
+use lager_ports::Clock;
+use lager_topics::{OBSERVERS, Role, Stamp, Topic as _};
 
-use super::{BARE_FAN, Fan, Job, KIB_64, MIB_1, Observed, Round, SMALL, event, numbers};
+use super::{BARE_FAN, Fan, Job, KIB_64, MIB_1, Round, SMALL, event, numbers, rings};
 use crate::baseline::iceoryx::{self, Member};
 use crate::error::{BenchError, Fault, broken, no_bus};
 use crate::pair::Side;
@@ -62,33 +62,22 @@ fn publish<const WORDS: usize>(side: &Side, round: &Round) -> Result<Vec<u64>, B
 
 fn ring(side: &Side, round: &Round) -> Result<Vec<u64>, BenchError> {
     let bus = side.bus(SENDER)?;
-    let quiet = bus.publisher::<Observed>().map_err(no_bus)?;
-    let loud = bus.publisher::<Ping>().map_err(no_bus)?;
-    // The first of a pair goes where nobody is rung. The readers need a ring all the same, to go on.
-    let is_first = |sample: &Sample| sample.number().is_multiple_of(2);
-    let publish = |sample: &Sample| match is_first(sample) {
-        true => send(&quiet, sample),
-        false => send(&loud, sample),
+    let publisher = bus.publisher::<Ping>().map_err(no_bus)?;
+    let publish = |sample: &Sample| {
+        let mut loan = publisher.loan().map_err(broken)?;
+        *loan = *sample;
+        if rings(sample.number()) {
+            slow::publish(OBSERVERS);
+        }
+        loan.send().map_err(broken)
     };
-    let follow_up = |sample: &Sample| match is_first(sample) {
-        true => send(&loud, sample),
-        false => Ok(()),
+    let wake = |sample: &Sample| match rings(sample.number()) {
+        true => Ok(()),
+        false => Ok(side.shared.lanes[0].word.wake()?),
     };
-    let times = timed(side, round, publish, follow_up)?;
+    let times = timed(side, round, publish, wake)?;
     let pairs = times.chunks_exact(2);
     Ok(pairs.map(|pair| pair[1].saturating_sub(pair[0])).collect())
-}
-
-fn send<T: Topic<Payload = Sample>>(
-    publisher: &Publisher<T>,
-    sample: &Sample,
-) -> Result<(), Fault> {
-    let mut loan = publisher.loan().map_err(broken)?;
-    *loan = *sample;
-    if !T::QOS.actors.is_empty() {
-        slow::publish(OBSERVERS);
-    }
-    loan.send().map_err(broken)
 }
 
 /// Publishes each sample of a round when the readers are ready for it; how long each took, in ns.
