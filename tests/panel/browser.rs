@@ -119,16 +119,23 @@ impl Browser {
     }
 }
 
-/// What it takes of the machine, all its processes together.
+/// What it takes of the machine.
 impl Browser {
-    /// On all cores, since it began. What a process took that has ended meanwhile is not in it.
-    pub(crate) fn processor_time(&self) -> Duration {
-        let ticks: u64 = self
-            .processes()
-            .iter()
-            .map(|stat| stat[11].parse::<u64>().unwrap_or(0) + stat[12].parse::<u64>().unwrap_or(0))
-            .sum();
-        Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second() as f64)
+    /// On all cores, since they began: the processes of its pages, and all. What a process took that
+    /// has ended meanwhile is not in it.
+    pub(crate) fn processor_times(&self) -> [Duration; 2] {
+        let second = rustix::param::clock_ticks_per_second() as f64;
+        let (mut pages, mut all) = (0.0, 0.0);
+        for (pid, stat) in self.processes() {
+            let ticks = [11, 12].map(|field| stat[field].parse::<u64>().unwrap_or(0));
+            let time = ticks.iter().sum::<u64>() as f64 / second;
+            let command = std::fs::read_to_string(format!("/proc/{pid}/cmdline"));
+            if command.is_ok_and(|command| command.contains("--type=renderer")) {
+                pages += time;
+            }
+            all += time;
+        }
+        [pages, all].map(Duration::from_secs_f64)
     }
 
     /// Bytes that are in memory, those that processes share counted for each.
@@ -136,13 +143,13 @@ impl Browser {
         let pages: u64 = self
             .processes()
             .iter()
-            .map(|stat| stat[21].parse::<u64>().unwrap_or(0))
+            .map(|(_, stat)| stat[21].parse::<u64>().unwrap_or(0))
             .sum();
         pages * rustix::param::page_size() as u64
     }
 
-    /// What `/proc/PID/stat` says of each, behind the name.
-    fn processes(&self) -> Vec<Vec<String>> {
+    /// The number of each, and what `/proc/PID/stat` says of it behind the name.
+    fn processes(&self) -> Vec<(u32, Vec<String>)> {
         let all: Vec<_> = std::fs::read_dir("/proc")
             .expect("/proc")
             .filter_map(|entry| {
@@ -160,8 +167,8 @@ impl Browser {
             let children = all.iter().filter(|(_, stat)| stat[1] == parent.to_string());
             family.extend(children.map(|(pid, _)| *pid));
         }
-        let all = all.into_iter().filter(|(pid, _)| family.contains(pid));
-        all.map(|(_, stat)| stat).collect()
+        let all = all.into_iter();
+        all.filter(|(pid, _)| family.contains(pid)).collect()
     }
 }
 

@@ -193,6 +193,22 @@ fn take_hold(scene: &mut Scene, page: &mut Page, hold: &By) {
     });
 }
 
+/// Gamepads are not looked at before the box is ticked, and what is held then is to be let go first.
+fn a_stick_held_before_drives_nothing(page: &mut Page) {
+    page.value(
+        "document.querySelector('#armed').click(); pad.axes = [-1, 0]; window.looks = 0; \
+         navigator.getGamepads = () => { window.looks += 1; return [window.pad]; }",
+    );
+    page.pause();
+    assert_eq!(page.value("looks"), 0);
+    page.moves();
+    page.value("document.querySelector('#armed').click()");
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    assert_ne!(page.value("looks"), 0);
+    assert_eq!(page.moves(), [""; 0]);
+    let_all_go(page);
+}
+
 pub(crate) fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence(
     scene: &mut Scene,
     page: &mut Page,
@@ -201,6 +217,7 @@ pub(crate) fn each_way_to_let_go_ends_it_in_time_by_one_zero_and_then_silence(
     page.listen_in();
     let mut reports = scene.bus.subscriber::<SteeringState>().expect("a topic");
     let_all_go(page);
+    a_stick_held_before_drives_nothing(page);
     for (name, hold, release) in WAYS {
         let mut times = Vec::new();
         while times.len() < TRIES && times.iter().all(|ms| *ms > RELEASE_MS) {

@@ -105,7 +105,7 @@ fn what_a_page_takes_in_an_hour() {
     let looks = std::env::var("LAGER_SOAK_MINUTES").map_or(LOOKS, |minutes| {
         minutes.parse().expect("LAGER_SOAK_MINUTES is a number")
     });
-    println!("minute   share of a core   memory of the scripts   of all of the browser");
+    println!("minute   share of a core: page   all of the browser   memory: scripts   all");
     for minute in 1..=looks {
         // It drives all the time.
         let queue = page.value("document.querySelectorAll('#queue button').length");
@@ -113,10 +113,13 @@ fn what_a_page_takes_in_an_hour() {
             page.click("#fetch button");
             page.click("#fetch button");
         }
-        let (began, before) = (Instant::now(), scene.browser.processor_time());
+        let (began, before) = (Instant::now(), scene.browser.processor_times());
         std::thread::sleep(LOOK);
-        let spent = scene.browser.processor_time() - before;
-        let share = spent.as_secs_f64() / began.elapsed().as_secs_f64() * 100.0;
+        let after = scene.browser.processor_times();
+        let share = |which: usize| {
+            let spent = after[which] - before[which];
+            spent.as_secs_f64() / began.elapsed().as_secs_f64() * 100.0
+        };
         page.call("HeapProfiler.collectGarbage", &json!({}));
         let metrics = page.call("Performance.getMetrics", &json!({}));
         let metrics = metrics["metrics"].as_array().expect("metrics");
@@ -126,7 +129,9 @@ fn what_a_page_takes_in_an_hour() {
         let heap = heap.and_then(|heap| heap["value"].as_f64()).expect("bytes");
         let all = scene.browser.memory();
         println!(
-            "{minute:>6}   {share:>13.1} %   {:>17.2} MiB   {:>17.1} MiB",
+            "{minute:>6}   {:>19.1} %   {:>16.1} %   {:>9.2} MiB   {:>5.0} MiB",
+            share(0),
+            share(1),
             heap / f64::from(1 << 20),
             all as f64 / f64::from(1 << 20),
         );

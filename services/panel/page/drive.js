@@ -49,6 +49,9 @@ const STEPS = [
   ["FA", "release", [".", "\u00f7"]],
 ];
 
+/** So long after the box was ticked a gamepad is only looked at. */
+const PAD_MS = 500;
+
 /** Keys whose names are long, as they are printed on keyboards. */
 const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", ArrowRight: "\u2192", PageUp: "PgUp", PageDown: "PgDn" };
 
@@ -65,7 +68,8 @@ export class Driving {
     this.buttons();
     this.keys();
     this.releases();
-    this.pads();
+    /** When the box was ticked. */
+    this.armedAt = -Infinity;
   }
 
   /** Whether something is held now. */
@@ -219,12 +223,17 @@ export class Driving {
     // A menu or a list of the browser's own takes the end of a key for itself.
     addEventListener("contextmenu", (event) => event.defaultPrevented || this.letGo());
     addEventListener("pointerdown", (event) => ownsKeys(event.target) && this.letGo(), { capture: true });
-    this.parts.armed.addEventListener("change", () => this.letGo());
+    this.parts.armed.addEventListener("change", () => {
+      this.armedAt = this.now();
+      this.letGo();
+    });
     this.link.addEventListener("link", () => this.link.open || this.letGo());
   }
 
   /** Looks at the gamepads; called before each picture. */
   pads() {
+    // A browser that was asked once looks at them all the time, for a hundredth of a core.
+    if (!this.parts.armed.checked) return;
     const pad = navigator.getGamepads?.().find((found) => found?.mapping === "standard");
     if (!pad) return this.release("pad");
     const [x, y] = pad.axes;
@@ -235,7 +244,9 @@ export class Driving {
     else if (x < -0.5 || pressed(14)) code = 6;
     else if (x > 0.5 || pressed(15)) code = 7;
     if (this.held?.source === "pad" && this.held.code !== code) this.letGo();
-    if (code && !this.held && this.parts.armed.checked && this.padWas !== code) this.hold(code, "pad");
+    // What was held before the box was ticked is to be let go first. The browser tells of it some time later.
+    const isNew = this.padWas !== code && this.now() - this.armedAt > PAD_MS;
+    if (code && !this.held && isNew) this.hold(code, "pad");
     this.padWas = code;
   }
 }
