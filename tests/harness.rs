@@ -105,16 +105,24 @@ impl Domain {
     /// # Panics
     /// When it cannot be started.
     pub fn start(&self, args: &[&str]) -> Running {
+        self.launch(self.lager(args))
+    }
+
+    /// Starts a command that becomes [`Domain::lager`], in the background.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn launch(&self, mut command: Command) -> Running {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
         let log = self.folder().join(format!("{number}.log"));
         let out = self.folder().join(format!("{number}.out"));
-        let child = self
-            .lager(args)
+        let child = command
             .stdout(fs::File::create(&out).expect("a log file"))
             .stderr(fs::File::create(&log).expect("a log file"))
             .spawn()
-            .expect("lager starts");
+            .expect("it starts");
         Running { child, log, out }
     }
 

@@ -254,6 +254,41 @@ fn a_service_on_its_own_takes_the_same_flags() {
     domain.assert_clean();
 }
 
+/// The time slice of each thread of a process, in ns; none where the kernel does not tell.
+fn slices(process: u32) -> Vec<u64> {
+    let slice = |task: std::io::Result<fs::DirEntry>| {
+        let told = fs::read_to_string(task.ok()?.path().join("sched")).ok()?;
+        let line = told.lines().find(|line| line.starts_with("se.slice"))?;
+        line.rsplit(':').next()?.trim().parse().ok()
+    };
+    let tasks = fs::read_dir(format!("/proc/{process}/task"));
+    tasks.into_iter().flatten().filter_map(slice).collect()
+}
+
+/// Whether the kernel has a slice for each thread: Linux 6.12 and later ones.
+fn slices_are_chosen() -> bool {
+    let uname = rustix::system::uname();
+    let release = uname.release().to_string_lossy().into_owned();
+    let mut numbers = release.split('.').map_while(|part| part.parse().ok());
+    (numbers.next(), numbers.next()) >= (Some(6_u32), Some(12))
+}
+
+#[test]
+fn the_path_has_short_time_slices_without_any_right_and_nobody_else_has() {
+    let domain = Domain::new();
+    let up = domain.launch(without_rights(&domain.lager(&["up", "--headless"])));
+    let [bridge, logic] = ["bridge", "logic"].map(|service| at_work(&up, service, None));
+    if slices_are_chosen() {
+        let simulator = up.service("simulator").expect("a simulated robot");
+        let path = [slices(bridge), slices(logic)].concat();
+        let others = [slices(up.pid()), slices(simulator)].concat();
+        assert!(path.iter().all(|slice| *slice == 100_000), "{path:?}");
+        assert!(others.iter().all(|slice| *slice > 100_000), "{others:?}");
+    }
+    drop(up);
+    domain.assert_clean();
+}
+
 #[test]
 fn who_lacks_a_right_is_told_what_to_do_before_anything_runs() {
     let domain = Domain::new();

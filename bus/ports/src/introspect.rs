@@ -1,11 +1,5 @@
 //! Who is on the bus and what is in use there. Only looks; nothing here creates a topic.
 
-use std::collections::BTreeSet;
-use std::ffi::OsString;
-use std::fs;
-use std::io;
-use std::os::unix::fs::MetadataExt;
-
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{
@@ -138,46 +132,6 @@ impl TopicInfo {
         let observes = |peer: &&Peer| peer.role.is_some_and(Role::is_observer);
         self.observers = self.readers.iter().filter(observes).count();
     }
-}
-
-/// Tells whether services have come to a bus or gone from it, by a look at the folder of their
-/// descriptions. It is for whoever waits for topics: [`Bus::topics`] opens every service, which takes
-/// a core for tens of milliseconds.
-#[derive(Debug, Default)]
-pub struct ServiceWatch {
-    seen: Option<BTreeSet<DescriptionFile>>,
-}
-
-impl ServiceWatch {
-    /// Whether a service has come, was finished or has gone since the last call. At the first call,
-    /// and where the folder cannot be read, yes.
-    pub fn has_changed(&mut self, bus: &Bus) -> bool {
-        let now = descriptions(bus).ok();
-        let is_same = now.is_some() && now == self.seen;
-        self.seen = now;
-        !is_same
-    }
-}
-
-/// The file that describes a service: its name, its number and when it last changed.
-type DescriptionFile = (OsString, u64, (i64, i64));
-
-fn descriptions(bus: &Bus) -> io::Result<BTreeSet<DescriptionFile>> {
-    let files = match fs::read_dir(bus.place().transport_folder().join("services")) {
-        // The first service makes the folder.
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
-        files => files?,
-    };
-    let described = |file: io::Result<fs::DirEntry>| {
-        let file = file?;
-        let data = file.metadata()?;
-        Ok((
-            file.file_name(),
-            data.ino(),
-            (data.ctime(), data.ctime_nsec()),
-        ))
-    };
-    files.map(described).collect()
 }
 
 /// Whether a process lives.

@@ -3,7 +3,8 @@
 //! A file that is removed stays with every process that has it mapped. The robot drives on and
 //! nothing fails, but no new process can see it, stop it with a tool, or take over from a service
 //! that ends. So once a second the attendant looks at what the robot's processes have mapped
-//! (`/proc/PID/maps`) and at the files that describe it. It opens nothing and waits for nothing.
+//! (`/proc/PID/maps`) and at the files that describe it. It opens nothing of the bus but descriptions
+//! that are new or have changed, and waits for nothing.
 //!
 //! | file | is missed when |
 //! |---|---|
@@ -14,12 +15,13 @@
 //! A new process that finds no description makes another one, with another number. Ports come and
 //! go at any moment, so a file counts as missing only when two looks in a row miss it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 
 use crate::place::Place;
 use crate::shortage::SHARED_MEMORY;
+use crate::watch::{NODES, PORT_TAG, SERVICES, Version};
 
 /// The ending of a service's list of ends.
 const LIST: &str = "dynamic";
@@ -30,6 +32,7 @@ const REMOVED: &str = " (deleted)";
 /// What the last look missed.
 #[derive(Debug, Default)]
 pub struct Inventory {
+    described: Described,
     missed: BTreeSet<PathBuf>,
 }
 
@@ -38,10 +41,11 @@ impl Inventory {
     /// or whose description is, if the look before missed it too. A process that has ended has
     /// nothing mapped.
     pub fn look(&mut self, place: &Place, processes: &[u32]) -> Option<PathBuf> {
-        let (ports, described) = (ports(place), Described::at(place));
+        self.described.look(place);
+        let ports = ports(place);
         let mapped = processes.iter().flat_map(|pid| mapped(*pid));
         let missed = mapped
-            .filter(|file| is_missed(file, place, &ports, &described))
+            .filter(|file| is_missed(file, place, &ports, &self.described))
             .map(|file| file.path)
             .collect();
         let before = core::mem::replace(&mut self.missed, missed);
@@ -99,36 +103,50 @@ fn parts<'a>(path: &'a Path, prefix: &str) -> Option<(&'a str, &'a str)> {
 
 /// The numbers of the ports that processes have.
 fn ports(place: &Place) -> BTreeSet<String> {
-    let nodes = entries(&place.transport_folder().join("nodes"));
+    let nodes = entries(&place.transport_folder().join(NODES));
     nodes
         .flat_map(|node| entries(&node.path()))
         .filter_map(|file| {
             let name = file.file_name();
             let name = name.to_str()?.strip_prefix(place.prefix())?;
-            Some(name.strip_suffix(".port_tag")?.to_owned())
+            Some(name.strip_suffix(PORT_TAG)?.to_owned())
         })
         .collect()
 }
 
 /// The services that have a description.
+#[derive(Debug, Default)]
 pub(crate) struct Described {
     prefix: String,
-    numbers: BTreeSet<u128>,
+    /// Each file with the service's number, if there is one in it.
+    numbers: BTreeMap<Version, Option<u128>>,
 }
 
 impl Described {
     pub(crate) fn at(place: &Place) -> Self {
-        Self {
-            prefix: place.prefix().to_owned(),
-            numbers: entries(&place.transport_folder().join("services"))
-                .filter_map(|file| number_in(&fs::read_to_string(file.path()).ok()?))
-                .collect(),
-        }
+        let mut described = Self::default();
+        described.look(place);
+        described
+    }
+
+    /// Reads what has changed since the last look.
+    fn look(&mut self, place: &Place) {
+        place.prefix().clone_into(&mut self.prefix);
+        let mut known = core::mem::take(&mut self.numbers);
+        known.retain(|version, _| !version.is_of_this_moment());
+        self.numbers = entries(&place.transport_folder().join(SERVICES))
+            .filter_map(|file| {
+                let version = Version::of(&file).ok()?;
+                let read = || number_in(&fs::read_to_string(file.path()).ok()?);
+                let number = known.remove(&version).unwrap_or_else(read);
+                Some((version, number))
+            })
+            .collect();
     }
 
     /// Whether a segment is the list of ends of a service without a description.
     pub(crate) fn misses(&self, segment: &Path) -> bool {
-        let has = |number: u128| self.numbers.contains(&number);
+        let has = |number: u128| self.numbers.values().any(|other| *other == Some(number));
         match parts(segment, &self.prefix) {
             Some((number, LIST)) => !number.parse().is_ok_and(has),
             _ => false,

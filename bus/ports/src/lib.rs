@@ -79,6 +79,7 @@ mod sweep;
 mod transport;
 mod untyped;
 mod waiter;
+mod watch;
 mod watchdog;
 
 pub use any::AnyPublisher;
@@ -91,9 +92,7 @@ pub use error::{
 };
 pub use fault::{Difference, TransportFault};
 pub use found::{Found, FoundSample};
-pub use introspect::{
-    Layout, NodeInfo, NodeState, Peer, ServiceWatch, TopicInfo, nodes, remove_stale_nodes,
-};
+pub use introspect::{Layout, NodeInfo, NodeState, Peer, TopicInfo, nodes, remove_stale_nodes};
 pub use inventory::Inventory;
 pub use keeper::{Keeper, KeeperError};
 pub use kept::KeptError;
@@ -110,6 +109,7 @@ pub use source::{Look, Source};
 pub use stop::{Release, Stop, StopPage, StopTold, StopWord};
 pub use subscriber::{Sample, Subscriber};
 pub use waiter::{Policy, PolicyError, Ringer, Waiter, Wake};
+pub use watch::BusWatch;
 pub use watchdog::{GivenUp, Watchdog};
 
 /// What carries the bus. All processes on one bus must agree in it.

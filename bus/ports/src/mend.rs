@@ -26,6 +26,7 @@ use crate::lease;
 use crate::lock;
 use crate::name::RobotName;
 use crate::place::{Place, user_name};
+use crate::watch::{NODES, SERVICES};
 
 /// A creator makes a node's folder and opens a file in it at once.
 const CREATION: Duration = Duration::from_secs(2);
@@ -189,7 +190,7 @@ fn segments(place: &Place) -> impl Iterator<Item = PathBuf> {
 }
 
 fn services(place: &Place) -> PathBuf {
-    place.transport_folder().join("services")
+    place.transport_folder().join(SERVICES)
 }
 
 fn files(folder: &Path) -> impl Iterator<Item = PathBuf> {
@@ -264,7 +265,7 @@ struct Node {
 }
 
 fn nodes(place: &Place) -> Vec<Node> {
-    let beside = place.transport_folder().join("nodes");
+    let beside = place.transport_folder().join(NODES);
     let mut nodes: Vec<Node> = Vec::new();
     let entries = fs::read_dir(&beside).into_iter().flatten().flatten();
     for entry in entries {

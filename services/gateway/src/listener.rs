@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, Clock, Found, Layout, Look, PortError, ReceiveError, ServiceWatch, Shutdown, Source,
+    Bus, BusWatch, Clock, Found, Layout, Look, PortError, ReceiveError, Shutdown, Source,
     Subscriber, Watchdog,
 };
 use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
@@ -23,8 +23,6 @@ const VIEWED: Duration = Duration::from_millis(2);
 const COUNTED: Duration = Duration::from_millis(5);
 /// How often it looks whether topics have come.
 const LOOK: Duration = Duration::from_secs(1);
-/// How often it looks at the ends of all, which opens every topic.
-const ENDS: Duration = Duration::from_secs(5);
 /// So many samples of one topic are taken before the next topic has its turn.
 const TURN: usize = 1_024;
 
@@ -58,8 +56,8 @@ pub(crate) fn listen(
         feeds: Vec::new(),
         opened: BTreeSet::new(),
         refused: BTreeSet::new(),
-        services: ServiceWatch::default(),
-        ends_looked_at: None,
+        services: BusWatch::of_services(),
+        ports: BusWatch::of_ports(),
     };
     let mut looked: Option<Instant> = None;
     while !shutdown.is_requested() && !is_over() {
@@ -86,8 +84,8 @@ struct Listener<'a> {
     opened: BTreeSet<String>,
     /// Topics that could not be opened, which was said.
     refused: BTreeSet<String>,
-    services: ServiceWatch,
-    ends_looked_at: Option<Instant>,
+    services: BusWatch,
+    ports: BusWatch,
 }
 
 /// A topic that is listened to.
@@ -126,8 +124,8 @@ impl Takers<'_> {
 
 impl Listener<'_> {
     /// Opens topics that are not listened to yet, of the table and of other people's, and looks at
-    /// the ends of all, where services have come or gone or it is time. A topic that cannot be opened
-    /// is tried again.
+    /// the ends of all, where services or ports have come or gone. A topic that cannot be opened is
+    /// tried again.
     fn look(&mut self, shared: &Shared) -> Result<(), GatewayError> {
         for entry in TOPICS {
             if !self.opened.contains(entry.name) {
@@ -136,11 +134,10 @@ impl Listener<'_> {
                 self.keep(entry.name, opened.expect("a topic of the table").map(Some));
             }
         }
-        let is_due = |looked: Instant| looked.elapsed() >= ENDS;
-        if !self.services.has_changed(self.bus) && !self.ends_looked_at.is_none_or(is_due) {
+        // Both, so that each knows what is there now.
+        if !(self.services.has_changed(self.bus) | self.ports.has_changed(self.bus)) {
             return Ok(());
         }
-        self.ends_looked_at = Some(Instant::now());
         let look = || self.bus.topics();
         let mut topics = self.watchdog.over("listing the topics", look)?;
         topics.retain(|topic| topic.robot == *self.bus.robot());

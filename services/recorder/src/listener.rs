@@ -4,9 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lager_journal::{Envelope, EnvelopeSchema, Times};
-use lager_ports::{
-    Bus, Clock, Layout, Look, PortError, ReceiveError, ServiceWatch, Source, Watchdog,
-};
+use lager_ports::{Bus, BusWatch, Clock, Layout, Look, PortError, ReceiveError, Source, Watchdog};
 use lager_topics::{Description, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, visit};
 use serde::Serialize;
 
@@ -28,7 +26,7 @@ pub(crate) struct Listener<'a> {
     pub(crate) feeds: Vec<Box<dyn Feed>>,
     /// Topics that are listened to, or cannot be.
     pub(crate) known: BTreeSet<String>,
-    pub(crate) services: ServiceWatch,
+    pub(crate) services: BusWatch,
 }
 
 /// How stamps become times of the file.

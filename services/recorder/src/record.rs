@@ -9,7 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use lager_journal::{Count, Start};
-use lager_ports::{Bus, Clock, ServiceWatch, Shutdown, Watchdog};
+use lager_ports::{Bus, BusWatch, Clock, Shutdown, Watchdog};
 
 use crate::config::RecordConfig;
 use crate::error::RecordError;
@@ -129,7 +129,7 @@ pub fn record(
         queue: to,
         feeds: Vec::new(),
         known: BTreeSet::new(),
-        services: ServiceWatch::default(),
+        services: BusWatch::of_services(),
     };
     let mut stands = |refused| {
         let progress = Progress {

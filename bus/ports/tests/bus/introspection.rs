@@ -4,7 +4,7 @@ use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
-use lager_ports::{Layout, NodeState, Peer, Policy, ServiceWatch, nodes, remove_stale_nodes};
+use lager_ports::{Bus, BusWatch, Layout, NodeState, Peer, Policy, nodes, remove_stale_nodes};
 use lager_topics::{NavStatus, Role, SensorLine, TOPICS};
 
 use crate::domain::{Domain, send};
@@ -91,22 +91,50 @@ fn looking_does_not_create_topics() {
     assert!(observer.topics().unwrap().is_empty());
 }
 
+/// Whether a watch tells of a change, twice as it does, and then of none.
+fn tells(watch: &mut BusWatch, observer: &Bus) -> bool {
+    let told = [(); 3].map(|()| watch.has_changed(observer));
+    assert!(
+        [[true, true, false], [false; 3]].contains(&told),
+        "{told:?}"
+    );
+    told[0]
+}
+
 #[test]
 fn a_watch_tells_when_services_come_and_go() {
     let domain = Domain::new();
     let observer = domain.open(Role::Observer);
-    let mut watch = ServiceWatch::default();
-    assert!(watch.has_changed(&observer), "it was not known");
-    assert!(!watch.has_changed(&observer));
+    let mut watch = BusWatch::of_services();
+    assert!(tells(&mut watch, &observer), "it was not known");
     let bridge = domain.open(Role::Bridge);
     let writer = bridge.publisher::<SensorLine>().unwrap();
-    assert!(watch.has_changed(&observer), "it has come");
+    assert!(tells(&mut watch, &observer), "it has come");
     // A reader of a topic that is there changes no service.
     let reader = observer.subscriber::<SensorLine>().unwrap();
-    assert!(!watch.has_changed(&observer));
+    assert!(!tells(&mut watch, &observer));
     drop((writer, reader));
-    assert!(watch.has_changed(&observer), "it has gone");
-    assert!(!watch.has_changed(&observer));
+    assert!(tells(&mut watch, &observer), "it has gone");
+}
+
+#[test]
+fn a_watch_tells_when_ports_come_and_go() {
+    let domain = Domain::new();
+    let observer = domain.open(Role::Observer);
+    let mut watch = BusWatch::of_ports();
+    assert!(tells(&mut watch, &observer), "it was not known");
+    let bridge = domain.open(Role::Bridge);
+    let writer = bridge.publisher::<SensorLine>().unwrap();
+    assert!(tells(&mut watch, &observer), "a writer");
+    let reader = observer.subscriber::<SensorLine>().unwrap();
+    assert!(tells(&mut watch, &observer), "a reader");
+    drop(reader);
+    assert!(tells(&mut watch, &observer), "the reader has gone");
+    // A look at the topics opens them all, which is no change.
+    observer.topics().unwrap();
+    assert!(!tells(&mut watch, &observer));
+    drop((writer, bridge));
+    assert!(tells(&mut watch, &observer), "the writer has gone");
 }
 
 #[test]

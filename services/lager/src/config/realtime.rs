@@ -53,6 +53,7 @@ impl RealtimeSection {
         let on_path = Self::ON_PATH.contains(&role);
         Wanted {
             priority: if on_path { self.priority } else { 0 },
+            short_slices: on_path,
             lock_memory: on_path && self.lock_memory,
             cores: match role {
                 Role::Bridge => self.cores.bridge.clone(),

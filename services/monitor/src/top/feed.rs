@@ -8,8 +8,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use lager_ports::{
-    Bus, Clock, NodeInfo, NodeState, PortError, ReceiveError, ServiceWatch, Source, StopPage,
-    StopWord, Subscriber, TopicInfo, Watchdog,
+    Bus, BusWatch, Clock, NodeInfo, NodeState, PortError, ReceiveError, Source, StopPage, StopWord,
+    Subscriber, TopicInfo, Watchdog,
 };
 use lager_topics::{
     LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit,
@@ -23,9 +23,6 @@ use crate::source::Stamped;
 
 /// Samples that are taken of one topic in one look.
 const TURN: u64 = 1_024;
-/// How often it looks who is on the topics where nobody is known to have come or gone. It takes a
-/// core for tens of milliseconds, which the robot's path would feel.
-const ENDS: Duration = Duration::from_secs(5);
 
 /// What reads a robot's bus.
 pub(crate) struct Feed<'a> {
@@ -34,7 +31,8 @@ pub(crate) struct Feed<'a> {
     open: BTreeMap<String, Box<dyn Pull>>,
     /// Topics that could not be read at the last look, such as one with no place left.
     refused: BTreeSet<String>,
-    services: ServiceWatch,
+    services: BusWatch,
+    ports: BusWatch,
     ends: Option<Ends>,
     health: Subscriber<LinkHealth>,
     status: Subscriber<NavStatus>,
@@ -59,7 +57,8 @@ impl<'a> Feed<'a> {
                 watchdog,
                 open: BTreeMap::new(),
                 refused: BTreeSet::new(),
-                services: ServiceWatch::default(),
+                services: BusWatch::of_services(),
+                ports: BusWatch::of_ports(),
                 ends: None,
                 health: bus.subscriber()?,
                 status: bus.subscriber()?,
@@ -76,9 +75,11 @@ impl<'a> Feed<'a> {
     /// Looks who is on the topics, and reads those that the model wants.
     pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
         let bus = self.bus;
-        let known = self.ends.take().filter(Ends::are_likely);
-        let ends = match known {
-            Some(ends) if !self.services.has_changed(bus) => ends,
+        // Both, so that each knows what is there now.
+        let is_other = self.services.has_changed(bus) | self.ports.has_changed(bus);
+        let ends = match self.ends.take().filter(Ends::writers_are_there) {
+            Some(ends) if !is_other => ends,
+            // It takes a core for tens of milliseconds, which the robot's path would feel.
             _ => Ends::look(bus, self.watchdog)?,
         };
         model.take_ends(&ends.topics, |pid| ends.life(pid));
@@ -213,7 +214,6 @@ impl TopicVisitor for Open<'_> {
 struct Ends {
     topics: Vec<TopicInfo>,
     nodes: Vec<NodeInfo>,
-    looked: Instant,
 }
 
 impl Ends {
@@ -223,15 +223,14 @@ impl Ends {
         Ok(Self {
             topics,
             nodes: watchdog.over("looking at the processes", || bus.nodes())?,
-            looked: Instant::now(),
         })
     }
 
-    /// Whether the look was not long ago, and no writer has gone since.
-    fn are_likely(&self) -> bool {
+    /// Whether no writer has gone since the look. One that was killed has its ports until it is swept.
+    fn writers_are_there(&self) -> bool {
         let mut writers = self.topics.iter().flat_map(|topic| &topic.writers);
         let is_there = |pid: u32| pid == 0 || Path::new("/proc").join(pid.to_string()).exists();
-        self.looked.elapsed() < ENDS && writers.all(|writer| is_there(writer.pid))
+        writers.all(|writer| is_there(writer.pid))
     }
 
     fn life(&self, pid: u32) -> Life {
