@@ -23,8 +23,8 @@ fn compare<W>(what: &str, observers: usize, begin: impl Fn(&Domain) -> W) {
     compare_on_robot(&domain, what, || {
         let guests = begin(&domain);
         wait_for("all to listen", || all_listen(&observer, observers));
-        // They look for the writers once a second.
-        std::thread::sleep(Duration::from_secs(1));
+        // Once a second they look whether ports have come, and twice at each that has.
+        std::thread::sleep(Duration::from_secs(4));
         guests
     });
     let mut queue = observer.subscriber::<MissionQueue>().expect("a topic");
