@@ -118,8 +118,9 @@ fn ports(place: &Place) -> BTreeSet<String> {
 #[derive(Debug, Default)]
 pub(crate) struct Described {
     prefix: String,
-    /// Each file with the service's number, if there is one in it.
-    numbers: BTreeMap<Version, Option<u128>>,
+    numbers: BTreeSet<u128>,
+    /// The files that need not be read again, each with the number in it.
+    read: BTreeMap<Version, Option<u128>>,
 }
 
 impl Described {
@@ -132,21 +133,25 @@ impl Described {
     /// Reads what has changed since the last look.
     fn look(&mut self, place: &Place) {
         place.prefix().clone_into(&mut self.prefix);
-        let mut known = core::mem::take(&mut self.numbers);
-        known.retain(|version, _| !version.is_of_this_moment());
-        self.numbers = entries(&place.transport_folder().join(SERVICES))
-            .filter_map(|file| {
-                let version = Version::of(&file).ok()?;
-                let read = || number_in(&fs::read_to_string(file.path()).ok()?);
-                let number = known.remove(&version).unwrap_or_else(read);
-                Some((version, number))
-            })
-            .collect();
+        self.numbers.clear();
+        let mut before = core::mem::take(&mut self.read);
+        for file in entries(&place.transport_folder().join(SERVICES)) {
+            let Ok(version) = Version::of(&file) else {
+                continue;
+            };
+            let is_settled = !version.is_of_this_moment();
+            let read = || number_in(&fs::read_to_string(file.path()).ok()?);
+            let number = before.remove(&version).unwrap_or_else(read);
+            self.numbers.extend(number);
+            if is_settled {
+                self.read.insert(version, number);
+            }
+        }
     }
 
     /// Whether a segment is the list of ends of a service without a description.
     pub(crate) fn misses(&self, segment: &Path) -> bool {
-        let has = |number: u128| self.numbers.values().any(|other| *other == Some(number));
+        let has = |number: u128| self.numbers.contains(&number);
         match parts(segment, &self.prefix) {
             Some((number, LIST)) => !number.parse().is_ok_and(has),
             _ => false,
