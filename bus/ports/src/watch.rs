@@ -11,7 +11,6 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::{Duration, UNIX_EPOCH};
 
-use crate::bus::Bus;
 use crate::place::Place;
 
 /// Where the transport describes its services, a file for each.
@@ -21,7 +20,7 @@ pub(crate) const NODES: &str = "nodes";
 /// How the name of a port's tag ends.
 pub(crate) const PORT_TAG: &str = ".port_tag";
 
-/// Tells whether the services or the ports of a bus are others than before.
+/// Tells whether the services or the ports of the bus at a place are others than before.
 #[derive(Debug)]
 pub struct BusWatch {
     files: fn(&Place) -> io::Result<BTreeSet<Version>>,
@@ -53,8 +52,8 @@ impl BusWatch {
     /// Whether one has come, was finished or has gone. At the first call, and where the folder cannot
     /// be read, yes. Each change is told by two calls, because a port has its tag a moment before it
     /// can be seen on its topic, and because two changes at once may have the same time.
-    pub fn has_changed(&mut self, bus: &Bus) -> bool {
-        let now = (self.files)(bus.place()).ok();
+    pub fn has_changed(&mut self, place: &Place) -> bool {
+        let now = (self.files)(place).ok();
         let is_same = now.is_some() && now == self.seen;
         self.seen = now;
         let is_new = !is_same || self.told_once;

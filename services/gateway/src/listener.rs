@@ -135,7 +135,8 @@ impl Listener<'_> {
             }
         }
         // Both, so that each knows what is there now.
-        if !(self.services.has_changed(self.bus) | self.ports.has_changed(self.bus)) {
+        let place = self.bus.place();
+        if !(self.services.has_changed(place) | self.ports.has_changed(place)) {
             return Ok(());
         }
         let look = || self.bus.topics();

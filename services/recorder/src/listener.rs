@@ -90,7 +90,7 @@ impl Listener<'_> {
     /// Opens topics of other people's that have come. Returns why some cannot be recorded.
     pub(crate) fn look_for_more(&mut self) -> Result<Vec<String>, RecordError> {
         let mut refused = Vec::new();
-        if !self.services.has_changed(self.bus) {
+        if !self.services.has_changed(self.bus.place()) {
             return Ok(refused);
         }
         let look = || self.bus.topics();

@@ -76,7 +76,7 @@ impl<'a> Feed<'a> {
     pub(crate) fn look(&mut self, model: &mut Model) -> Result<(), ToolError> {
         let bus = self.bus;
         // Both, so that each knows what is there now.
-        let is_other = self.services.has_changed(bus) | self.ports.has_changed(bus);
+        let is_other = self.services.has_changed(bus.place()) | self.ports.has_changed(bus.place());
         let ends = match self.ends.take().filter(Ends::writers_are_there) {
             Some(ends) if !is_other => ends,
             // It takes a core for tens of milliseconds, which the robot's path would feel.
