@@ -1,12 +1,12 @@
-//! Real time for a service's process: priority, memory that stays, cores of its own. Without it, the
-//! services on the path ask for short time slices.
+//! Real time for a service's process: priority, memory that stays, cores of its own. Without it,
+//! the services on the path ask for short time slices.
 //!
-//! Everything is asked for before the process starts its first thread, so that every thread inherits
-//! it. A process that asks for real time and does not get it ends with an error that says how to get
-//! it (exit code 5); it never runs slower than its user believes. The supervisor tries everything out
-//! before it starts any service, in a thread that ends at once ([`Wanted::rehearse`]); it never
-//! becomes real-time itself. Spinning with a real-time priority on as many cores as the machine has
-//! is refused, since it can hang the machine.
+//! Everything is asked for before the process starts its first thread, so that every thread
+//! inherits it. A process that asks for real time and does not get it ends with an error that says
+//! how to get it (exit code 5); it never runs slower than its user believes. The supervisor tries
+//! everything out before it starts any service, in a thread that ends at once
+//! ([`Wanted::rehearse`]); it never becomes real-time itself. Spinning with a real-time priority on
+//! as many cores as the machine has is refused, since it can hang the machine.
 
 mod cores;
 mod error;
@@ -32,10 +32,11 @@ pub const HIGHEST_PRIORITY: u8 = 99;
 pub const LOCKED_AT_MOST: usize = 64 << 20;
 
 /// How long a time slice is for a service on the path where it has no priority: the shortest that
-/// Linux gives. Whoever has shorter slices gets a core sooner when it wakes, from whoever has longer
-/// ones; the default was 1.4 ms where this was measured. In one run that stopped and continued 64
-/// observers every two seconds, on two cores, it brought the path's p99 beside them from 140 to 99 us,
-/// and without them from 97 to 84 (2026-11-25; `tests/soak listened` has yet to show it).
+/// Linux gives. Whoever has shorter slices gets a core sooner when it wakes, from whoever has
+/// longer ones; the default was 1.4 ms where this was measured. In one run that stopped and
+/// continued 64 observers every two seconds, on two cores, it brought the path's p99 beside them
+/// from 140 to 99 us, and without them from 97 to 84 (2026-11-25; `tests/soak listened` has yet to
+/// show it).
 const SLICE: Duration = Duration::from_micros(100);
 
 /// What one process wants of the machine.
