@@ -282,6 +282,7 @@ fn the_path_has_short_time_slices_without_any_right_and_nobody_else_has() {
         let simulator = up.service("simulator").expect("a simulated robot");
         let path = [slices(bridge), slices(logic)].concat();
         let others = [slices(up.pid()), slices(simulator)].concat();
+        assert_eq!(path.is_empty(), others.is_empty(), "told of some only");
         assert!(path.iter().all(|slice| *slice == 100_000), "{path:?}");
         assert!(others.iter().all(|slice| *slice > 100_000), "{others:?}");
     }
