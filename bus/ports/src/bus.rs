@@ -1,7 +1,7 @@
 //! A process's membership on the bus.
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeCreationFailure;
@@ -12,6 +12,7 @@ use lager_topics::Role;
 
 use crate::clock::{self, Clock};
 use crate::config::BusConfig;
+use crate::descriptions::Descriptions;
 use crate::doorbell::{self, Board};
 use crate::error::OpenError;
 use crate::here::Here;
@@ -40,6 +41,8 @@ struct Shared {
     clock: clock::Source,
     port_name: PortName,
     board: Board,
+    /// As the last sweep saw them.
+    descriptions: Mutex<Descriptions>,
 }
 
 impl Bus {
@@ -56,7 +59,8 @@ impl Bus {
         set_log_level(log_level());
         // Before anything is opened that could be waited for.
         mend::refuse_foreign(&place)?;
-        mend::unfinished(&place);
+        let mut descriptions = Descriptions::default();
+        mend::unfinished(&place, &mut descriptions);
         let node = make_node(&transport, &place, &config.robot, role)?;
         mend::protect(&place);
         // What cannot be listed now is left to the next sweep.
@@ -75,6 +79,7 @@ impl Bus {
                 role,
                 clock,
                 port_name,
+                descriptions: Mutex::new(descriptions),
             }),
         })
     }
@@ -106,7 +111,7 @@ impl Bus {
     /// Samples a killed writer has sent stay with subscribers that have received from it before,
     /// until they are drained; a keeper should still drain first ([`crate::Keeper::remember`]).
     pub fn sweep(&self) -> usize {
-        mend::unfinished(&self.shared.place);
+        mend::unfinished(&self.shared.place, &mut self.descriptions());
         doorbell::sweep(&self.shared.place, &self.shared.robot);
         sweep::dead_nodes(&self.shared.config).unwrap_or_default()
     }
@@ -127,6 +132,11 @@ impl Bus {
 
     pub(crate) fn board(&self) -> &Board {
         &self.shared.board
+    }
+
+    pub(crate) fn descriptions(&self) -> MutexGuard<'_, Descriptions> {
+        let descriptions = self.shared.descriptions.lock();
+        descriptions.unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(crate) fn port_name(&self) -> &PortName {

@@ -10,6 +10,7 @@ use lager_topics::{Description, Role, TOPICS, Topic, TopicEntry, TopicVisitor, v
 
 use crate::bus::Bus;
 use crate::config::BusConfig;
+use crate::descriptions::Descriptions;
 use crate::doorbell;
 use crate::error::IntrospectError;
 use crate::fault::TransportFault;
@@ -204,7 +205,7 @@ pub fn nodes(config: &BusConfig) -> Result<Vec<NodeInfo>, IntrospectError> {
 pub fn remove_stale_nodes(config: &BusConfig) -> Result<usize, IntrospectError> {
     let place = config.place()?;
     let config = config.transport(&place)?;
-    mend::unfinished(&place);
+    mend::unfinished(&place, &mut Descriptions::default());
     let removed = sweep::dead_nodes(&config).map_err(TransportFault::from)?;
     doorbell::sweep_all(&place);
     place.sweep_locks();

@@ -15,16 +15,14 @@
 //! A new process that finds no description makes another one, with another number. Ports come and
 //! go at any moment, so a file counts as missing only when two looks in a row miss it.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, DirEntry};
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
 
+use crate::bus::Bus;
+use crate::descriptions::{Descriptions, LIST, parts};
 use crate::place::Place;
-use crate::shortage::SHARED_MEMORY;
-use crate::watch::{NODES, PORT_TAG, SERVICES, Version};
-
-/// The ending of a service's list of ends.
-const LIST: &str = "dynamic";
+use crate::watch;
 
 /// How the kernel marks a mapping whose file was removed.
 const REMOVED: &str = " (deleted)";
@@ -32,20 +30,21 @@ const REMOVED: &str = " (deleted)";
 /// What the last look missed.
 #[derive(Debug, Default)]
 pub struct Inventory {
-    described: Described,
     missed: BTreeSet<PathBuf>,
 }
 
 impl Inventory {
-    /// Looks at what `processes` have mapped of the bus at `place`. Returns a file that is missing,
-    /// or whose description is, if the look before missed it too. A process that has ended has
-    /// nothing mapped.
-    pub fn look(&mut self, place: &Place, processes: &[u32]) -> Option<PathBuf> {
-        self.described.look(place);
-        let ports = ports(place);
+    /// Looks at what `processes` have mapped of `bus`. Returns a file that is missing, or whose
+    /// description is, if the look before missed it too. A process that has ended has nothing
+    /// mapped.
+    pub fn look(&mut self, bus: &Bus, processes: &[u32]) -> Option<PathBuf> {
+        let place = bus.place();
+        let mut descriptions = bus.descriptions();
+        descriptions.look(place);
+        let ports: BTreeSet<String> = watch::ports(place).unwrap_or_default();
         let mapped = processes.iter().flat_map(|pid| mapped(*pid));
         let missed = mapped
-            .filter(|file| is_missed(file, place, &ports, &self.described))
+            .filter(|file| is_missed(file, place, &ports, &descriptions))
             .map(|file| file.path)
             .collect();
         let before = core::mem::replace(&mut self.missed, missed);
@@ -80,7 +79,7 @@ fn is_missed(
     file: &Mapped,
     place: &Place,
     ports: &BTreeSet<String>,
-    described: &Described,
+    descriptions: &Descriptions,
 ) -> bool {
     let Mapped { path, removed } = file;
     if path.starts_with(place.folder()) {
@@ -88,88 +87,8 @@ fn is_missed(
         return *removed && (path.ends_with("bells") || path.ends_with("clock"));
     }
     match parts(path, place.prefix()) {
-        Some((_, LIST)) => *removed || described.misses(path),
+        Some((_, LIST)) => *removed || descriptions.misses(path),
         Some((number, "data")) => *removed && ports.contains(number),
         _ => false,
     }
-}
-
-/// The number of a service or port, and the ending, in the name of a segment.
-fn parts<'a>(path: &'a Path, prefix: &str) -> Option<(&'a str, &'a str)> {
-    let name = path.strip_prefix(SHARED_MEMORY).ok()?.to_str()?;
-    let (stem, end) = name.strip_prefix(prefix)?.rsplit_once('.')?;
-    Some((stem.rsplit('_').next().unwrap_or_default(), end))
-}
-
-/// The numbers of the ports that processes have.
-fn ports(place: &Place) -> BTreeSet<String> {
-    let nodes = entries(&place.transport_folder().join(NODES));
-    nodes
-        .flat_map(|node| entries(&node.path()))
-        .filter_map(|file| {
-            let name = file.file_name();
-            let name = name.to_str()?.strip_prefix(place.prefix())?;
-            Some(name.strip_suffix(PORT_TAG)?.to_owned())
-        })
-        .collect()
-}
-
-/// The services that have a description.
-#[derive(Debug, Default)]
-pub(crate) struct Described {
-    prefix: String,
-    numbers: BTreeSet<u128>,
-    /// The files that need not be read again, each with the number in it.
-    read: BTreeMap<Version, Option<u128>>,
-}
-
-impl Described {
-    pub(crate) fn at(place: &Place) -> Self {
-        let mut described = Self::default();
-        described.look(place);
-        described
-    }
-
-    /// Reads what has changed since the last look.
-    fn look(&mut self, place: &Place) {
-        place.prefix().clone_into(&mut self.prefix);
-        self.numbers.clear();
-        let mut before = core::mem::take(&mut self.read);
-        for file in entries(&place.transport_folder().join(SERVICES)) {
-            let Ok(version) = Version::of(&file) else {
-                continue;
-            };
-            let is_settled = !version.is_of_this_moment();
-            let read = || number_in(&fs::read_to_string(file.path()).ok()?);
-            let number = before.remove(&version).unwrap_or_else(read);
-            self.numbers.extend(number);
-            if is_settled {
-                self.read.insert(version, number);
-            }
-        }
-    }
-
-    /// Whether a segment is the list of ends of a service without a description.
-    pub(crate) fn misses(&self, segment: &Path) -> bool {
-        let has = |number: u128| self.numbers.contains(&number);
-        match parts(segment, &self.prefix) {
-            Some((number, LIST)) => !number.parse().is_ok_and(has),
-            _ => false,
-        }
-    }
-}
-
-/// The number of the service that a description belongs to; the name of the service's list of ends
-/// contains it.
-fn number_in(description: &str) -> Option<u128> {
-    let value = |key: &str| {
-        let mut lines = description.lines();
-        let value = lines.find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "))?;
-        value.parse::<u64>().ok().map(u128::from)
-    };
-    Some(value("unique_value")? << 64 | value("payload_value")?)
-}
-
-fn entries(folder: &Path) -> impl Iterator<Item = DirEntry> + use<> {
-    fs::read_dir(folder).into_iter().flatten().flatten()
 }

@@ -45,6 +45,7 @@ mod bus;
 mod cause;
 mod clock;
 mod config;
+mod descriptions;
 mod doorbell;
 mod error;
 mod factory;

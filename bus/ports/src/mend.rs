@@ -20,8 +20,8 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use crate::descriptions::Descriptions;
 use crate::error::OpenError;
-use crate::inventory::Described;
 use crate::lease;
 use crate::lock;
 use crate::name::RobotName;
@@ -71,7 +71,7 @@ pub struct Mended {
 /// The folder cannot be used, or belongs to another user.
 pub fn mend(config: &crate::BusConfig) -> Result<Mended, OpenError> {
     let place = config.place()?;
-    let mut removed = unfinished(&place);
+    let mut removed = unfinished(&place, &mut Descriptions::default());
     removed += segments(&place)
         .filter(|path| !is_counter(path))
         .filter(|path| lease::remove_unused(path))
@@ -113,14 +113,14 @@ pub fn damaged(config: &crate::BusConfig) -> Result<Vec<PathBuf>, OpenError> {
 /// Removes what was never finished and whose creator is gone, and lists of ends whose description
 /// is; returns how much it was. Such a list is left where a sweep had it open while the rest of its
 /// service was removed.
-pub(crate) fn unfinished(place: &Place) -> usize {
+pub(crate) fn unfinished(place: &Place, descriptions: &mut Descriptions) -> usize {
     let bad_counter = |path: &Path| is_counter(path) && !is_sound_counter(path);
     let all: Vec<PathBuf> = segments(place).collect();
     // After the segments: a service has its description first.
-    let described = Described::at(place);
+    descriptions.look(place);
     let segments = all
         .iter()
-        .filter(|path| is_unfinished(path) || bad_counter(path) || described.misses(path))
+        .filter(|path| is_unfinished(path) || bad_counter(path) || descriptions.misses(path))
         .filter(|path| lease::remove_unused(path))
         .count();
     let descriptions = files(&services(place))

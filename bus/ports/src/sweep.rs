@@ -17,7 +17,9 @@ use iceoryx2::config::Config;
 use iceoryx2::node::{DeadNodeView, NodeListFailure, NodeState, NodeView};
 use iceoryx2::prelude::{CallbackProgression, FileName, Node, SemanticString};
 use iceoryx2::service::Service;
-use iceoryx2_cal::monitoring::{Monitoring, MonitoringBuilder, MonitoringCleaner};
+use iceoryx2_cal::monitoring::{
+    Monitoring, MonitoringBuilder, MonitoringCleaner, MonitoringMonitor, State,
+};
 use iceoryx2_cal::named_concept::{
     NamedConceptBuilder, NamedConceptConfiguration, NamedConceptMgmt,
 };
@@ -36,6 +38,9 @@ const BEING_WRITTEN: u32 = 0o600;
 
 /// Removes the nodes of all processes that are dead; returns how many there were.
 pub(crate) fn dead_nodes(config: &Config) -> Result<usize, NodeListFailure> {
+    if all_live(config) {
+        return Ok(0);
+    }
     let mut removed = 0;
     Node::<Ipc>::list(config, |state| {
         if let NodeState::Dead(dead) = state {
@@ -44,6 +49,22 @@ pub(crate) fn dead_nodes(config: &Config) -> Result<usize, NodeListFailure> {
         CallbackProgression::Continue
     })?;
     Ok(removed)
+}
+
+/// Whether the process of every node lives. The transport's list of nodes would tell, too, but it
+/// reads the details of each.
+fn all_live(config: &Config) -> bool {
+    let monitors = monitors(config);
+    let Ok(names) = Monitors::list_cfg(&monitors) else {
+        return false;
+    };
+    let lives = |name: &FileName| {
+        let monitor = <Monitors as Monitoring>::Builder::new(name)
+            .config(&monitors)
+            .monitor();
+        monitor.is_ok_and(|monitor| matches!(monitor.state(), Ok(State::Alive)))
+    };
+    names.iter().all(lives)
 }
 
 /// Whether the files by which others find this node are there. Writing the tag of a port makes the
@@ -123,16 +144,20 @@ impl Files {
 
 /// The transport's lock on what a dead node has left. Nobody gets it for a living one.
 fn cleaner(config: &Config, id: &str) -> Option<<Monitors as Monitoring>::Cleaner> {
-    let global = &config.global;
-    let monitors = <Monitors as NamedConceptMgmt>::Configuration::default()
-        .prefix(&global.prefix)
-        .suffix(&global.node.monitor_suffix)
-        .path_hint(&global.node_dir());
     let name = FileName::new(id.as_bytes()).ok()?;
     <Monitors as Monitoring>::Builder::new(&name)
-        .config(&monitors)
+        .config(&monitors(config))
         .cleaner()
         .ok()
+}
+
+/// Where the monitors of a bus are, and how they are named.
+fn monitors(config: &Config) -> <Monitors as NamedConceptMgmt>::Configuration {
+    let global = &config.global;
+    <Monitors as NamedConceptMgmt>::Configuration::default()
+        .prefix(&global.prefix)
+        .suffix(&global.node.monitor_suffix)
+        .path_hint(&global.node_dir())
 }
 
 fn details_name(config: &Config) -> String {

@@ -18,7 +18,7 @@ pub(crate) const SERVICES: &str = "services";
 /// Where each process has a folder, with a tag for each of its ports.
 pub(crate) const NODES: &str = "nodes";
 /// How the name of a port's tag ends.
-pub(crate) const PORT_TAG: &str = ".port_tag";
+const PORT_TAG: &str = ".port_tag";
 
 /// Tells whether the services or the ports of the bus at a place are others than before.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl BusWatch {
     /// Watches the ports of all processes. What a killed one had is there until it is swept.
     #[must_use]
     pub fn of_ports() -> Self {
-        Self::over(ports)
+        Self::over(tags)
     }
 
     fn over(files: fn(&Place) -> io::Result<BTreeSet<Version>>) -> Self {
@@ -102,18 +102,31 @@ fn services(place: &Place) -> io::Result<BTreeSet<Version>> {
 
 /// The tags of all ports. They never change. Whoever opens a service tags that too, for a moment, so
 /// the times of the folders tell nothing.
-fn ports(place: &Place) -> io::Result<BTreeSet<Version>> {
+fn tags(place: &Place) -> io::Result<BTreeSet<Version>> {
+    let version = |port: String| Version {
+        name: port.into(),
+        inode: 0,
+        changed: Duration::ZERO,
+    };
+    Ok(ports(place)?.into_iter().map(version).collect())
+}
+
+/// The numbers of all ports that have a tag.
+pub(crate) fn ports(place: &Place) -> io::Result<BTreeSet<String>> {
     let mut ports = BTreeSet::new();
     for node in entries(&place.transport_folder().join(NODES))? {
-        for tag in entries(&node?.path())? {
+        let node = node?;
+        // Beside the folders there are files, three for each.
+        if !node.file_type()?.is_dir() {
+            continue;
+        }
+        for tag in entries(&node.path())? {
             let name = tag?.file_name();
-            if name.to_string_lossy().ends_with(PORT_TAG) {
-                ports.insert(Version {
-                    name,
-                    inode: 0,
-                    changed: Duration::ZERO,
-                });
-            }
+            let name = name
+                .to_str()
+                .and_then(|name| name.strip_prefix(place.prefix()));
+            let number = name.and_then(|name| name.strip_suffix(PORT_TAG));
+            ports.extend(number.map(str::to_owned));
         }
     }
     Ok(ports)
@@ -123,10 +136,7 @@ fn ports(place: &Place) -> io::Result<BTreeSet<Version>> {
 fn entries(folder: &Path) -> io::Result<impl Iterator<Item = io::Result<DirEntry>> + use<>> {
     match fs::read_dir(folder) {
         Ok(entries) => Ok(Some(entries).into_iter().flatten()),
-        // Beside the processes' folders there are files.
-        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-            Ok(None.into_iter().flatten())
-        }
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None.into_iter().flatten()),
         Err(error) => Err(error),
     }
 }

@@ -203,7 +203,7 @@ fn missed(damage: impl FnOnce(&Domain)) -> Option<PathBuf> {
     let publisher = bridge.publisher::<SensorLine>().unwrap();
     let mut subscriber = domain.open(Role::Logic).subscriber::<SensorLine>().unwrap();
     let mut inventory = Inventory::default();
-    let mut look = || inventory.look(&domain.place(), &[std::process::id()]);
+    let mut look = || inventory.look(&bridge, &[std::process::id()]);
     // Ports that come and go are nobody's damage.
     for _ in 0..3 {
         let passing = bridge.publisher::<SensorLine>().unwrap();
