@@ -33,10 +33,9 @@ pub const LOCKED_AT_MOST: usize = 64 << 20;
 
 /// How long a time slice is for a service on the path where it has no priority: the shortest that
 /// Linux gives. Whoever has shorter slices gets a core sooner when it wakes, from whoever has
-/// longer ones; the default was 1.4 ms where this was measured. In one run that stopped and
-/// continued 64 observers every two seconds, on two cores, it brought the path's p99 beside them
-/// from 140 to 99 us, and without them from 97 to 84 (2026-11-25; `tests/soak listened` has yet to
-/// show it).
+/// longer ones; the default was 1.4 ms where this was measured. In runs that stopped and continued
+/// 64 observers every few seconds, on two cores, the path's p99 beside them was 99 us instead of
+/// 140, and on a noisier day 1.31 times what it was without them instead of 1.52 times (2026-11-25).
 const SLICE: Duration = Duration::from_micros(100);
 
 /// What one process wants of the machine.
