@@ -14,7 +14,7 @@ use rustix::process::{Signal, kill_process};
 /// Prints what the path of a robot on a mission takes, alone and with what `begin` starts, each time
 /// as soon as so many observers are on the line.
 fn compare<W>(what: &str, observers: usize, begin: impl Fn(&Domain) -> W) {
-    let domain = Domain::new();
+    let domain = Domain::alone();
     // Goods for longer than it is measured.
     let mission = ["1,2,3"; 80].join(",");
     let mut up = domain.start(&["up", "--headless", "--speed", "5", "--mission", &mission]);
