@@ -12,12 +12,13 @@ use lager_topics::{MissionQueue, OBSERVERS, SensorLine, Topic};
 use rustix::process::{Signal, kill_process};
 
 /// Prints what the path of a robot on a mission takes, alone and with what `begin` starts, each time
-/// as soon as so many observers are on the line.
-fn compare<W>(what: &str, observers: usize, begin: impl Fn(&Domain) -> W) {
+/// as soon as so many observers are on the line. The robot is started with `more` flags.
+fn compare<W>(what: &str, more: &[&str], observers: usize, begin: impl Fn(&Domain) -> W) {
     let domain = Domain::alone();
     // Goods for longer than it is measured.
     let mission = ["1,2,3"; 80].join(",");
-    let mut up = domain.start(&["up", "--headless", "--speed", "5", "--mission", &mission]);
+    let up = ["up", "--headless", "--speed", "5", "--mission", &mission];
+    let mut up = domain.start(&[&up[..], more].concat());
     domain.done(&["topic", "echo", "latency/path", "--count", "2", "--wait"]);
     let observer = domain.observe("r1", 1.0);
     compare_on_robot(&domain, what, || {
@@ -99,7 +100,14 @@ impl Drop for Listeners {
 #[test]
 #[ignore = "it prints figures and wants the machine to itself: tests/soak listened"]
 fn the_path_while_all_places_are_taken() {
-    compare("64 observers", OBSERVERS, Listeners::new);
+    compare("64 observers", &[], OBSERVERS, Listeners::new);
+}
+
+#[test]
+#[ignore = "it prints figures, and wants the machine to itself and the right to real time: tests/soak listened"]
+fn the_path_in_real_time_while_all_places_are_taken() {
+    let more = ["--realtime", "20"];
+    compare("64, in real time", &more, OBSERVERS, Listeners::new);
 }
 
 /// A Python program that reads every line frame.
@@ -132,5 +140,5 @@ impl Drop for Python {
 #[test]
 #[ignore = "it prints figures and wants the machine to itself: tests/soak python"]
 fn the_path_while_python_reads() {
-    compare("one Python program", 1, Python::new);
+    compare("one Python program", &[], 1, Python::new);
 }
