@@ -31,7 +31,7 @@ fn until(moment: Instant) {
 #[test]
 fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
     let kills = soak("LAGER_SOAK_BAG_KILLS");
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut taken = Vec::new();
     for kill in 0..kills.unwrap_or(3) {
@@ -109,7 +109,7 @@ pub(crate) fn must_have_filled_its_disk(domain: &Domain, recorder: Child) {
 
 #[test]
 fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut recorder = record_on_a_small_disk(&domain, 1_536, &["--wait"]);
     let mut up = domain.start(&[
         "up",
@@ -137,7 +137,7 @@ fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
 
 #[test]
 fn what_finds_the_queue_full_is_told_live_and_in_the_file() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     let args = ["--topic", "noise/now", "--queue", "10", "slow.mcap"];
@@ -198,7 +198,7 @@ fn what_finds_the_queue_full_is_told_live_and_in_the_file() {
 #[test]
 fn ten_thousand_frames_a_second_are_all_recorded_or_counted() {
     let seconds = soak("LAGER_SOAK_BAG_SECONDS");
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let lines = bus.publisher::<SensorLine>().expect("a topic");
     let recorder = recorder(&domain, &["--topic", "sensor/line", "fast.mcap"]);

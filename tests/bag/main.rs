@@ -189,7 +189,7 @@ fn recorder(domain: &Domain, args: &[&str]) -> Running {
 
 #[test]
 fn a_bag_of_a_mission_has_what_the_bus_has_numbered() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let observer = domain.observe("r1", 1.0);
     let mut line = observer.subscriber::<SensorLine>().expect("a topic");
     let mut command = observer.subscriber::<SteeringCommand>().expect("a topic");
@@ -299,7 +299,7 @@ fn a_bag_of_a_mission_has_what_the_bus_has_numbered() {
 
 #[test]
 fn what_a_killed_recorder_had_flushed_is_recovered() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     let mut recorder = recorder(&domain, &["--topic", "noise/now", "noise.mcap"]);
@@ -365,7 +365,7 @@ fn what_a_killed_recorder_had_flushed_is_recovered() {
 
 #[test]
 fn a_full_disk_ends_the_recording_with_a_whole_file() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     let mut recorder = hard::record_on_a_small_disk(&domain, 2_048, &["--topic", "noise/now"]);
@@ -385,7 +385,7 @@ fn a_full_disk_ends_the_recording_with_a_whole_file() {
 
 #[test]
 fn a_recording_is_split_without_a_loss_and_each_file_is_whole() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     let args = ["--topic", "noise/now", "--split-size", "1", "noise.mcap"];
@@ -418,7 +418,7 @@ fn a_recording_is_split_without_a_loss_and_each_file_is_whole() {
 
 #[test]
 fn bad_input_is_told_with_what_to_do() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     fs::write(domain.folder().join("text.mcap"), "no recording at all").expect("a file");
     for (args, code, told) in [
         (&["bag", "info", "none.mcap"][..], 1, "No such file"),
@@ -468,7 +468,7 @@ fn bad_input_is_told_with_what_to_do() {
 
 #[test]
 fn a_recording_is_split_by_time_into_files_that_are_whole() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     let args = ["--topic", "noise/now", "--split-time", "0.5", "noise.mcap"];

@@ -11,7 +11,7 @@ use crate::{Noisy, end, guest, recorder, said};
 #[test]
 #[ignore = "needs LAGER_PYTHON, a Python with mcap and jsonschema; tests/run makes one"]
 fn other_peoples_readers_find_every_message_and_each_fits_its_schema() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let recorder = recorder(&domain, &["tour.mcap"]);
     let up = domain.start(&["up", "--headless", "--mission", "1", "--speed", "4"]);
     // Beside the robot's topics one that is in no table.

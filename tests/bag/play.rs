@@ -32,7 +32,7 @@ fn recorded(domain: &Domain) -> Seen {
 
 #[test]
 fn another_robots_name_hears_the_same_samples() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let first = recorded(&domain);
     for (stamps, file) in [("new", "new.mcap"), ("recorded", "same.mcap")] {
         let recorder = recorder(&domain, &["--name", "r2", file]);
@@ -92,7 +92,7 @@ fn another_robots_name_hears_the_same_samples() {
 
 #[test]
 fn a_recording_is_not_played_onto_a_robot_or_beside_its_writer() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     recorded(&domain);
     let play = ["bag", "play", "lines.mcap"];
     let place = domain.bus("r1", 1.0).place().expect("the bus's folder");
@@ -150,7 +150,7 @@ fn lasted(seen: &Seen) -> u64 {
 
 #[test]
 fn a_rate_stretches_a_recording_or_presses_it() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let first = lasted(&recorded(&domain));
     let mut played = Vec::new();
     for (rate, file) in [("0.5", "slow.mcap"), ("100", "fast.mcap")] {
@@ -174,7 +174,7 @@ fn a_rate_stretches_a_recording_or_presses_it() {
 
 #[test]
 fn only_the_topics_that_are_asked_for_are_played() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let lines = bus.publisher::<SensorLine>().expect("a topic");
     let distances = bus.publisher::<SensorDistance>().expect("a topic");
@@ -213,7 +213,7 @@ fn only_the_topics_that_are_asked_for_are_played() {
 
 #[test]
 fn a_loop_plays_the_same_again_until_somebody_ends_it() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let first = recorded(&domain);
     let listener = recorder(&domain, &["--name", "r2", "again.mcap"]);
     let play = [
@@ -251,7 +251,7 @@ fn a_loop_plays_the_same_again_until_somebody_ends_it() {
 
 #[test]
 fn somebodys_own_topic_is_played_to_those_who_have_it_open() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let bus = guest(&domain);
     let mut noisy = Noisy::new(&bus);
     let listener = recorder(&domain, &["--topic", "noise/now", "noise.mcap"]);

@@ -176,7 +176,7 @@ fn rewrite(from: &Path, to: &Path, change: Change<'_>) {
 fn missions_with_kills_and_things_in_the_way_are_identical() {
     let (mut inputs, mut compared, mut unexplained) = (0, 0, 0);
     for seed in 1..=missions() {
-        let domain = Domain::alone();
+        let domain = Domain::new();
         let (told, killed) = record_all_of_a_mission(&domain, seed, "2", "tour.mcap");
         // What held logic up for too long was restarted as well.
         assert!(told["navigators"].as_u64() > Some(killed), "{told:#}");
@@ -200,7 +200,7 @@ fn missions_with_kills_and_things_in_the_way_are_identical() {
 
 #[test]
 fn what_is_not_as_it_was_is_named() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     // With nothing in its way it drives, so that it gives orders that could be others.
     let (told, _) = record_all_of_a_mission(&domain, 77, "0", "tour.mcap");
     let lives = told["navigators"].as_u64().expect("a number");
@@ -308,7 +308,7 @@ fn what_is_not_as_it_was_is_named() {
 
 #[test]
 fn a_recording_from_the_middle_is_proved_from_the_next_navigator_on() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mission = ["--mission", "1", "--speed", "4"];
     let up = domain.start(&[&["up", "--headless", "--no-station"], &mission[..]].concat());
     let observer = domain.observe("r1", 1.0);
