@@ -57,9 +57,8 @@ pub fn released(name: &str) -> PathBuf {
     binary
 }
 
-/// The machine. A test that measures, that asks how soon something happens, or that has a browser
-/// paint has it alone. Else there are as many robots as test threads: one for each core, unless
-/// somebody says otherwise.
+/// The machine. A test that measures, or asks how soon something happens, has it alone. Else there
+/// are as many robots as test threads: one for each core, unless somebody says otherwise.
 static MACHINE: RwLock<()> = RwLock::new(());
 
 /// Waits until no other test of this file has the machine, and keeps them waiting.

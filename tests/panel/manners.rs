@@ -242,7 +242,7 @@ fn address(told: &str, before: &str) -> Option<String> {
 
 #[test]
 fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_stop() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let station = domain.start(&["station", "--listen", "127.0.0.1:0", "--panel", "0.0.0.0:0"]);
     let (listens, driver, viewer) = wait_for("its addresses", || {
         let told = station.output();

@@ -26,7 +26,7 @@ pub(crate) struct Stage {
 impl Stage {
     /// One that knows this warehouse, a file of TOML, if any; `everywhere`: beyond this machine.
     pub(crate) fn new(warehouse: Option<&str>, everywhere: bool) -> Self {
-        let domain = Domain::alone();
+        let domain = Domain::new();
         let panel = match everywhere {
             true => "0.0.0.0:0",
             false => "127.0.0.1:0",

@@ -41,7 +41,7 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new(speed: f64, more: &[&str]) -> Self {
-        let domain = Domain::alone();
+        let domain = Domain::new();
         let speed_word = speed.to_string();
         let mut args = vec!["up", "--panel", "127.0.0.1:0", "--speed", &speed_word];
         args.extend(more);
