@@ -329,7 +329,7 @@ struct Outcome {
 
 /// Starts a robot, has it attacked as it drives, and judges what becomes of it.
 fn attack(what: &str, spoil: impl FnOnce(&Domain, &Running)) -> Outcome {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let boards = Boards::start(&domain);
     let mut up = driving(&domain, &boards);
     let start = Instant::now();
@@ -435,7 +435,7 @@ fn a_robot_whose_files_are_spoilt_is_up_again_or_ends_with_a_reason() {
 #[test]
 fn observers_killed_at_random_moments_cost_nobody_anything() {
     let count = soak().unwrap_or(20);
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let boards = Boards::start(&domain);
     let up = driving(&domain, &boards);
     let mut moment = 0_u64;
@@ -530,7 +530,7 @@ fn has_argument(process: u32, wanted: &[u8]) -> bool {
 
 /// Fills `full`, kills the bridge meanwhile, and makes room again.
 fn fill(full: &str, log: &str) -> Outcome {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let boards = Boards::start(&domain);
     let mut robot = in_its_own_mounts(&domain, log);
     let id = robot.id();

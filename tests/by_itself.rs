@@ -119,7 +119,7 @@ fn driving(domain: &Domain, watch: &mut Watch, drive: &[&str]) -> Running {
 
 #[test]
 fn a_frozen_drive_does_not_move_the_robot_again() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let (up, mut watch, mut drive) = driven_by_hand(&domain);
     freeze(drive.pid());
     watch.wait_to_stand();
@@ -140,7 +140,7 @@ fn a_frozen_drive_does_not_move_the_robot_again() {
 
 #[test]
 fn a_request_that_a_frozen_bridge_finds_later_changes_nothing() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let up = domain.start(&["up"]);
     let mut watch = Watch::new(&domain);
     watch.wait_for_health("the steering board", |health| health.steering.up != 0);
@@ -174,7 +174,7 @@ fn a_request_that_a_frozen_bridge_finds_later_changes_nothing() {
 
 #[test]
 fn a_robot_whose_steering_board_is_not_heard_stands_and_goes_on_by_a_new_order_only() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let (body, plugged, config) = boards_at_a_cable(&domain);
     let bridge = domain.start(&["--config", &config, "bridge"]);
     let mut watch = Watch::new(&domain);
@@ -238,7 +238,7 @@ fn boards_at_a_cable(domain: &Domain) -> (Running, Cable, String) {
 
 #[test]
 fn a_mission_stands_while_the_steering_board_is_not_heard_and_is_delivered_after() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let (body, plugged, config) = boards_at_a_cable(&domain);
     let mut up = domain.start(&[
         "--config",
@@ -284,7 +284,7 @@ fn a_mission_stands_while_the_steering_board_is_not_heard_and_is_delivered_after
 
 #[test]
 fn noise_on_the_cable_in_each_turn_costs_no_mission() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let (body, cable, config) = boards_at_a_cable(&domain);
     let mut up = domain.start(&[
         "--config",

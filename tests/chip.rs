@@ -133,7 +133,7 @@ fn a_mission_on_the_real_images_is_delivered_even_if_they_are_held_up() {
 
 #[test]
 fn gains_outlive_a_clean_end() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let steering = domain.eeprom("r1").join("steering.eeprom");
     let mut up = up(&domain, &[]);
     let mut watch = Watch::new(&domain, &mut up);
@@ -163,7 +163,7 @@ fn gains_outlive_a_clean_end() {
 
 #[test]
 fn a_robot_on_the_images_is_put_down_by_hand_and_drives_from_there() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = started(
         &domain,
         &["up", "--body", "chip", "--headless", "--mission", "1"],
@@ -215,7 +215,7 @@ fn a_robot_on_the_images_is_put_down_by_hand_and_drives_from_there() {
 
 /// One mission, with its chips held up for far longer than a board may be silent.
 fn held_up_mission() -> serde_json::Value {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = up(&domain, &[]);
     let mut watch = Watch::new(&domain, &mut up);
     watch.wait_until(&mut up, Phase::Driving);
@@ -241,7 +241,7 @@ fn held_up_mission() -> serde_json::Value {
 
 #[test]
 fn a_killed_emulator_is_started_again_and_the_mission_ends() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     // As fast as the machine can: the services follow.
     let mut up = up(&domain, &["--speed", "20"]);
     let mut watch = Watch::new(&domain, &mut up);
@@ -281,7 +281,7 @@ fn a_killed_emulator_is_started_again_and_the_mission_ends() {
 
 #[test]
 fn a_killed_supervisor_takes_the_emulator_along_and_the_next_one_starts() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut first = up(&domain, &[]);
     let mut watch = Watch::new(&domain, &mut first);
     watch.wait_until(&mut first, Phase::Driving);
@@ -314,7 +314,7 @@ fn a_killed_supervisor_takes_the_emulator_along_and_the_next_one_starts() {
 
 #[test]
 fn what_is_missing_is_an_error_that_tells_how_to_build_it() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let nowhere = domain.folder().join("nowhere");
     let nowhere = nowhere.to_str().expect("a path in UTF-8");
     let refused = domain.run(&["up", "--images", nowhere, "--emulator", nowhere]);
@@ -343,7 +343,7 @@ fn what_is_missing_is_an_error_that_tells_how_to_build_it() {
 
 #[test]
 fn images_for_another_baud_rate_are_told_and_given_up() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let images = built("firmware/avr/target/images");
     let mut up = up(&domain, &["--baud", "9600", "--images", &images]);
     assert_eq!(up.wait(), Some(1), "{}", up.log());
@@ -358,7 +358,7 @@ fn images_for_another_baud_rate_are_told_and_given_up() {
 
 #[test]
 fn an_emulator_that_cannot_run_ends_up_with_a_sentence() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let images = domain.folder().join("images");
     std::fs::create_dir(&images).expect("a folder");
     for image in ["sensor.elf", "steering.elf"] {

@@ -174,7 +174,7 @@ fn a_killed_service_comes_back_and_the_mission_still_ends() {
     let mut done: Vec<Kill> = Vec::new();
     let mut missions = 0;
     while left.values().any(|kills| *kills > 0) {
-        let domain = Domain::alone();
+        let domain = Domain::new();
         let mut up = domain.start(&[
             "up",
             "--headless",
@@ -253,7 +253,7 @@ fn report(kills: &[Kill], missions: u32) {
 
 #[test]
 fn a_killed_supervisor_stops_the_robot_and_takes_its_children_along() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     // The robot is a process of its own, as real boards are, and lives on.
     let [sensor, steering] = ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
     let config = domain.folder().join("robot.toml");

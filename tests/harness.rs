@@ -9,7 +9,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_ports::{Bus, BusConfig, StopPage, StopWord};
@@ -57,33 +57,21 @@ pub fn released(name: &str) -> PathBuf {
     binary
 }
 
-/// The machine. A test that measures, or asks how soon something happens, has it alone. Else there
-/// are as many robots as test threads: one for each core, unless somebody says otherwise.
-static MACHINE: RwLock<()> = RwLock::new(());
-
-/// Waits until no other test of this file has the machine, and keeps them waiting.
-pub fn alone() -> RwLockWriteGuard<'static, ()> {
+/// Waits until no other test of this file holds what it returns. One robot is what a small machine
+/// drives in time, and figures want the machine to themselves.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
     // A test that failed has let go of the machine too.
-    MACHINE.write().unwrap_or_else(PoisonError::into_inner)
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A test's part of the machine.
-#[derive(Debug)]
-enum Part {
-    Whole {
-        _until: RwLockWriteGuard<'static, ()>,
-    },
-    Shared {
-        _until: RwLockReadGuard<'static, ()>,
-    },
-}
-
-/// A bus and a folder of a test's own, one at a time. Call [`Domain::assert_clean`] at the end of a
-/// test; a test that failed earlier leaves what its processes left.
+/// A bus and a folder of a test's own; and the machine, as [`alone`] has it, so a test has one at a
+/// time. Call [`Domain::assert_clean`] at the end of a test; a test that failed earlier leaves what
+/// its processes left.
 #[derive(Debug)]
 pub struct Domain {
     own: lager_rig::Domain,
-    _part: Part,
+    _alone: MutexGuard<'static, ()>,
 }
 
 impl Domain {
@@ -93,23 +81,10 @@ impl Domain {
     /// When its folder cannot be made.
     #[must_use]
     pub fn new() -> Self {
-        let until = MACHINE.read().unwrap_or_else(PoisonError::into_inner);
-        Self::with(Part::Shared { _until: until })
-    }
-
-    /// A domain with the machine to itself, as [`alone`] has it.
-    ///
-    /// # Panics
-    /// When its folder cannot be made.
-    #[must_use]
-    pub fn alone() -> Self {
-        Self::with(Part::Whole { _until: alone() })
-    }
-
-    fn with(part: Part) -> Self {
+        let alone = alone();
         Self {
             own: lager_rig::Domain::new("lager-test").expect("a bus of its own"),
-            _part: part,
+            _alone: alone,
         }
     }
 

@@ -153,7 +153,7 @@ fn at_work(up: &Running, service: &str, before: Option<u32>) -> u32 {
 #[ignore = "needs the right to a real-time priority of 20 and to 1 GiB of locked memory; `tests/run` runs it where it has them"]
 fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
     need_real_time();
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let [first, last] = two_cores();
     let cores = [("bridge", &first), ("logic", &last)];
     let flags = cores.map(|(service, core)| format!("{service}={core}"));
@@ -218,7 +218,7 @@ fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
 #[ignore = "needs the right to a real-time priority of 20 and to 1 GiB of locked memory; `tests/run` runs it where it has them"]
 fn a_mission_is_delivered_in_real_time_with_locked_memory() {
     need_real_time();
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let config = domain.folder().join("robot.toml");
     fs::write(&config, "[realtime]\npriority = 20\nlock_memory = true\n").expect("a file");
     let mut up = domain.start(&[
@@ -242,7 +242,7 @@ fn a_mission_is_delivered_in_real_time_with_locked_memory() {
 #[ignore = "needs the right to a real-time priority of 20 and to 1 GiB of locked memory; `tests/run` runs it where it has them"]
 fn a_service_on_its_own_takes_the_same_flags() {
     need_real_time();
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let [_, last] = two_cores();
     let logic = domain.start(&["logic", "--realtime", "7", "--core", &last]);
     wait_for("logic", || (bus_mappings(logic.pid()).0 > 0).then_some(()));
@@ -275,7 +275,7 @@ fn slices_are_chosen() -> bool {
 
 #[test]
 fn the_path_has_short_time_slices_without_any_right_and_nobody_else_has() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let up = domain.launch(without_rights(&domain.lager(&["up", "--headless"])));
     let [bridge, logic] = ["bridge", "logic"].map(|service| at_work(&up, service, None));
     if slices_are_chosen() {
@@ -292,7 +292,7 @@ fn the_path_has_short_time_slices_without_any_right_and_nobody_else_has() {
 
 #[test]
 fn who_lacks_a_right_is_told_what_to_do_before_anything_runs() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     for (flags, words) in [
         (
             &["--realtime", "20"][..],
@@ -332,7 +332,7 @@ fn who_lacks_a_right_is_told_what_to_do_before_anything_runs() {
 
 #[test]
 fn cores_that_are_not_there_and_spinning_on_all_of_them_are_refused() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let spin = domain.folder().join("spin.toml");
     fs::write(&spin, "[bus]\nwaiting = \"spin\"\n").expect("a file");
     let spin = spin.to_str().expect("a path in UTF-8");
@@ -356,7 +356,7 @@ fn cores_that_are_not_there_and_spinning_on_all_of_them_are_refused() {
 
 #[test]
 fn the_doctor_tries_what_was_asked_for_and_does_not_guess() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let asked = ["doctor", "--realtime", "20", "--lock-memory"];
     let poor = run_without_rights(&domain, &asked);
     let text = String::from_utf8_lossy(&poor.stdout).into_owned();
@@ -382,7 +382,7 @@ fn the_doctor_tries_what_was_asked_for_and_does_not_guess() {
 #[ignore = "needs the right to a real-time priority of 20 and to 1 GiB of locked memory; `tests/run` runs it where it has them"]
 fn the_doctor_says_what_is_granted() {
     need_real_time();
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let rich = domain.run(&["doctor", "--realtime", "20", "--lock-memory"]);
     let text = String::from_utf8_lossy(&rich.stdout).into_owned();
     assert_eq!(rich.status.code(), Some(0), "{text}");

@@ -28,7 +28,7 @@ struct Scene {
 impl Scene {
     /// A robot whose wheels turn at full speed, with so many people who drive it.
     fn driving(people: usize) -> Self {
-        let domain = Domain::alone();
+        let domain = Domain::new();
         let [sensor, steering] =
             ["sensor.tty", "steering.tty"].map(|name| domain.folder().join(name));
         let config = domain.folder().join("robot.toml");

@@ -112,7 +112,7 @@ fn cut_off(domain: &Domain) {
 
 #[test]
 fn a_bridge_comes_back_on_a_bus_with_a_segment_that_was_never_finished() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     let lager = domain.lager(&["topic", "echo", "sensor/line", "--count", "1"]);
     let ended = Command::new("strace")
@@ -143,7 +143,7 @@ fn a_bridge_comes_back_on_a_bus_with_a_segment_that_was_never_finished() {
 
 #[test]
 fn a_robot_comes_up_again_on_an_emptied_bus() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     // A bus that was cleared has names of its own.
     for (emptied, next, cause) in [
@@ -168,7 +168,7 @@ fn a_robot_comes_up_again_on_an_emptied_bus() {
 
 #[test]
 fn a_robot_comes_up_again_when_its_memory_is_cut_off() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     let attendant = service(&mut up, "attend", None);
     cut_off(&domain);
@@ -199,7 +199,7 @@ fn own_topics(domain: &Domain, robot: &[u32], others: &[u32]) -> Vec<PathBuf> {
 
 #[test]
 fn a_robot_whose_topics_are_overwritten_comes_up_again_beside_another_that_notices_nothing() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless", "--no-station"]);
     let mut other = domain.start(&["--name", "r2", "up", "--headless", "--no-station"]);
     const SERVICES: [&str; 4] = ["attend", "simulator", "bridge", "logic"];
@@ -247,7 +247,7 @@ fn a_robot_whose_topics_are_overwritten_comes_up_again_beside_another_that_notic
 
 #[test]
 fn a_bus_that_never_holds_ends_the_robot_with_a_sentence() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     wait_for("the end", || {
         cut_off(&domain);
@@ -261,7 +261,7 @@ fn a_bus_that_never_holds_ends_the_robot_with_a_sentence() {
 
 #[test]
 fn a_mission_is_delivered_though_its_attendant_is_killed_again_and_again() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = domain.start(&MISSION);
     let mut killed = 0;
     let mut attendant = None;
@@ -294,7 +294,7 @@ fn a_mission_is_delivered_though_its_attendant_is_killed_again_and_again() {
 
 #[test]
 fn a_stopped_attendant_is_replaced_and_the_mission_goes_on() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = domain.start(&MISSION);
     let observer = domain.observe("r1", 3.0);
     let mut status = observer.subscriber::<NavStatus>().expect("a topic");
@@ -316,7 +316,7 @@ fn a_stopped_attendant_is_replaced_and_the_mission_goes_on() {
 
 #[test]
 fn a_stopped_service_is_replaced_by_itself() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     let others =
         |up: &mut Running| ["attend", "simulator", "logic"].map(|name| service(up, name, None));
@@ -333,7 +333,7 @@ fn a_stopped_service_is_replaced_by_itself() {
 /// Nobody hears whether comm lives. `strace` keeps a call of it from returning.
 #[test]
 fn a_comm_that_hangs_ends_itself_with_a_sentence() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless", "--no-station"]);
     let station = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = station.local_addr().expect("an address").to_string();
@@ -365,7 +365,7 @@ fn a_comm_that_hangs_ends_itself_with_a_sentence() {
 
 #[test]
 fn a_second_ctrl_c_ends_what_does_not_stop() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
     let observer = domain.observe("r1", 1.0);
     let mut health: Subscriber<LinkHealth> = observer.subscriber().expect("a topic");

@@ -190,7 +190,7 @@ fn a_robot_delivers_while_its_station_sends_what_it_should_not() {
 #[test]
 #[ignore = "it wants the machine to itself: tests/soak attacked"]
 fn the_path_while_the_network_attacks() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
     let up = domain.start(&["up", "--headless", "--station", &address]);

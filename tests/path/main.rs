@@ -92,7 +92,7 @@ fn at_most(limit: u64, actual: u64, what: &str, calls: &Calls) {
 
 #[test]
 fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut robot = Robot::start(&domain, true);
     robot.frames(20);
 
@@ -176,7 +176,7 @@ fn a_frame_costs_its_read_its_write_and_one_ring_and_one_sleep_a_hop() {
 
 #[test]
 fn every_frame_counts_and_each_command_that_one_has_caused() {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     let mut robot = Robot::start(&domain, false);
     let frames = robot.seen.samples().frames;
     let before = robot.seen.last_path;

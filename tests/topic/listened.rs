@@ -14,7 +14,7 @@ use rustix::process::{Signal, kill_process};
 /// Prints what the path of a robot on a mission takes, alone and with what `begin` starts, each time
 /// as soon as so many observers are on the line. The robot is started with `more` flags.
 fn compare<W>(what: &str, more: &[&str], observers: usize, begin: impl Fn(&Domain) -> W) {
-    let domain = Domain::alone();
+    let domain = Domain::new();
     // Goods for longer than it is measured.
     let mission = ["1,2,3"; 80].join(",");
     let up = ["up", "--headless", "--speed", "5", "--mission", &mission];
