@@ -12,6 +12,7 @@ const HELD: Duration = Duration::from_secs(30);
 pub struct Resets {
     count: u32,
     whole_since: Option<Instant>,
+    was_whole: bool,
 }
 
 /// What to do about a damaged bus.
@@ -29,9 +30,11 @@ impl Resets {
         self.count > 0
     }
 
-    /// Every service of the robot has been started.
-    pub fn whole(&mut self, now: Instant) {
+    /// Every service of the robot is started; says whether they have run before. Where the bus was
+    /// damaged before any could, there is nothing that they could go on with.
+    pub fn whole(&mut self, now: Instant) -> bool {
         self.whole_since.get_or_insert(now);
+        core::mem::replace(&mut self.was_whole, true)
     }
 
     /// The bus is damaged.
@@ -54,6 +57,15 @@ impl Resets {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn services_go_on_only_with_what_ran_before() {
+        let (mut resets, now) = (Resets::default(), Instant::now());
+        assert_eq!(resets.damaged(now), Remedy::StartAgain(1));
+        assert!(!resets.whole(now), "none has run yet");
+        assert_eq!(resets.damaged(now), Remedy::StartAgain(2));
+        assert!(resets.whole(now));
+    }
 
     #[test]
     fn three_starts_in_vain_are_the_end_and_one_that_held_is_not_counted() {

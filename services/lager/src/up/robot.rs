@@ -339,7 +339,7 @@ impl Robot {
         self.attendant.joined |= pulse.robot_time.is_some();
         if self.attendant.joined && self.stage == Stage::Joining {
             // A service that has run before resumes, or stands if its state is lost.
-            let resume = self.resets.have_been();
+            let resume = self.resets.whole(Instant::now());
             // What talks goes first, so that it ends after what moves the robot.
             if self.external.listener.is_some() {
                 self.start(Service::Station, resume);
@@ -353,7 +353,6 @@ impl Robot {
             self.start(Service::Bridge, resume);
             self.start(Service::Logic, resume);
             self.enter(Stage::Whole);
-            self.resets.whole(Instant::now());
         }
     }
 
