@@ -41,7 +41,7 @@ struct Shared {
     clock: clock::Source,
     port_name: PortName,
     board: Board,
-    /// As the last sweep saw them.
+    /// As they were at the last look.
     descriptions: Mutex<Descriptions>,
 }
 

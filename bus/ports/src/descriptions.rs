@@ -17,7 +17,6 @@ pub(crate) const LIST: &str = "dynamic";
 /// The services that have a description.
 #[derive(Debug, Default)]
 pub(crate) struct Descriptions {
-    prefix: String,
     numbers: BTreeSet<u128>,
     /// The files that need not be read again, each with the number in it.
     read: BTreeMap<Version, Option<u128>>,
@@ -26,7 +25,6 @@ pub(crate) struct Descriptions {
 impl Descriptions {
     /// Reads what has changed since the last look.
     pub(crate) fn look(&mut self, place: &Place) {
-        place.prefix().clone_into(&mut self.prefix);
         self.numbers.clear();
         let mut before = core::mem::take(&mut self.read);
         let services = place.transport_folder().join(SERVICES);
@@ -44,10 +42,10 @@ impl Descriptions {
         }
     }
 
-    /// Whether a segment is the list of ends of a service without a description.
-    pub(crate) fn misses(&self, segment: &Path) -> bool {
+    /// Whether a segment of `place` is the list of ends of a service without a description.
+    pub(crate) fn misses(&self, segment: &Path, place: &Place) -> bool {
         let has = |number: u128| self.numbers.contains(&number);
-        match parts(segment, &self.prefix) {
+        match parts(segment, place.prefix()) {
             Some((number, LIST)) => !number.parse().is_ok_and(has),
             _ => false,
         }

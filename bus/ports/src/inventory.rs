@@ -87,7 +87,7 @@ fn is_missed(
         return *removed && (path.ends_with("bells") || path.ends_with("clock"));
     }
     match parts(path, place.prefix()) {
-        Some((_, LIST)) => *removed || descriptions.misses(path),
+        Some((_, LIST)) => *removed || descriptions.misses(path, place),
         Some((number, "data")) => *removed && ports.contains(number),
         _ => false,
     }

@@ -120,7 +120,7 @@ pub(crate) fn unfinished(place: &Place, descriptions: &mut Descriptions) -> usiz
     descriptions.look(place);
     let segments = all
         .iter()
-        .filter(|path| is_unfinished(path) || bad_counter(path) || descriptions.misses(path))
+        .filter(|path| is_unfinished(path) || bad_counter(path) || descriptions.misses(path, place))
         .filter(|path| lease::remove_unused(path))
         .count();
     let descriptions = files(&services(place))
