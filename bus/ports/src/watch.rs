@@ -23,27 +23,36 @@ const PORT_TAG: &str = ".port_tag";
 /// Tells whether the services or the ports of the bus at a place are others than before.
 #[derive(Debug)]
 pub struct BusWatch {
-    files: fn(&Place) -> io::Result<BTreeSet<Version>>,
-    seen: Option<BTreeSet<Version>>,
+    look: fn(&Place) -> io::Result<Seen>,
+    seen: Option<Seen>,
     told_once: bool,
+}
+
+/// What there was at a look.
+#[derive(Debug, PartialEq, Eq)]
+enum Seen {
+    Services(BTreeSet<Version>),
+    /// Their numbers. Whoever opens a service has a tag for it, too, for a moment, so the times of
+    /// the folders tell nothing; and tags never change.
+    Ports(BTreeSet<String>),
 }
 
 impl BusWatch {
     /// Watches the services.
     #[must_use]
     pub fn of_services() -> Self {
-        Self::over(services)
+        Self::by(|place| services(place).map(Seen::Services))
     }
 
     /// Watches the ports of all processes. What a killed one had is there until it is swept.
     #[must_use]
     pub fn of_ports() -> Self {
-        Self::over(tags)
+        Self::by(|place| ports(place).map(Seen::Ports))
     }
 
-    fn over(files: fn(&Place) -> io::Result<BTreeSet<Version>>) -> Self {
+    fn by(look: fn(&Place) -> io::Result<Seen>) -> Self {
         Self {
-            files,
+            look,
             seen: None,
             told_once: false,
         }
@@ -53,7 +62,7 @@ impl BusWatch {
     /// be read, yes. Each change is told by two calls, because a port has its tag a moment before it
     /// can be seen on its topic, and because two changes at once may have the same time.
     pub fn has_changed(&mut self, place: &Place) -> bool {
-        let now = (self.files)(place).ok();
+        let now = (self.look)(place).ok();
         let is_same = now.is_some() && now == self.seen;
         self.seen = now;
         let is_new = !is_same || self.told_once;
@@ -98,17 +107,6 @@ impl Version {
 fn services(place: &Place) -> io::Result<BTreeSet<Version>> {
     let files = entries(&place.transport_folder().join(SERVICES))?;
     files.map(|file| Version::of(&file?)).collect()
-}
-
-/// The tags of all ports. They never change. Whoever opens a service tags that too, for a moment, so
-/// the times of the folders tell nothing.
-fn tags(place: &Place) -> io::Result<BTreeSet<Version>> {
-    let version = |port: String| Version {
-        name: port.into(),
-        inode: 0,
-        changed: Duration::ZERO,
-    };
-    Ok(ports(place)?.into_iter().map(version).collect())
 }
 
 /// The numbers of all ports that have a tag.
