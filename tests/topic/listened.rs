@@ -7,18 +7,20 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use lager_ports::Bus;
+use lager_rig::schedule::usable_cores;
 use lager_tests::{Domain, Running, compare_on_robot, free, lager, pid, wait_for};
 use lager_topics::{MissionQueue, OBSERVERS, SensorLine, Topic};
 use rustix::process::{Signal, kill_process};
 
 /// Prints what the path of a robot on a mission takes, alone and with what `begin` starts, each time
-/// as soon as so many observers are on the line. The robot is started with `more` flags.
-fn compare<W>(what: &str, more: &[&str], observers: usize, begin: impl Fn(&Domain) -> W) {
+/// as soon as so many observers are on the line. The robot is started with these `flags`, too.
+fn compare<W>(what: &str, flags: &str, observers: usize, begin: impl Fn(&Domain) -> W) {
     let domain = Domain::new();
     // Goods for longer than it is measured.
     let mission = ["1,2,3"; 80].join(",");
-    let up = ["up", "--headless", "--speed", "5", "--mission", &mission];
-    let mut up = domain.start(&[&up[..], more].concat());
+    let mut up = vec!["up", "--headless", "--speed", "5", "--mission", &mission];
+    up.extend(flags.split_whitespace());
+    let mut up = domain.start(&up);
     domain.done(&["topic", "echo", "latency/path", "--count", "2", "--wait"]);
     let observer = domain.observe("r1", 1.0);
     compare_on_robot(&domain, what, || {
@@ -97,17 +99,27 @@ impl Drop for Listeners {
     }
 }
 
+/// Binds bridge and logic to one core: the last, as most interrupts come to the first.
+fn on_one_core() -> String {
+    let core = *usable_cores().last().expect("a core");
+    format!("--core bridge={core} --core logic={core}")
+}
+
 #[test]
 #[ignore = "it prints figures and wants the machine to itself: tests/soak listened"]
 fn the_path_while_all_places_are_taken() {
-    compare("64 observers", &[], OBSERVERS, Listeners::new);
+    compare("64 observers", "", OBSERVERS, Listeners::new);
+    let flags = on_one_core();
+    compare("64, one core", &flags, OBSERVERS, Listeners::new);
 }
 
 #[test]
 #[ignore = "it prints figures, and wants the machine to itself and the right to real time: tests/soak listened"]
 fn the_path_in_real_time_while_all_places_are_taken() {
-    let more = ["--realtime", "20"];
-    compare("64, in real time", &more, OBSERVERS, Listeners::new);
+    let flags = "--realtime 20";
+    compare("64, real time", flags, OBSERVERS, Listeners::new);
+    let flags = format!("{flags} {}", on_one_core());
+    compare("64, real time, one core", &flags, OBSERVERS, Listeners::new);
 }
 
 /// A Python program that reads every line frame.
@@ -140,5 +152,5 @@ impl Drop for Python {
 #[test]
 #[ignore = "it prints figures and wants the machine to itself: tests/soak python"]
 fn the_path_while_python_reads() {
-    compare("one Python program", &[], 1, Python::new);
+    compare("one Python program", "", 1, Python::new);
 }

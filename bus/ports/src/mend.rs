@@ -80,7 +80,7 @@ pub fn mend(config: &crate::BusConfig) -> Result<Mended, OpenError> {
     for node in nodes(&place) {
         if node.is_used() {
             living = true;
-        } else if node.is_left() {
+        } else {
             removed += node.remove();
         }
     }
@@ -129,7 +129,7 @@ pub(crate) fn unfinished(place: &Place, descriptions: &mut Descriptions) -> usiz
         .count();
     let nodes = nodes(place)
         .into_iter()
-        .filter(|node| node.monitors.is_empty() && !node.is_used() && node.is_left())
+        .filter(|node| node.monitors.is_empty() && !node.is_used())
         .map(|node| node.remove())
         .sum::<usize>();
     segments + descriptions + nodes
@@ -257,10 +257,11 @@ fn tidy(place: &Place, robot: &RobotName) -> usize {
     removed
 }
 
-/// What the transport keeps of a process: a folder of tags and details, and the files beside it
-/// that tell whether the process lives.
+/// What the transport keeps of a process, as it was at one look: a folder of tags and details, and
+/// the files beside it that tell whether the process lives.
 struct Node {
     folder: PathBuf,
+    inside: Vec<PathBuf>,
     monitors: Vec<PathBuf>,
 }
 
@@ -279,6 +280,7 @@ fn nodes(place: &Place) -> Vec<Node> {
         let at = nodes.iter().position(|node| node.folder == folder);
         let at = at.unwrap_or_else(|| {
             nodes.push(Node {
+                inside: files(&folder).collect(),
                 folder,
                 monitors: Vec::new(),
             });
@@ -292,28 +294,31 @@ fn nodes(place: &Place) -> Vec<Node> {
 }
 
 impl Node {
-    /// Whether its process is gone, where no process has a file of the node open. A process that
-    /// makes a node opens a file at once, but an empty folder may be a moment old.
-    fn is_left(&self) -> bool {
-        if !self.monitors.is_empty() || files(&self.folder).next().is_some() {
-            return true;
-        }
-        let age = fs::metadata(&self.folder)
-            .and_then(|found| found.modified())
-            .map(|when| SystemTime::now().duration_since(when).unwrap_or_default());
-        age.is_ok_and(|age| age >= CREATION)
+    fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.inside.iter().chain(&self.monitors)
     }
 
+    /// Whether a process has one of the files open, as the one whose node it is does from the
+    /// moment it makes them.
     fn is_used(&self) -> bool {
-        let mut all = files(&self.folder).chain(self.monitors.iter().cloned());
-        all.any(|path| lease::is_used(&path))
+        self.files().any(|path| lease::is_used(path))
     }
 
+    /// Removes what no process uses; returns how many files it was. A folder that was empty goes
+    /// only when it is older than a creation takes, and what has come into it since stays.
     fn remove(&self) -> usize {
-        let own: Vec<PathBuf> = files(&self.folder).collect();
-        let all = own.iter().chain(&self.monitors);
-        let removed = all.filter(|path| fs::remove_file(path).is_ok()).count();
-        let _ = fs::remove_dir(&self.folder);
+        let removed = self
+            .files()
+            .filter(|path| lease::remove_unused(path))
+            .count();
+        if self.files().next().is_some() || is_older_than(&self.folder, CREATION) {
+            let _ = fs::remove_dir(&self.folder);
+        }
         removed
     }
+}
+
+fn is_older_than(path: &Path, age: Duration) -> bool {
+    let changed = fs::metadata(path).and_then(|found| found.modified());
+    changed.is_ok_and(|when| SystemTime::now().duration_since(when).unwrap_or_default() >= age)
 }

@@ -67,8 +67,9 @@ priority = {priority}
 lock_memory = {lock_memory}
 
 [realtime.cores]
-# The cores each service may run on, by number from 0; none means any. On the robot's four cores
-# bridge = [2] and logic = [3] with isolcpus=2,3 on the kernel's command line keep all else away.
+# The cores each service may run on, by number from 0; none means any. On one core, such as
+# bridge = [3] and logic = [3], they wake each other sooner than across two; with \"spin\" or
+# \"adaptive\" each needs its own. isolcpus=3 on the kernel's command line keeps all else away.
 bridge = {bridge}
 logic = {logic_cores}
 # The simulated robot stands for boards with processors of their own; only cores can be chosen.
