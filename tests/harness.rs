@@ -9,7 +9,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::{Duration, Instant};
 
 use lager_ports::{Bus, BusConfig, StopPage, StopWord};
@@ -57,34 +57,63 @@ pub fn released(name: &str) -> PathBuf {
     binary
 }
 
-/// Waits until no other test of this file holds what it returns. One robot is what a small machine
-/// drives in time, and figures want the machine to themselves.
-pub fn alone() -> MutexGuard<'static, ()> {
-    static ONE: Mutex<()> = Mutex::new(());
+/// The machine, as far as the tests of one file share it.
+static MACHINE: RwLock<()> = RwLock::new(());
+
+/// Waits until no other test of this file has a robot, and keeps them waiting. Figures want the
+/// machine to themselves, and one robot is what a small machine drives without losing a frame.
+pub fn alone() -> RwLockWriteGuard<'static, ()> {
     // A test that failed has let go of the machine too.
-    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+    MACHINE.write().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A bus and a folder of a test's own; and the machine, as [`alone`] has it, so a test has one at a
-/// time. Call [`Domain::assert_clean`] at the end of a test; a test that failed earlier leaves what
-/// its processes left.
+/// What a test has of the machine.
+#[derive(Debug)]
+enum Share {
+    All {
+        _until_dropped: RwLockWriteGuard<'static, ()>,
+    },
+    Part {
+        _until_dropped: RwLockReadGuard<'static, ()>,
+    },
+}
+
+/// A bus and a folder of a test's own, one at a time. Call [`Domain::assert_clean`] at the end of a
+/// test; a test that failed earlier leaves what its processes left.
 #[derive(Debug)]
 pub struct Domain {
     own: lager_rig::Domain,
-    _alone: MutexGuard<'static, ()>,
+    _share: Share,
 }
 
 impl Domain {
-    /// A domain no other test has.
+    /// A domain no other test has, and the machine with it, as [`alone`] has it.
     ///
     /// # Panics
     /// When its folder cannot be made.
     #[must_use]
     pub fn new() -> Self {
-        let alone = alone();
+        Self::with(Share::All {
+            _until_dropped: alone(),
+        })
+    }
+
+    /// A domain no other test has, for a test that loses nothing by a few others that drive their
+    /// robots meanwhile: as many as there are test threads.
+    ///
+    /// # Panics
+    /// When its folder cannot be made.
+    #[must_use]
+    pub fn among_others() -> Self {
+        Self::with(Share::Part {
+            _until_dropped: MACHINE.read().unwrap_or_else(PoisonError::into_inner),
+        })
+    }
+
+    fn with(share: Share) -> Self {
         Self {
             own: lager_rig::Domain::new("lager-test").expect("a bus of its own"),
-            _alone: alone,
+            _share: share,
         }
     }
 

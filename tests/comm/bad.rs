@@ -53,7 +53,7 @@ fn attacks() -> [Vec<u8>; 4] {
 
 #[test]
 fn the_memory_of_a_station_is_bounded_whatever_its_peers_do() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let (mut station, address) = station_at(&domain, "127.0.0.1:0", &[]);
     let stream = TcpStream::connect(&address).expect("it listens");
     stream.set_read_timeout(Some(WATCHDOG)).expect("a socket");
@@ -152,7 +152,7 @@ impl Drop for BadStation {
 
 #[test]
 fn a_robot_delivers_while_its_station_sends_what_it_should_not() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let (station, address) = station_at(&domain, "127.0.0.1:0", &["r1=2"]);
     let file = domain.folder().join("warehouse.toml");
     let up = domain.start(&[

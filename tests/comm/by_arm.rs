@@ -92,7 +92,7 @@ impl Asking {
 
 #[test]
 fn goods_are_picked_up_by_steps_of_the_arm_and_delivered() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let file = domain.folder().join("warehouse.toml");
     fs::write(&file, WAREHOUSE).expect("a file");
     let warehouse = file.to_str().expect("UTF-8");

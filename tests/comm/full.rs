@@ -25,7 +25,7 @@ impl Drop for Ends {
 
 #[test]
 fn a_station_on_a_full_disk_goes_on_and_saves_when_there_is_room() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let here = domain.folder();
     fs::write(here.join("warehouse.toml"), WAREHOUSE).expect("a file");
     fs::create_dir(here.join("disk")).expect("a folder");

@@ -14,7 +14,7 @@ use crate::station_at;
 
 #[test]
 fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let socket = domain.folder().join("my-gag");
     let socket = socket.to_str().expect("UTF-8");
     let up = domain.start(&[
@@ -70,7 +70,7 @@ fn a_person_at_a_gag_has_goods_fetched_at_a_station_of_chosen_places() {
 
 #[test]
 fn a_gag_without_a_station_says_what_to_do() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let alone = domain.run(&["gag"]);
     let said = String::from_utf8_lossy(&alone.stderr).into_owned();
     assert_eq!(alone.status.code(), Some(1), "{said}");
@@ -79,7 +79,7 @@ fn a_gag_without_a_station_says_what_to_do() {
 
 #[test]
 fn a_gag_finds_the_station_of_its_robot_and_else_the_one_that_runs_alone() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let finds = |folder: &Path| {
         let gag = domain.lager(&["gag"]).stdin(Stdio::null()).output();
         let said = gag.expect("lager starts").stdout;
@@ -98,7 +98,7 @@ fn a_gag_finds_the_station_of_its_robot_and_else_the_one_that_runs_alone() {
 
 #[test]
 fn a_path_that_no_socket_can_have_is_refused_before_anything_runs() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let long = domain.folder().join("g".repeat(108));
     let long = long.to_str().expect("UTF-8");
     for command in [&["up", "--headless"][..], &["station", "--no-panel"]] {
@@ -113,7 +113,7 @@ fn a_path_that_no_socket_can_have_is_refused_before_anything_runs() {
 
 #[test]
 fn a_robot_stands_when_the_gag_that_drives_it_has_gone() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let socket = domain.folder().join("gag");
     let (_station, address) = station_at(&domain, "127.0.0.1:0", &[]);
     let mut scene = Scene::at(domain, &address);

@@ -45,7 +45,7 @@ fn robot_without_station(domain: &Domain, link_lost: &str) -> (Running, String) 
 
 #[test]
 fn a_robot_that_goes_on_delivers_without_its_station() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let (up, _) = robot_without_station(&domain, "go-on");
     wait_for("the delivery", || {
         up.output().contains("DELIVERED product 1").then_some(())
@@ -56,7 +56,7 @@ fn a_robot_that_goes_on_delivers_without_its_station() {
 
 #[test]
 fn a_robot_that_stands_ends_the_edge_and_goes_on_when_the_station_is_back() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let (up, address) = robot_without_station(&domain, "stand");
     let bus = domain.observe("r1", 2.0);
     let mut status = bus.subscriber::<NavStatus>().expect("a topic");

@@ -105,7 +105,7 @@ side = \"right\"
 
 #[test]
 fn a_gag_at_a_station_has_goods_fetched() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let file = domain.folder().join("warehouse.toml");
     fs::write(&file, WAREHOUSE).expect("a file");
     let gag = domain.folder().join("gag");
@@ -208,7 +208,7 @@ pub(crate) fn station_at(domain: &Domain, at: &str, fetch: &[&str]) -> (Running,
 
 #[test]
 fn two_robots_of_one_station_deliver_though_both_are_killed() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let (_station, address) = station(&domain, &["r1=2", "r2=3,1"]);
     let file = domain.folder().join("warehouse.toml");
     let file = file.to_str().expect("UTF-8");
@@ -254,7 +254,7 @@ fn two_robots_of_one_station_deliver_though_both_are_killed() {
 
 #[test]
 fn a_second_robot_joins_the_station_of_the_first_or_says_why_not() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let up = |name, warehouse| {
         let args = ["--name", name, "up", "--headless", "--warehouse", warehouse];
         let up = domain.start(&args);

@@ -76,7 +76,7 @@ impl Drop for Played {
 
 #[test]
 fn a_robot_and_a_gag_of_strangers_hold_a_whole_session_at_a_station() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let gag = domain.folder().join("gag");
     let gag = gag.to_str().expect("UTF-8");
     let file = domain.folder().join("warehouse.toml");
@@ -114,7 +114,7 @@ fn listens_at(station: &Running) -> String {
 
 #[test]
 fn a_robert_of_strangers_drives_a_robot_by_hand() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let (mut robert, address) = Played::robert(&domain, "by_hand.txt");
     let mut scene = Scene::at(domain, &address);
     let before = scene.place();
@@ -128,7 +128,7 @@ fn a_robert_of_strangers_drives_a_robot_by_hand() {
 
 #[test]
 fn a_robert_of_strangers_has_goods_fetched() {
-    let domain = Domain::new();
+    let domain = Domain::among_others();
     let file = domain.folder().join("warehouse.toml");
     fs::write(&file, WAREHOUSE).expect("a file");
     let warehouse = file.to_str().expect("UTF-8");

@@ -84,7 +84,7 @@ impl Scene {
         let address = listener.local_addr().expect("an address").to_string();
         Self {
             listener: Some(listener),
-            ..Self::at(Domain::new(), &address)
+            ..Self::at(Domain::among_others(), &address)
         }
     }
 

@@ -1,0 +1,152 @@
+//! What a page says or leaves unsaid harms nobody else.
+
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use lager_station::Warehouse;
+use tungstenite::Message;
+
+use crate::scene::{Page, Running, WATCHDOG, server, status};
+
+#[test]
+fn a_page_that_says_what_nobody_understands_is_told_and_then_closed() {
+    let panel = Running::new(None);
+    let mut page = panel.own_page();
+    page.say("do r1 7 0 fly");
+    let answer = page.line("answer ").unwrap();
+    assert!(answer.starts_with("answer 7 refused column"), "{answer}");
+    for _ in 0..30 {
+        if page.0.send(Message::text("what")).is_err() {
+            break;
+        }
+    }
+    assert_eq!(page.line("answer "), None, "it is closed");
+    // Whoever opens it anew is served.
+    assert!(panel.own_page().line("you ").is_some());
+}
+
+#[test]
+fn a_page_that_says_more_than_a_person_can_is_closed() {
+    let panel = Running::new(None);
+    let mut page = panel.own_page();
+    for number in 0..5_000 {
+        if page
+            .0
+            .send(Message::text(format!("take r1 {number}")))
+            .is_err()
+        {
+            return;
+        }
+    }
+    while page.line("answer ").is_some() {}
+}
+
+#[test]
+fn a_warehouse_is_described_and_shown_to_everybody() {
+    let panel = Running::new(None);
+    let (mut page, mut other) = (panel.own_page(), panel.own_page());
+    assert_eq!(other.line("warehouse ").unwrap(), "warehouse null");
+    page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":0}"#);
+    let answer = page.line("answer ").unwrap();
+    assert!(answer.contains("refused side_length_cm is 0"), "{answer}");
+    page.say(r#"warehouse 2 {"size":[2,3],"side_length_cm":40,"product":[{"id":7,"square":[1,2],"side":"up"}]}"#);
+    assert_eq!(page.line("answer ").unwrap(), "answer 2 done");
+    let shown = other.line("warehouse {").unwrap();
+    assert!(
+        shown.contains(r#""size":[2,3]"#) && shown.contains(r#""id":7"#),
+        "{shown}"
+    );
+}
+
+#[test]
+fn so_many_pages_look_at_once_and_one_that_goes_makes_room() {
+    let panel = Running::new(None);
+    let mut pages: Vec<Page> = (0..32).map(|_| panel.own_page()).collect();
+    let origin = format!("http://{}", panel.address);
+    assert_eq!(panel.page(&origin, "").err(), Some(503));
+    pages.truncate(31);
+    let give_up = Instant::now() + WATCHDOG;
+    while panel.page(&origin, "").is_err() {
+        assert!(Instant::now() < give_up);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_page_is_told_that_the_disk_does_not_take_its_warehouse() {
+    let folder = std::env::temp_dir().join(format!("lager-panel-{}", std::process::id()));
+    let file = folder.join("warehouse.toml");
+    // Nothing can be written under the name of a folder, whoever asks.
+    let in_the_way = folder.join("warehouse.toml.new");
+    std::fs::create_dir_all(&in_the_way).unwrap();
+    let panel = Running::of(server(Some(file.clone())), None);
+    let mut page = panel.own_page();
+    page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":40}"#);
+    let answer = page.line("answer 1").unwrap();
+    let why = format!("answer 1 refused {} is not saved: ", file.display());
+    assert!(answer.starts_with(&why), "{answer}");
+    assert!(
+        panel.handle.look(|station| station.warehouse().is_some()),
+        "it is in force"
+    );
+    std::fs::remove_dir(&in_the_way).unwrap();
+    page.say(r#"warehouse 2 {"size":[2,3],"side_length_cm":45}"#);
+    assert_eq!(page.line("answer 2").unwrap(), "answer 2 done");
+    assert!(file.is_file());
+    drop(panel);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_page_that_takes_nothing_in_is_dropped_though_it_says_that_it_is_there() {
+    let panel = Running::new(None);
+    let mut page = panel.own_page();
+    page.line("you ").unwrap();
+    // 60 kB of news after the other, more than the system keeps for a socket.
+    let note = "a".repeat(60_000);
+    let end = Instant::now() + WATCHDOG;
+    let stream = page.0.get_mut().try_clone().unwrap();
+    stream.set_nonblocking(true).unwrap();
+    for side in (40..).map(|side| 40 + side % 100) {
+        let json = format!(r#"{{"size":[2,3],"side_length_cm":{side},"note":"{note}"}}"#);
+        let warehouse: Warehouse = serde_json::from_str(&json).unwrap();
+        panel.handle.set_warehouse(warehouse).unwrap();
+        // An empty pong, as an answer to no ping; it shows that somebody is there.
+        let said = (&stream).write_all(&[0x8A, 0x80, 0, 0, 0, 0]);
+        match said.map_err(|error| error.kind()) {
+            Ok(()) => {}
+            Err(ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) => return,
+            Err(other) => panic!("{other}"),
+        }
+        assert!(Instant::now() < end, "it is still served");
+        std::thread::sleep(Duration::from_millis(30));
+    }
+}
+
+#[test]
+fn whoever_connects_and_asks_nothing_is_sent_away() {
+    let panel = Running::new(None);
+    let mut silent = TcpStream::connect(panel.address).unwrap();
+    let mut slow = TcpStream::connect(panel.address).unwrap();
+    slow.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
+    let mut page = panel.own_page();
+    for stream in [&mut silent, &mut slow] {
+        let second = Some(Duration::from_secs(1));
+        stream.set_read_timeout(second).unwrap();
+        let end = Instant::now() + WATCHDOG;
+        loop {
+            match stream.read(&mut [0; 512]).map_err(|error| error.kind()) {
+                Ok(0) | Err(ErrorKind::ConnectionReset) => break,
+                Ok(_) => {}
+                Err(ErrorKind::WouldBlock | ErrorKind::TimedOut) => page.say("here 0"),
+                Err(other) => panic!("{other}"),
+            }
+            assert!(Instant::now() < end, "it is still there");
+        }
+    }
+    // A page stays, and others are served.
+    page.say("take r1 1");
+    assert!(page.line("answer 1").is_some());
+    assert_eq!(status(&panel.ask("/", &[("Host", &panel.host())])), 200);
+}

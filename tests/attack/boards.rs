@@ -1,0 +1,137 @@
+//! Boards on a bus of their own, and whether their motors run.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use lager_ports::{Bus, BusConfig};
+use lager_tests::{Cable, Domain, lager, pid, wait_for};
+use lager_topics::{Role, TruthPose};
+use rustix::process::{Signal, kill_process};
+
+/// Boards on a bus of their own, and the cable to the steering board.
+pub(crate) struct Boards {
+    bus: PathBuf,
+    process: Child,
+    pub(crate) watch: Watch,
+}
+
+/// A thread that looks at the motors.
+pub(crate) struct Watch {
+    over: Arc<AtomicBool>,
+    /// The longest time between the bridge's last word and a motor that runs, in ns.
+    unsteered_ns: Arc<AtomicU64>,
+    /// Whether a motor runs.
+    runs: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watch {
+    fn start(bus: &BusConfig, cable: &Arc<Cable>) -> Self {
+        let config = bus.clone();
+        let cable = Arc::clone(cable);
+        let over = Arc::new(AtomicBool::new(false));
+        let unsteered_ns = Arc::new(AtomicU64::new(0));
+        let runs = Arc::new(AtomicBool::new(false));
+        let (is_over, longest, is_running) = (
+            Arc::clone(&over),
+            Arc::clone(&unsteered_ns),
+            Arc::clone(&runs),
+        );
+        let thread = std::thread::spawn(move || {
+            let bus = Bus::open(&config, Role::Observer).expect("the boards' bus");
+            let mut truth = bus.subscriber::<TruthPose>().expect("a topic");
+            while !is_over.load(Ordering::Relaxed) {
+                // Before the sample: a word that comes in between cannot make a gap longer.
+                let spoken = cable.spoken_ns();
+                if let Some(truth) = truth.latest().expect("readable") {
+                    let runs = (truth.left_duty, truth.right_duty) != (0, 0);
+                    is_running.store(runs, Ordering::Relaxed);
+                    if runs {
+                        let since = truth.stamp().source_time_ns.saturating_sub(spoken);
+                        longest.fetch_max(since, Ordering::Relaxed);
+                    }
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        });
+        Self {
+            over,
+            unsteered_ns,
+            runs,
+            thread: Some(thread),
+        }
+    }
+
+    pub(crate) fn unsteered(&self) -> Duration {
+        Duration::from_nanos(self.unsteered_ns.load(Ordering::Relaxed))
+    }
+
+    pub(crate) fn runs(&self) -> bool {
+        self.runs.load(Ordering::Relaxed)
+    }
+}
+
+impl Boards {
+    /// Boards, and in `domain`'s folder the configuration of a robot that is wired to them.
+    pub(crate) fn start(domain: &Domain) -> Self {
+        let file = |name: &str| domain.folder().join(name);
+        let [sensor, steering, cable] = ["sensor.tty", "steering.tty", "cable.tty"].map(file);
+        let write = |name: &str, steering: &Path| {
+            let serial = format!("[serial]\nsensor = {sensor:?}\nsteering = {steering:?}\n");
+            fs::write(file(name), format!("body = \"serial\"\n{serial}")).expect("a configuration");
+        };
+        write("boards.toml", &steering);
+        write("robot.toml", &cable);
+        let name = format!("/dev/shm/lager-boards-{}", std::process::id());
+        let bus = PathBuf::from(name);
+        let process = Command::new(lager())
+            .arg("--bus")
+            .arg(&bus)
+            .arg("--config")
+            .arg(file("boards.toml"))
+            .arg("simulator")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(fs::File::create(file("boards.log")).expect("a log file"))
+            .spawn()
+            .expect("lager starts");
+        let cable = wait_for("the board's port", || {
+            steering
+                .exists()
+                .then(|| Arc::new(Cable::plug(&steering, &cable)))
+        });
+        let config = BusConfig {
+            folder: Some(bus.clone()),
+            ..BusConfig::default()
+        };
+        let watch = Watch::start(&config, &cable);
+        Self {
+            bus,
+            process,
+            watch,
+        }
+    }
+}
+
+impl Drop for Boards {
+    fn drop(&mut self) {
+        self.watch.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.watch.thread.take() {
+            let _ = thread.join();
+        }
+        let _ = kill_process(pid(self.process.id()), Signal::TERM);
+        let _ = self.process.wait();
+        let config = BusConfig {
+            folder: Some(self.bus.clone()),
+            ..BusConfig::default()
+        };
+        if let Ok(place) = config.place() {
+            place.remove();
+        }
+    }
+}
