@@ -22,6 +22,7 @@ const FIFO: u32 = 1;
 /// How a thread is scheduled.
 #[derive(Debug, PartialEq, Eq)]
 struct Scheduled {
+    name: String,
     policy: u32,
     priority: u32,
     cores: String,
@@ -40,12 +41,29 @@ fn threads(process: u32) -> Vec<Scheduled> {
             let fields: Vec<&str> = stat.rsplit(") ").next()?.split_whitespace().collect();
             let field = |number: usize| fields[number - 3].parse().ok();
             Some(Scheduled {
+                name: name_of(&task)?,
                 priority: field(40)?,
                 policy: field(41)?,
                 cores: status(&task, "Cpus_allowed_list")?,
             })
         })
         .collect()
+}
+
+/// The name of a thread.
+fn name_of(task: &Path) -> Option<String> {
+    let name = fs::read_to_string(task.join("comm")).ok()?;
+    Some(name.trim_end().to_owned())
+}
+
+/// How many steps a thread of a service stands behind the bridge's main loop: who is farther along
+/// the path goes first.
+fn behind(service: &str, name: &str) -> u32 {
+    match (service, name) {
+        ("bridge", "sensor-port" | "steering-port") => 2,
+        ("logic", "lager") => 1,
+        _ => 0,
+    }
 }
 
 /// One line of a `status` file.
@@ -173,14 +191,16 @@ fn up_gives_its_services_what_was_asked_for_and_their_successors_too() {
         for (place, (service, core)) in cores.iter().enumerate() {
             let process = at_work(&up, service, before[place]);
             before[place] = Some(process);
-            for thread in threads(process) {
-                let wanted = Scheduled {
-                    policy: FIFO,
-                    priority: 20,
-                    cores: (*core).clone(),
+            // A new thread takes its place first of all.
+            wait_for("each thread in its place", || {
+                let all = threads(process);
+                let is_placed = |thread: &Scheduled| {
+                    let place = (FIFO, 20 - behind(service, &thread.name), *core);
+                    (thread.policy, thread.priority, &thread.cores) == place
                 };
-                assert_eq!(thread, wanted, "{service} in life {life}");
-            }
+                println!("{service} in life {life}: {all:?}");
+                (all.len() >= 2 && all.iter().all(is_placed)).then_some(())
+            });
             let (mapped, locked) = bus_mappings(process);
             assert_eq!(mapped, locked, "{service} in life {life}");
             let folder = format!("/proc/{process}");
@@ -247,19 +267,25 @@ fn a_service_on_its_own_takes_the_same_flags() {
     let logic = domain.start(&["logic", "--realtime", "7", "--core", &last]);
     wait_for("logic", || (bus_mappings(logic.pid()).0 > 0).then_some(()));
     for thread in threads(logic.pid()) {
-        assert_eq!((thread.policy, thread.priority), (FIFO, 7));
+        let priority = 7 - behind("logic", &thread.name);
+        assert_eq!((thread.policy, thread.priority), (FIFO, priority));
         assert_eq!(thread.cores, last);
     }
     drop(logic);
     domain.assert_clean();
 }
 
-/// The time slice of each thread of a process, in ns; none where the kernel does not tell.
-fn slices(process: u32) -> Vec<u64> {
+/// The name and the time slice, in ns, of each thread of a process; none where the kernel does not
+/// tell.
+fn slices(process: u32) -> Vec<(String, u64)> {
     let slice = |task: std::io::Result<fs::DirEntry>| {
-        let told = fs::read_to_string(task.ok()?.path().join("sched")).ok()?;
+        let task = task.ok()?.path();
+        let told = fs::read_to_string(task.join("sched")).ok()?;
         let line = told.lines().find(|line| line.starts_with("se.slice"))?;
-        line.rsplit(':').next()?.trim().parse().ok()
+        Some((
+            name_of(&task)?,
+            line.rsplit(':').next()?.trim().parse().ok()?,
+        ))
     };
     let tasks = fs::read_dir(format!("/proc/{process}/task"));
     tasks.into_iter().flatten().filter_map(slice).collect()
@@ -280,11 +306,21 @@ fn the_path_has_short_time_slices_without_any_right_and_nobody_else_has() {
     let [bridge, logic] = ["bridge", "logic"].map(|service| at_work(&up, service, None));
     if slices_are_chosen() {
         let simulator = up.service("simulator").expect("a simulated robot");
-        let path = [slices(bridge), slices(logic)].concat();
         let others = [slices(up.pid()), slices(simulator)].concat();
-        assert_eq!(path.is_empty(), others.is_empty(), "told of some only");
-        assert!(path.iter().all(|slice| *slice == 100_000), "{path:?}");
-        assert!(others.iter().all(|slice| *slice > 100_000), "{others:?}");
+        for (service, process) in [("bridge", bridge), ("logic", logic)] {
+            wait_for("each thread to have its slices", || {
+                let all = slices(process);
+                println!("{service}: {all:?}");
+                assert_eq!(all.is_empty(), others.is_empty(), "told of some only");
+                let is_its =
+                    |(name, slice): &(String, u64)| *slice == 100_000 << behind(service, name);
+                all.iter().all(is_its).then_some(())
+            });
+        }
+        assert!(
+            others.iter().all(|(_, slice)| *slice > 400_000),
+            "{others:?}"
+        );
     }
     drop(up);
     domain.assert_clean();

@@ -175,8 +175,9 @@ impl<T: Topic> Loan<'_, T> {
         self.deliver(Clock::monotonic_ns(), To::Actors)
     }
 
-    /// Sends the sample without ringing: actors find it when they next look. For samples that no
-    /// actor has to act upon at once, so that no process is woken in vain.
+    /// Sends the sample without ringing: actors find it when another ring or their time-out wakes
+    /// them. For samples that no actor has to act upon at once, so that no process is woken in
+    /// vain.
     ///
     /// # Errors
     /// As [`Loan::send`].

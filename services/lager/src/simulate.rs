@@ -412,7 +412,7 @@ impl Whole {
     fn publish_state(&mut self) {
         let mut report = SteeringReport::default();
         self.bridge.fill_state(self.now, &mut report);
-        self.bridge.state_told();
+        self.bridge.state_told(&report);
         self.tell_logic(Input::Steering(&report));
     }
 

@@ -89,10 +89,21 @@ impl Board {
     /// Rings every waiter of `role`.
     #[inline]
     pub(crate) fn ring(&self, role: Role, reason: usize) {
+        self.each_of(role, |seat| word::ring(seat, reason));
+    }
+
+    /// Leaves every waiter of `role` a reason, without a ring.
+    #[inline]
+    pub(crate) fn leave(&self, role: Role, reason: usize) {
+        self.each_of(role, |seat| word::leave(seat, reason));
+    }
+
+    #[inline]
+    fn each_of(&self, role: Role, does: impl Fn(&Seat)) {
         // Relaxed: see `take` for a waiter that is taking its seat at this moment.
         let mut seats = self.callers_of(role).load(Ordering::Relaxed);
         while seats != 0 {
-            word::ring(self.seat(seats.trailing_zeros() as usize), reason);
+            does(self.seat(seats.trailing_zeros() as usize));
             seats &= seats - 1;
         }
     }

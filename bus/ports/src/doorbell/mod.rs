@@ -199,6 +199,12 @@ impl RoleRinger {
     pub(crate) fn ring(&self) {
         self.segment.ring(self.role, self.reason);
     }
+
+    /// Has every waiter of the role look when it is next awake. No system call.
+    #[inline]
+    pub(crate) fn leave(&self) {
+        self.segment.leave(self.role, self.reason);
+    }
 }
 
 /// A ringer of one bell, for the threads of its own process; clones ring the same bell. After the

@@ -75,11 +75,16 @@ pub(crate) fn ring(word: &impl Word, reason: usize) {
 pub(crate) fn count(word: &impl Word, reason: usize) -> bool {
     // The reason is stored with release ordering by itself, too: a waiter that another ring has
     // woken may take the reason before this ring's addition, and look because of it.
-    word.set_reason(reason, Ordering::Release);
+    leave(word, reason);
     word.fetch_add(ONE, Ordering::Release) & SLEEPING != 0
 }
 
-/// Whether it has been rung for `reason` since this was last asked.
+/// Leaves `reason` without ringing: the waiter finds it when it is next awake.
+pub(crate) fn leave(word: &impl Word, reason: usize) {
+    word.set_reason(reason, Ordering::Release);
+}
+
+/// Whether it has been rung for `reason`, or that was left, since this was last asked.
 pub(crate) fn rung_for(word: &impl Word, reason: usize) -> bool {
     word.take_reason(reason, Ordering::Acquire)
 }

@@ -38,7 +38,7 @@ ends_here!(StandardListeners);
 pub(crate) enum To {
     /// First the actors, who are rung, then everybody else.
     All,
-    /// The same without the ring.
+    /// The same, but the actors are not rung: they look when they are next awake.
     AllQuietly,
     /// The actors, who are rung. Everybody else gets it when the writer is asked to catch up, sends
     /// again or ends.
@@ -119,9 +119,10 @@ impl Writer {
             copies.take(&stamp, lent.payload());
         }
         let sent = lent.send(stamp);
-        if to != To::AllQuietly {
-            for ringer in &self.ringers {
-                ringer.ring();
+        for ringer in &self.ringers {
+            match to {
+                To::All | To::Actors => ringer.ring(),
+                To::AllQuietly => ringer.leave(),
             }
         }
         self.behind.set(true);

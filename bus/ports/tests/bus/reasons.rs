@@ -45,7 +45,27 @@ fn a_waiter_is_told_which_topics_it_is_rung_for() {
 }
 
 #[test]
-fn a_sample_that_came_without_a_ring_is_found_among_rings_for_others() {
+fn a_sample_that_was_sent_quietly_wakes_nobody_and_is_found_at_the_next_ring() {
+    let domain = Domain::new();
+    let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::Block).unwrap();
+    let bridge = domain.open(Role::Bridge);
+    let line = bridge.publisher::<SensorLine>().unwrap();
+    let health = bridge.publisher::<LinkHealth>().unwrap();
+    let mut subscriber = logic.subscriber::<LinkHealth>().unwrap();
+    send(&line, 0);
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    assert!(!waiter.has::<LinkHealth>());
+    health.loan().unwrap().send_quietly().unwrap();
+    assert_eq!(waiter.wait(Duration::from_millis(20)), Wake::TimedOut);
+    send(&line, 1);
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    assert!(waiter.has::<LinkHealth>());
+    assert!(subscriber.receive().unwrap().is_some());
+}
+
+#[test]
+fn a_sample_of_somebody_who_knows_of_no_bells_is_found_among_rings_for_others() {
     let domain = Domain::new();
     let logic = domain.open(Role::Logic);
     let waiter = logic.waiter(Policy::Block).unwrap();
@@ -54,7 +74,11 @@ fn a_sample_that_came_without_a_ring_is_found_among_rings_for_others() {
     let health = bridge.publisher::<LinkHealth>().unwrap();
     let mut subscriber = logic.subscriber::<LinkHealth>().unwrap();
     health.loan().unwrap().send_quietly().unwrap();
-    let found = (0..100).position(|number| {
+    // The reason that it has left is gone, as if it had never been.
+    send(&line, 0);
+    assert_eq!(waiter.wait(LONG), Wake::Rung);
+    assert!(waiter.has::<LinkHealth>());
+    let found = (1..100).position(|number| {
         send(&line, number);
         assert_eq!(waiter.wait(LONG), Wake::Rung);
         waiter.has::<LinkHealth>() && subscriber.receive().unwrap().is_some()

@@ -38,7 +38,7 @@ use core::time::Duration;
 
 use heapless::Deque;
 use lager_ports::Stop;
-use lager_topics::{Health, Mode, Outcome, Refusal, SteeringOrder, StopCause};
+use lager_topics::{Health, Mode, Outcome, Refusal, SteeringOrder, SteeringReport, StopCause};
 use lager_wire::link::HostTransmitter;
 use lager_wire::{
     ArmProfile, Callsign, Command, PACKET_LENGTH, Payload, Setting, SettingKey, SteerData, Version,
@@ -179,6 +179,8 @@ struct Told {
     setpoint: bool,
     /// `steering/state` has shown the last report.
     report: bool,
+    /// All that it has shown.
+    shown: SteeringReport,
 }
 
 /// How long a packet takes on the wire at `baud`: ten bits a byte.
@@ -233,6 +235,7 @@ impl BridgeCore {
                 mover: None,
                 setpoint: false,
                 report: false,
+                shown: SteeringReport::default(),
             },
             health_due: Duration::ZERO,
             arbiter,

@@ -78,8 +78,16 @@ impl BridgeCore {
         *state = steering_report(epoch, &data, age_ms, &self.servos, &self.arbiter);
     }
 
-    /// `steering/state` has been published.
-    pub fn state_told(&mut self) {
+    /// Whether this `steering/state` says something new to those who act upon it. While the robot
+    /// stands, most reports say only once more how the board sees its line, battery and loads.
+    pub fn is_news(&self, state: &SteeringReport) -> bool {
+        let stands = (state.left_duty, state.right_duty) == (0, 0);
+        !stands || without_measurements(state) != without_measurements(&self.told.shown)
+    }
+
+    /// This `steering/state` has been published.
+    pub fn state_told(&mut self, shown: &SteeringReport) {
+        self.told.shown = *shown;
         self.told.report = true;
         self.told.state = self.arbiter.revision();
         self.told.end = self.arbiter.last_ended();
@@ -89,5 +97,18 @@ impl BridgeCore {
         self.health_due = now.robot + HEALTH_PERIOD;
         let rings = self.told.mover != Some(self.who_may_move());
         Action::PublishHealth { rings }
+    }
+}
+
+/// A report without what a board measures again and again, and without its age, as long as it has
+/// one.
+fn without_measurements(report: &SteeringReport) -> SteeringReport {
+    let is_unheard = report.age_ms == SteeringReport::NEVER_HEARD;
+    SteeringReport {
+        line_error: 0,
+        battery_decivolts: 0,
+        age_ms: if is_unheard { report.age_ms } else { 0 },
+        servo_load: [0; 8],
+        ..*report
     }
 }

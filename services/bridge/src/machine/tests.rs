@@ -2,7 +2,8 @@
 
 use lager_ports::Stop;
 use lager_topics::{
-    ArmProfileState, Ask, AskKind, Mode, Origin, Outcome, Role, SteeringOrder, StopCause,
+    ArmProfileState, Ask, AskKind, Mode, Origin, Outcome, Role, SteeringOrder, SteeringReport,
+    StopCause,
 };
 use lager_wire::link::Up;
 use lager_wire::{
@@ -44,22 +45,24 @@ fn core() -> BridgeCore {
     let version = Version::One;
     core.port(at(1_000), STEERING, PortEvent::SendAck { version, up });
     turn(&mut core, 1_000);
-    report(&mut core, 1_001);
+    report(&mut core, 1_001, IDLE);
     turn(&mut core, 1_001);
     core
 }
 
-fn report(core: &mut BridgeCore, millis: u64) {
-    let data = SteerData {
-        code: 0,
-        left_duty: 0,
-        right_duty: 0,
-        flags: SteerFlags::NONE,
-        line_error: 0,
-        finished_seq: 0,
-        servo_errors: 0,
-        battery_decivolts: 0,
-    };
+/// What a steering board reports that does nothing.
+const IDLE: SteerData = SteerData {
+    code: 0,
+    left_duty: 0,
+    right_duty: 0,
+    flags: SteerFlags::NONE,
+    line_error: 0,
+    finished_seq: 0,
+    servo_errors: 0,
+    battery_decivolts: 0,
+};
+
+fn report(core: &mut BridgeCore, millis: u64, data: SteerData) {
     let at = at(millis);
     core.port(at, STEERING, PortEvent::Steer { data, at });
 }
@@ -80,8 +83,14 @@ fn step(core: &mut BridgeCore, millis: u64) -> Option<(&'static str, Option<u8>)
             ("health", None)
         }
         Action::PublishState { .. } => {
-            core.state_told();
-            ("state", None)
+            let mut shown = SteeringReport::default();
+            core.fill_state(at(millis).robot, &mut shown);
+            let what = match core.is_news(&shown) {
+                true => "state",
+                false => "same state",
+            };
+            core.state_told(&shown);
+            (what, None)
         }
         Action::Discard { .. } => ("discard", None),
         Action::ShowReport(shown) if shown.proves_rest => ("at rest", None),
@@ -144,7 +153,7 @@ fn a_stop_in_the_middle_of_a_turn_overtakes_what_the_turn_decided() {
     // Two reports of wheels at rest, read late enough after the standby, prove that they are.
     let mut shown = Vec::new();
     for millis in [1_004, 1_008, 1_013] {
-        report(&mut core, millis);
+        report(&mut core, millis, IDLE);
         shown.extend(step(&mut core, millis));
         turn(&mut core, millis);
     }
@@ -254,4 +263,54 @@ fn a_release_that_was_asked_for_before_a_stop_does_not_end_it() {
     core.ask(at(2_002), &resume(2_002));
     let did = turn(&mut core, 2_002);
     assert!(did.contains(&("release", None)), "{did:?}");
+}
+
+#[test]
+fn a_report_rings_if_the_robot_moves_or_does_something_else() {
+    let mut core = core();
+    let mut rings = |millis: u64, data: SteerData| {
+        report(&mut core, millis, data);
+        let told = turn(&mut core, millis);
+        let states = told.iter().map(|(what, _)| *what);
+        let states: Vec<_> = states.filter(|what| what.ends_with("state")).collect();
+        match states[..] {
+            ["state"] => true,
+            ["same state"] => false,
+            _ => panic!("not one state: {told:?}"),
+        }
+    };
+    assert!(!rings(1_006, IDLE));
+    assert!(!rings(
+        1_011,
+        SteerData {
+            line_error: 3,
+            ..IDLE
+        }
+    ));
+    assert!(!rings(
+        1_016,
+        SteerData {
+            battery_decivolts: 111,
+            ..IDLE
+        }
+    ));
+    assert!(rings(
+        1_021,
+        SteerData {
+            servo_errors: 1,
+            ..IDLE
+        }
+    ));
+    assert!(rings(1_026, SteerData { code: 1, ..IDLE }));
+    for millis in [1_031, 1_036] {
+        assert!(rings(
+            millis,
+            SteerData {
+                right_duty: 1,
+                ..IDLE
+            }
+        ));
+    }
+    assert!(rings(1_041, IDLE), "it has come to rest");
+    assert!(!rings(1_046, IDLE));
 }

@@ -146,10 +146,16 @@ impl Service<'_> {
         let sent = self.state.loan().and_then(|mut loan| {
             self.core.fill_state(now.robot, &mut loan);
             loan.cause(report_ns.map_or(Cause::OWN, Cause::event));
-            loan.send()
+            let shown = *loan;
+            if self.core.is_news(&shown) {
+                loan.send()?;
+            } else {
+                loan.send_quietly()?;
+            }
+            Ok(shown)
         });
         match sent {
-            Ok(()) => self.core.state_told(),
+            Ok(shown) => self.core.state_told(&shown),
             Err(error) => self.complain(&error),
         }
     }

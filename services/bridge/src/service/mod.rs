@@ -113,6 +113,7 @@ pub fn run_with(
             std::thread::Builder::new()
                 .name(["sensor-port", "steering-port"][place].to_owned())
                 .spawn_scoped(scope, move || {
+                    (config.begin_to_read)();
                     Reader::new(place, port, bus, events, ringer, (counts, end)).run();
                 })
                 .map_err(|error| PortError::Transport {
