@@ -40,7 +40,7 @@ use crate::steer::Place;
   lager up --headless --mission 1 --exit-when-done --json
   lager up --sensor /dev/ttyUSB0 --steering /dev/ttyUSB1
   lager up --body chip                         the boards' real images in an emulator
-  lager up --realtime 20 --lock-memory --core bridge=1 --core logic=1
+  lager up --realtime 20 --lock-memory --core 1
   lager simulate --seeds 1..20 --warehouse large --mission 1,2 --obstacles 4
   lager topic echo link/health
   lager bag record
@@ -322,7 +322,7 @@ pub enum ModeName {
   lager up --body chip                                    their images in an emulator
   lager up --station 192.168.1.5:7420                     another machine is the external computer
   lager up --metrics                                      figures for Prometheus
-  lager up --realtime 20 --lock-memory --core bridge=1 --core logic=1
+  lager up --realtime 20 --lock-memory --core 1
 
 Real time is for bridge and logic, the services between sensor and steering, and
 for those that take their place after a crash. The supervisor keeps the normal
@@ -330,9 +330,11 @@ priority, and so does a simulated or emulated body, which stands for boards with
 processors of their own. What is not granted is an error (5) that says how to get
 it; `lager doctor` with the same flags tries it beforehand.
 
-On one core bridge and logic wake each other sooner than across two, of which one
-has to be woken from its rest. With waiting = \"adaptive\" or \"spin\" in [bus] each of
-them needs a core of its own instead.")]
+Whoever is farther along the path goes first: the bridge's main loop has the
+priority, logic one below, and the threads that read the ports two below. On one
+core (--core 1 binds bridge and logic to core 1) they wake each other sooner than
+across two, of which one has to be woken from its rest. With waiting = \"adaptive\"
+or \"spin\" in [bus] each needs a core of its own instead, and all have the priority.")]
 pub struct UpArgs {
     /// What to drive [default: sim]
     #[arg(long, help_heading = "Body")]

@@ -57,8 +57,9 @@ waiting = {waiting}
 longest_spin_us = {longest_spin_us}
 
 [realtime]
-# Priority of bridge and logic under SCHED_FIFO, 1 to 99; 0 is the normal scheduler. Above 49 they
-# would go before the interrupt threads that bring the boards' bytes on a PREEMPT_RT kernel.
+# Priority of the bridge under SCHED_FIFO, 1 to 99; 0 is the normal scheduler. Logic gets one less
+# and the bridge's readers two, 1 at the least, unless they wait by spinning. Above 49 they would go
+# before the interrupt threads that bring the boards' bytes on a PREEMPT_RT kernel.
 # Needs LimitRTPRIO= in the systemd unit, `ulimit -r`, or CAP_SYS_NICE: `lager doctor` tries it.
 priority = {priority}
 # Keep all memory of bridge and logic from being paged out (mlockall): some 40 MiB each,
