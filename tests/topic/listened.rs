@@ -102,7 +102,7 @@ impl Drop for Listeners {
 /// Binds bridge and logic to one core: the last, as most interrupts come to the first.
 fn on_one_core() -> String {
     let core = *usable_cores().last().expect("a core");
-    format!("--core bridge={core} --core logic={core}")
+    format!("--core {core}")
 }
 
 #[test]

@@ -111,7 +111,7 @@ impl SteerFlags {
 }
 
 /// The steering board's report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SteerData {
     /// The firmware code being executed; 0 before the first.
     pub code: u8,

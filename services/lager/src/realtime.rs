@@ -2,7 +2,8 @@
 //! the services on the path ask for short time slices.
 //!
 //! Everything is asked for before the process starts its first thread, so that every thread
-//! inherits it. A process that asks for real time and does not get it ends with an error that says
+//! inherits it; then a thread of the path lets those go first that come after it
+//! ([`begin_to_read`]). A process that asks for real time and does not get it ends with an error that says
 //! how to get it (exit code 5); it never runs slower than its user believes. The supervisor tries
 //! everything out before it starts any service, in a thread that ends at once
 //! ([`Wanted::rehearse`]); it never becomes real-time itself. Spinning with a real-time priority on

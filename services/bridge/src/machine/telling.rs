@@ -5,7 +5,7 @@
 use core::time::Duration;
 
 use lager_topics::{Health, Role, SteeringReport};
-use lager_wire::{Callsign, SteerData, SteerFlags, Version};
+use lager_wire::{Callsign, SteerData, Version};
 
 use super::action::Action;
 use super::{BridgeCore, HEALTH_PERIOD};
@@ -55,13 +55,7 @@ impl BridgeCore {
                 .arbiter
                 .current()
                 .map_or(0, |(_, command)| command.code()),
-            left_duty: 0,
-            right_duty: 0,
-            flags: SteerFlags::NONE,
-            line_error: 0,
-            finished_seq: 0,
-            servo_errors: 0,
-            battery_decivolts: 0,
+            ..SteerData::default()
         };
         let (data, age_ms) = match (self.report, self.boards.version(Callsign::Steering)) {
             (Some((data, read)), _) => {

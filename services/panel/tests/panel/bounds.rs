@@ -1,4 +1,4 @@
-//! What a page says or leaves unsaid harms nobody else.
+//! What a page says or leaves unsaid harms nobody else, and the warehouse it describes is for all.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
