@@ -47,8 +47,8 @@ pub(crate) use services::PROCESSES;
 const TURNS: [usize; 2] = [2, 8];
 
 /// SCHED_FIFO priorities: the boards are hardware, so nothing of the robot comes before them.
-const SERVICES: i32 = 40;
-const BOARDS: i32 = 50;
+const SERVICES: u8 = 40;
+const BOARDS: u8 = 50;
 
 /// What is measured with nobody watching, and the number of observers: 0.
 const ALONE: [(Entry, usize); 3] = [

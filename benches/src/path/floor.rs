@@ -6,15 +6,15 @@
 //!       ends, reading thread           middle                   ends, main thread
 //! ```
 //!
-//! It has as many processes, threads, wake-ups and bytes as the robot, in the same places and on
-//! the same cores, but no packets, no decision and no bus. The time that a robot takes beyond this
+//! It has as many processes, threads, wake-ups and bytes as the robot, in the same places, on the
+//! same cores and in the same order of who goes first, but no packets, no decision and no bus. The time that a robot takes beyond this
 //! is its software's.
 
 use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};
 use std::path::PathBuf;
 
-use lager_ports::Clock;
+use lager_ports::{Clock, Policy, urgency};
 use lager_rig::process::Main;
 use lager_rig::schedule::Place;
 use lager_rig::{Cable, Parent, Shareable, Shared};
@@ -91,6 +91,7 @@ fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     let [first, second] = &lanes.0;
     std::thread::scope(|scope| {
         scope.spawn(|| {
+            urgency::step_back(2, Policy::Block);
             let mut bytes = Bytes::default();
             while read_whole(&sensor, &mut bytes).is_ok() && put(first, &bytes).is_ok() {}
         });
@@ -104,6 +105,7 @@ fn ends(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
 
 fn middle(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     let (_, lanes) = told(parent)?;
+    urgency::step_back(1, Policy::Block);
     parent.say(&())?;
     let [first, second] = &lanes.0;
     let mut seen = 0;

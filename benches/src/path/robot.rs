@@ -58,7 +58,7 @@ pub(super) struct Robot {
     /// While frames are counted, if the boards are to come before everything else. The first to
     /// go: nobody tears down a robot before the rest of the machine may run.
     urgent: Option<RealTime>,
-    boards_priority: Option<i32>,
+    boards_priority: Option<u8>,
     name: &'static str,
     // The processes end first and the bus's files go last.
     processes: Processes,
@@ -83,7 +83,7 @@ pub(super) struct Robot {
 pub(super) struct Places {
     pub(super) bridge: Place,
     pub(super) logic: Place,
-    pub(super) boards: Option<i32>,
+    pub(super) boards: Option<u8>,
 }
 
 impl Robot {

@@ -47,10 +47,12 @@ impl Setup {
     }
 }
 
-/// What the parent says, and the bus; the process has taken its place.
+/// What the parent says, and the bus; a service has taken its place.
 fn told(parent: &mut Parent, role: Role) -> Result<(Setup, Bus), Box<dyn Error>> {
     let setup: Setup = parent.told()?;
-    setup.place.take()?;
+    if role != Role::Observer {
+        setup.place.take()?;
+    }
     let bus = setup.open(role)?;
     Ok((setup, bus))
 }

@@ -79,6 +79,7 @@ mod subscriber;
 mod sweep;
 mod transport;
 mod untyped;
+pub mod urgency;
 mod waiter;
 mod watch;
 mod watchdog;

@@ -21,6 +21,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::shutdown::Shutdown;
+use crate::urgency;
 
 /// How often the watch looks while something may hang.
 const TICK: Duration = Duration::from_millis(50);
@@ -129,6 +130,7 @@ impl Watchdog {
 
     /// Looks until there is a reason to give up.
     fn watch(&self, mut watch: Watch, shutdown: &Shutdown) -> GivenUp {
+        urgency::wake_with_others(TICK);
         let mut looked = Instant::now();
         loop {
             std::thread::sleep(watch.tick());

@@ -30,8 +30,6 @@ pub struct BridgeConfig {
     pub buttons: Option<ButtonsConfig>,
     /// How to wait for orders and reports.
     pub waiting: Policy,
-    /// What each thread that reads a port does first.
-    pub begin_to_read: fn(),
 }
 
 impl Default for BridgeConfig {
@@ -48,7 +46,6 @@ impl Default for BridgeConfig {
             arm: ArmProfile::default(),
             buttons: None,
             waiting: Policy::default(),
-            begin_to_read: || (),
         }
     }
 }

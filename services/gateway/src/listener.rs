@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
     Bus, BusWatch, Clock, Found, Layout, Look, PortError, ReceiveError, Shutdown, Source,
-    Subscriber, Watchdog,
+    Subscriber, Watchdog, urgency,
 };
 use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
 use serde::Serialize;
@@ -48,6 +48,9 @@ pub(crate) fn listen(
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
     let pace = if viewer.is_some() { VIEWED } else { COUNTED };
+    if viewer.is_none() {
+        urgency::wake_with_others(pace);
+    }
     let mut listener = Listener {
         bus,
         watchdog,

@@ -61,7 +61,7 @@ use crate::cli::{
     Button, Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs,
     TopicArgs, TopicCommand,
 };
-use crate::config::{ChipSection, Config, Waiting};
+use crate::config::{ChipSection, Config};
 use crate::patience::Patience;
 use crate::steer::{Obstacle, Operator};
 use crate::voice::Speaker;
@@ -145,10 +145,6 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     arm: config.arm,
                     buttons: config.buttons.lines(),
                     waiting: config.bus.policy(),
-                    begin_to_read: match config.bus.waiting {
-                        Waiting::Block => realtime::begin_to_read,
-                        Waiting::Adaptive | Waiting::Spin => || (),
-                    },
                     resume,
                 };
                 Ok(lager_bridge::run(bus, &bridge, &shutdown)?)
@@ -161,9 +157,6 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
                     resume,
                     ..config.navigator()
                 };
-                if config.bus.waiting == Waiting::Block {
-                    realtime::begin_to_decide();
-                }
                 Ok(lager_logic::run(bus, &logic, &shutdown)?)
             })?;
             return Ok(ExitCode::SUCCESS);

@@ -3,9 +3,9 @@
 //!
 //! Everything is asked for before the process starts its first thread, so that every thread
 //! inherits it; then a thread of the path lets those go first that come after it
-//! ([`begin_to_read`]). A process that asks for real time and does not get it ends with an error that says
-//! how to get it (exit code 5); it never runs slower than its user believes. The supervisor tries
-//! everything out before it starts any service, in a thread that ends at once
+//! ([`urgency::step_back`]). A process that asks for real time and does not get it ends with an
+//! error that says how to get it (exit code 5); it never runs slower than its user believes. The
+//! supervisor tries everything out before it starts any service, in a thread that ends at once
 //! ([`Wanted::rehearse`]); it never becomes real-time itself. Spinning with a real-time priority on
 //! as many cores as the machine has is refused, since it can hang the machine.
 
@@ -16,8 +16,8 @@ mod kernel;
 use std::fs;
 use std::io;
 use std::path::Path;
-use std::time::Duration;
 
+use lager_ports::urgency;
 use rustix::io::Errno;
 use rustix::process::Resource;
 
@@ -31,38 +31,6 @@ pub const HIGHEST_PRIORITY: u8 = 99;
 /// them the program's file, and less than 1 MiB more with 64 observers; the rest is reserve for
 /// programs and topics that grow.
 pub const LOCKED_AT_MOST: usize = 64 << 20;
-
-/// How long a time slice is for a service on the path where it has no priority: the shortest that
-/// Linux gives. Whoever has shorter slices gets a core sooner when it wakes, from whoever has
-/// longer ones; the default was 1.4 ms where this was measured. In runs that stopped and continued
-/// 64 observers every few seconds, on two cores, the path's p99 beside them was 99 us instead of
-/// 140, and on a noisier day 1.31 times what it was without them instead of 1.52 times (2026-11-25).
-const SLICE: Duration = Duration::from_micros(100);
-
-/// Has the calling thread, one of the bridge's that read a port, let logic and the bridge's main
-/// loop go first. For services that sleep while they wait, and have taken what they
-/// [want](Wanted): whoever spins would keep the threads behind it from their core.
-///
-/// Whoever is farther along the path goes first, so a ring for logic takes the core from the reader
-/// that rang, which has nothing left to do but to serve observers and to wait. With bridge and
-/// logic on one core under `SCHED_FIFO`, alone and beside 63 observers, the path's p50 was 15 and
-/// 14 us instead of 27 and 32, p99 53 and 58 us instead of 72 and 94; under the normal scheduler
-/// p50 was 21 and 20 us instead of 29 and 33 (blocks of 16 s, one or two of each, 2026-11-26).
-pub fn begin_to_read() {
-    step_back(2);
-}
-
-/// Has the calling thread, logic's, let the bridge's main loop go first, likewise.
-pub fn begin_to_decide() {
-    step_back(1);
-}
-
-fn step_back(steps: u8) {
-    // A sandbox may forbid the call; the path is then as it is with one priority for all.
-    if let Err(error) = kernel::step_back(steps) {
-        tracing::debug!("not {steps} steps behind others: {error}");
-    }
-}
 
 /// What one process wants of the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -151,7 +119,7 @@ impl Wanted {
         // A sandbox may forbid the call; the path is then as it is with longer slices.
         if self.short_slices
             && self.priority == 0
-            && let Err(error) = kernel::set_slice(SLICE)
+            && let Err(error) = urgency::shorten_slices()
         {
             tracing::debug!("no shorter time slices: {error}");
         }
@@ -163,7 +131,7 @@ impl Wanted {
             return Ok(());
         }
         let allowed = kernel::whole_limit(Resource::Rtprio);
-        kernel::set_fifo(priority).map_err(|error| {
+        urgency::set_fifo(priority).map_err(|error| {
             let within = allowed.is_none_or(|allowed| u64::from(priority) <= allowed);
             if !is(&error, Errno::PERM) {
                 RealtimeError::Priority { priority, error }

@@ -7,7 +7,7 @@
 //! never lost. Only a setpoint that replaces a setpoint goes out before the status, because giving
 //! it twice has the effect of giving it once. The successor may not know its number, so it leaves
 //! one number out when it takes up a status. An unchanged order is renewed every 40 ms of robot
-//! time.
+//! time, with the frame before that moment if there is one.
 //!
 //! A turn takes one decision for each sample and, only if there was none, one for the time that
 //! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`), and
@@ -26,7 +26,7 @@ use core::time::Duration;
 
 use lager_ports::{
     Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, SendError, Shutdown, Subscriber,
-    Waiter,
+    Waiter, urgency,
 };
 use lager_topics::{
     InputKind, LatencyPath, LinkHealth, LogThought, MissionEvent, MissionOrder, MissionQueue, Mode,
@@ -48,6 +48,11 @@ const RENEWAL: Duration = Duration::from_millis(40);
 
 /// How often `nav/status` is published when nothing changes, in robot time.
 const STATUS_PERIOD: Duration = Duration::from_millis(50);
+
+/// How often the sensor board sees the line, in robot time. What falls due before the next frame is
+/// done with this one: no timer has to wake logic for it, least of all in the middle of a frame's
+/// way.
+const FRAME_PERIOD: Duration = Duration::from_millis(5);
 
 /// Longest wait for anything, in real time: a wake can be missed, and the shutdown flag is looked
 /// at that often.
@@ -76,6 +81,8 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
         }
         false => None,
     };
+    // The bridge's main loop is farther along the path.
+    urgency::step_back(1, config.waiting);
     let mut shell = Shell::new(bus, config, &Beginning::new(config, kept))?;
     shutdown.wake(shell.waiter.ringer()?);
     shell.publish_blocks(Cause::OWN);
@@ -202,11 +209,17 @@ impl Shell {
         self.take_states();
         self.take_wishes();
         self.take_senses();
-        if self.decisions == decisions {
+        let is_idle = self.decisions == decisions;
+        if is_idle {
             self.tell(Input::Tick, Cause::OWN, self.clock.now());
         }
         let now_ns = Clock::monotonic_ns();
-        self.keep_time(self.clock.at(now_ns));
+        let ahead = if is_idle {
+            Duration::ZERO
+        } else {
+            FRAME_PERIOD
+        };
+        self.keep_time(self.clock.at(now_ns), ahead);
         self.tell_latency(now_ns);
         let kept = self.journal.keep_time();
         self.check(kept);
@@ -388,12 +401,12 @@ impl Shell {
         self.check(told);
     }
 
-    /// Does what is due by the clock.
-    fn keep_time(&mut self, now: Duration) {
-        if now >= self.status_due {
+    /// Does what is due by the clock, or so soon.
+    fn keep_time(&mut self, now: Duration, ahead: Duration) {
+        if now + ahead >= self.status_due {
             self.repeat_status(now);
         }
-        if now >= self.renewal_due {
+        if now + ahead >= self.renewal_due {
             self.give_order(now, self.rests_on);
             if self.sent_order.is_some() {
                 self.tell_again(now, ToldKind::Renewed);

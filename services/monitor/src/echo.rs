@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::time::Instant;
 
-use lager_ports::{Clock, Source};
+use lager_ports::{Clock, Source, urgency};
 use lager_topics::{Description, Stamp, Topic, TopicVisitor, by_id, visit};
 use serde_json::{Value, json};
 
@@ -91,6 +91,7 @@ impl<W: Write> Tools<'_, W> {
         let (mut shown, mut lost) = (0, 0);
         let began = Instant::now();
         let mut heard = began;
+        urgency::wake_with_others(POLL);
         while !self.shutdown.is_requested() && !config.limits.are_reached(began, shown) {
             let Some((stamp, payload)) = self.receive(&mut from, Shown)? else {
                 self.out.flush()?;

@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Source};
+use lager_ports::{Clock, Source, urgency};
 use lager_topics::{Stamp, Topic, TopicVisitor, visit};
 use serde_json::{Value, json};
 
@@ -130,6 +130,9 @@ impl<W: Write> Tools<'_, W> {
         let (mut total, mut lost, mut is_over) = (0, 0, false);
         let mut heard = began;
         let mut wait = plan.pace.first();
+        if plan.pace == Pace::AsTheQueueAllows {
+            urgency::wake_with_others(2 * POLL);
+        }
         if !self.as_json && !plan.head.is_empty() {
             writeln!(self.out, "{}", plan.head)?;
         }

@@ -3,6 +3,7 @@
 use core::error::Error;
 use core::marker::PhantomData;
 
+use lager_ports::urgency;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
@@ -39,8 +40,8 @@ impl RealTime {
     ///
     /// # Errors
     /// The user may not.
-    pub fn begin(priority: i32) -> Result<Self, NoRealTime> {
-        schedule(libc::SCHED_FIFO, priority).map_err(NoRealTime)?;
+    pub fn begin(priority: u8) -> Result<Self, NoRealTime> {
+        urgency::set_fifo(priority).map_err(NoRealTime)?;
         Ok(Self {
             _in_its_thread: PhantomData,
         })
@@ -54,13 +55,13 @@ impl Drop for RealTime {
     }
 }
 
-/// Where and how urgently a process runs.
+/// Where a process of the path runs, and how urgently.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Place {
     /// The core it is bound to; `None` = any.
     pub core: Option<usize>,
-    /// Its SCHED_FIFO priority; `None` = as any process.
-    pub priority: Option<i32>,
+    /// Its SCHED_FIFO priority; `None` = under the normal scheduler, with short slices.
+    pub priority: Option<u8>,
 }
 
 impl Place {
@@ -72,8 +73,9 @@ impl Place {
         if let Some(core) = self.core {
             pin(core)?;
         }
-        if let Some(priority) = self.priority {
-            core::mem::forget(RealTime::begin(priority)?);
+        match self.priority {
+            Some(priority) => core::mem::forget(RealTime::begin(priority)?),
+            None => urgency::shorten_slices()?,
         }
         Ok(())
     }

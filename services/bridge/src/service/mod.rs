@@ -26,7 +26,7 @@ use std::time::Duration;
 use heapless::spsc::{Consumer, Queue};
 use lager_ports::{
     Bus, Cause, Clock, PortError, Publisher, ReceiveError, Sample, Server, Shutdown, StopPage,
-    Subscriber, Waiter,
+    Subscriber, Waiter, urgency,
 };
 use lager_topics::{
     Answer, Ask, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth, Mode,
@@ -113,7 +113,8 @@ pub fn run_with(
             std::thread::Builder::new()
                 .name(["sensor-port", "steering-port"][place].to_owned())
                 .spawn_scoped(scope, move || {
-                    (config.begin_to_read)();
+                    // Logic and the main loop are farther along the path.
+                    urgency::step_back(2, config.waiting);
                     Reader::new(place, port, bus, events, ringer, (counts, end)).run();
                 })
                 .map_err(|error| PortError::Transport {

@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Shutdown};
+use lager_ports::{Clock, Shutdown, urgency};
 use lager_topics::{
     LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic,
 };
@@ -59,6 +59,7 @@ impl<W: Write> Tools<'_, W> {
     pub fn top(&mut self, config: &TopConfig) -> Result<(), ToolError> {
         let mut model = Model::new(self.bus.robot().as_str());
         model.view.filter.clone_from(&config.filter);
+        urgency::wake_with_others(POLL);
         let mut feed = Feed::new(self.bus, self.watchdog)?;
         feed.look(&mut model)?;
         model.end_window(Clock::monotonic_ns());
