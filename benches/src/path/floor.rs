@@ -7,8 +7,8 @@
 //! ```
 //!
 //! It has as many processes, threads, wake-ups and bytes as the robot, in the same places, on the
-//! same cores and in the same order of who goes first, but no packets, no decision and no bus. The time that a robot takes beyond this
-//! is its software's.
+//! same cores and in the same order of who goes first, but no packets, no decision and no bus. The
+//! time that a robot takes beyond this is its software's.
 
 use std::error::Error;
 use std::os::fd::{OwnedFd, RawFd};

@@ -75,7 +75,8 @@ impl Place {
         }
         match self.priority {
             Some(priority) => core::mem::forget(RealTime::begin(priority)?),
-            None => urgency::shorten_slices()?,
+            // Where a sandbox forbids it, none of those that are compared has them.
+            None => drop(urgency::shorten_slices()),
         }
         Ok(())
     }
