@@ -81,7 +81,7 @@ pub(crate) fn kept_awake(regime: Regime) -> Result<Vec<Process>, BenchError> {
 /// 4 us (`lager_ports::Waiter`), and lost its core to this process until then.
 fn keep_from_halting(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
     pin(parent.told()?)?;
-    schedule(libc::SCHED_IDLE, 0).map_err(Refused::to_make("a process of the lowest priority"))?;
+    schedule(libc::SCHED_IDLE).map_err(Refused::to_make("a process of the lowest priority"))?;
     parent.say(&())?;
     loop {
         core::hint::spin_loop();

@@ -232,6 +232,27 @@ fn a_renewal_carries_the_newest_frame() {
 }
 
 #[test]
+fn a_renewal_does_not_wait_for_its_own_time_when_a_frame_comes_shortly_before() {
+    let domain = domain();
+    let bus = domain.open(Role::Supervisor);
+    let mut world = World::new(&bus);
+    with_logic(&domain, false, || {
+        // Alone a renewal is due after 40 ms, and not a moment sooner.
+        let is_early = |pair: &[(SteeringOrder, Stamp)]| {
+            let [(before, first), (order, second)] = pair else {
+                return false;
+            };
+            let apart = second.publish_time_ns - first.publish_time_ns;
+            order.id == before.id && (30_000_000..39_000_000).contains(&apart)
+        };
+        world.until("a frame takes a renewal along", false, |world| {
+            let given = world.given.iter().copied().zip(world.stamps.clone());
+            given.collect::<Vec<_>>().windows(2).any(is_early)
+        });
+    });
+}
+
+#[test]
 fn a_latched_stop_silences_logic_until_the_resume() {
     let domain = domain();
     let bus = domain.open(Role::Supervisor);

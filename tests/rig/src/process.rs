@@ -421,7 +421,7 @@ impl Drop for Process {
         // Linux waits, without giving its core away, for whoever reads in /proc of a process that
         // it takes down: a process of real time that keeps a less urgent one from that core would
         // never end.
-        let _ = schedule(libc::SCHED_OTHER, 0);
+        let _ = schedule(libc::SCHED_OTHER);
         // It may have ended already, which is as good.
         let _ = self.child.kill();
         let _ = self.child.wait();

@@ -7,15 +7,13 @@ use lager_ports::urgency;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
-/// Gives the calling thread a scheduling class (`libc::SCHED_FIFO`, …), and a priority in it.
+/// Gives the calling thread a scheduling class without priorities (`libc::SCHED_IDLE`, …).
 ///
 /// # Errors
 /// The user may not.
 #[allow(unsafe_code)]
-pub fn schedule(class: i32, priority: i32) -> std::io::Result<()> {
-    let parameter = libc::sched_param {
-        sched_priority: priority,
-    };
+pub fn schedule(class: i32) -> std::io::Result<()> {
+    let parameter = libc::sched_param { sched_priority: 0 };
     // SAFETY: the parameter outlives the call, which reads it and changes this thread only.
     match unsafe { libc::sched_setscheduler(0, class, &raw const parameter) } {
         0 => Ok(()),
@@ -51,7 +49,7 @@ impl RealTime {
 impl Drop for RealTime {
     fn drop(&mut self) {
         // Anybody may become less urgent.
-        let _ = schedule(libc::SCHED_OTHER, 0);
+        let _ = schedule(libc::SCHED_OTHER);
     }
 }
 
