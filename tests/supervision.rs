@@ -380,6 +380,8 @@ fn a_second_ctrl_c_ends_what_does_not_stop() {
         kill(*process, Signal::STOP);
     }
     up.signal(Signal::INT);
+    // Sooner it would be the same press.
+    std::thread::sleep(Duration::from_millis(400));
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0), "{}{}", up.log(), up.output());
     for process in frozen {

@@ -17,6 +17,26 @@ use crate::{Noisy, done, end, guest, info, must_be_right, must_be_swept, read, r
 /// What `kill -9` may take at the most.
 const LOST_BY_A_KILL: Duration = Duration::from_millis(300);
 
+#[test]
+fn a_recorder_that_gets_one_signal_twice_ends_in_order() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    for number in 0..5 {
+        let mut noisy = Noisy::new(&bus);
+        let file = format!("{number}.mcap");
+        let mut recorder = recorder(&domain, &["--topic", "noise/now", &file]);
+        noisy.meet(&recorder);
+        for pause in [2, 0] {
+            recorder.signal(Signal::INT);
+            std::thread::sleep(Duration::from_millis(pause));
+        }
+        assert_eq!(recorder.wait(), Some(0), "{}", recorder.log());
+        must_be_right(&domain, &file);
+    }
+    drop(bus);
+    must_be_swept(&domain);
+}
+
 /// What `tests/soak bag` asks for, if it runs.
 fn soak(what: &str) -> Option<u64> {
     std::env::var(what).ok()?.parse().ok()

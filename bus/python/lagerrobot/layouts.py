@@ -1090,31 +1090,31 @@ TOPICS = {
     "link/health": TopicEntry(
         "link/health",
         Health,
-        Qos(1, 1, 4, 74, 94),
+        Qos(16, 1, 4, 74, 94),
         "Both serial links and who may steer.",
     ),
     "nav/status": TopicEntry(
         "nav/status",
         NavigatorStatus,
-        Qos(1, 1, 4, 72, 92),
+        Qos(16, 1, 4, 72, 92),
         "Where the robot is and what it is doing.",
     ),
     "nav/map": TopicEntry(
         "nav/map",
         WarehouseMap,
-        Qos(1, 1, 10, 74, 100),
+        Qos(8, 1, 10, 74, 100),
         "The warehouse and where its products stand.",
     ),
     "nav/route": TopicEntry(
         "nav/route",
         Route,
-        Qos(1, 1, 4, 72, 92),
+        Qos(8, 1, 4, 72, 92),
         "The nodes the robot means to pass.",
     ),
     "nav/blocks": TopicEntry(
         "nav/blocks",
         BlockedWays,
-        Qos(1, 1, 4, 72, 92),
+        Qos(8, 1, 4, 72, 92),
         "The ways on which something stands.",
     ),
     "nav/inputs": TopicEntry(
@@ -1132,7 +1132,7 @@ TOPICS = {
     "mission/queue": TopicEntry(
         "mission/queue",
         OrderQueue,
-        Qos(1, 1, 4, 72, 92),
+        Qos(8, 1, 4, 72, 92),
         "The order under way and those that wait for their turn.",
     ),
     "mission/event": TopicEntry(
@@ -1156,19 +1156,19 @@ TOPICS = {
     "latency/path": TopicEntry(
         "latency/path",
         PathLatency,
-        Qos(1, 1, 4, 72, 92),
+        Qos(8, 1, 4, 72, 92),
         "How long sensor frames take until logic has decided, stage by stage, once a second.",
     ),
     "latency/command": TopicEntry(
         "latency/command",
         CommandLatency,
-        Qos(1, 1, 4, 72, 92),
+        Qos(8, 1, 4, 72, 92),
         "How long logic's orders take from the frame they rest on to the wire, once a second.",
     ),
     "truth/pose": TopicEntry(
         "truth/pose",
         Truth,
-        Qos(1, 1, 4, 72, 92),
+        Qos(16, 1, 4, 72, 92),
         "The simulated world as it really is.",
     ),
 }

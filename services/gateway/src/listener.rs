@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, BusWatch, Clock, Found, Layout, Look, PortError, ReceiveError, Shutdown, Source,
+    Bus, BusWatch, Clock, Found, Layout, Look, Pace, PortError, ReceiveError, Shutdown, Source,
     Subscriber, Watchdog, urgency,
 };
 use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
@@ -15,16 +15,16 @@ use serde::Serialize;
 use crate::figures::Figures;
 use crate::{GatewayError, Shared};
 
-/// The pace at which it polls for a viewer. A state's queue holds one sample, so the pace decides how
-/// many states are missed; `lager_recorder` has measured it.
-const VIEWED: Duration = Duration::from_millis(2);
-/// The pace at which it polls for its figures alone. They are made from stamps, so it is enough that
-/// no stream's queue runs over, and the robot keeps its cores.
-const COUNTED: Duration = Duration::from_millis(5);
+/// How often it looks for a viewer, as often as the recorder.
+const VIEWED: Pace = Pace::between(Duration::from_millis(1), Duration::from_millis(12));
+/// How often it looks for its figures alone, which are made from stamps.
+const COUNTED: Pace = Pace::between(Duration::from_millis(5), Duration::from_millis(50));
+/// How much later than wished for a look may come, for a viewer and for figures.
+const LATE: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(10)];
 /// How often it looks whether topics have come.
 const LOOK: Duration = Duration::from_secs(1);
 /// So many samples of one topic are taken before the next topic has its turn.
-const TURN: usize = 1_024;
+const TURN: u64 = 1_024;
 
 /// Whoever wants every sample as it comes, written as a recording has it.
 pub(crate) trait Viewer {
@@ -47,10 +47,11 @@ pub(crate) fn listen(
     viewer: Option<Box<dyn Viewer>>,
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
-    let pace = if viewer.is_some() { VIEWED } else { COUNTED };
-    if viewer.is_none() {
-        urgency::wake_with_others(pace);
-    }
+    let (mut pace, late) = match viewer {
+        Some(_) => (VIEWED, LATE[0]),
+        None => (COUNTED, LATE[1]),
+    };
+    urgency::wake_with_others(late);
     let mut listener = Listener {
         bus,
         watchdog,
@@ -71,8 +72,8 @@ pub(crate) fn listen(
             }
             listener.look(shared)?;
         }
-        listener.drain(shared)?;
-        std::thread::sleep(pace);
+        listener.drain(shared, &mut pace)?;
+        std::thread::sleep(pace.wait());
     }
     Ok(())
 }
@@ -96,8 +97,8 @@ trait Feed {
     /// How its messages are written, and whether it is a state.
     fn schema(&self) -> (EnvelopeSchema, bool);
 
-    /// Takes what has come.
-    fn drain(&mut self, to: &mut Takers<'_>) -> Result<(), ReceiveError>;
+    /// Takes what has come, and tells how full the topic's queue was.
+    fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError>;
 }
 
 /// Who is told of each sample.
@@ -179,7 +180,7 @@ impl Listener<'_> {
         }
     }
 
-    fn drain(&mut self, shared: &Shared) -> Result<(), GatewayError> {
+    fn drain(&mut self, shared: &Shared, pace: &mut Pace) -> Result<(), GatewayError> {
         self.watchdog.enter("reading the topics");
         let mut figures = shared.figures();
         let mut to = Takers {
@@ -188,7 +189,7 @@ impl Listener<'_> {
             viewer: self.viewer.as_deref_mut(),
         };
         let mut feeds = self.feeds.iter_mut();
-        let drained = feeds.try_for_each(|feed| feed.drain(&mut to));
+        let drained = feeds.try_for_each(|feed| feed.drain(&mut to, pace));
         self.watchdog.leave();
         Ok(drained?)
     }
@@ -212,16 +213,19 @@ impl<T: Topic> Feed for Subscriber<T> {
         (schema, T::QOS.history > 0)
     }
 
-    fn drain(&mut self, to: &mut Takers<'_>) -> Result<(), ReceiveError> {
-        for _ in 0..TURN {
+    fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError> {
+        let mut found = 0;
+        while found < TURN {
             let Some(sample) = self.receive()? else {
                 break;
             };
+            found += 1;
             let payload: &T::Payload = &sample;
             to.count(T::NAME, sample.stamp(), self.lost(), payload);
             let real = to.real;
             to.figures.learn(sample.stamp(), payload as &dyn Any, real);
         }
+        pace.found(found, self.queue());
         Ok(())
     }
 }
@@ -231,14 +235,13 @@ impl Feed for Found {
         (EnvelopeSchema::of(self.description()), false)
     }
 
-    fn drain(&mut self, to: &mut Takers<'_>) -> Result<(), ReceiveError> {
+    fn drain(&mut self, to: &mut Takers<'_>, pace: &mut Pace) -> Result<(), ReceiveError> {
         let name = self.name().to_owned();
-        for _ in 0..TURN {
-            let counting = Counting { name: &name, to };
-            if self.next(counting)?.is_none() {
-                break;
-            }
+        let mut found = 0;
+        while found < TURN && self.next(Counting { name: &name, to })?.is_some() {
+            found += 1;
         }
+        pace.found(found, self.queue());
         Ok(())
     }
 }

@@ -25,7 +25,7 @@ use crate::keepers::Keepers;
 use crate::map::bus_map;
 use crate::mission::{Helper, Mission, Watch};
 use crate::report::Narrator;
-use crate::supervisor;
+use crate::supervisor::{self, Parent};
 use crate::words::{Begin, Line, Pulse, Request, Sweep, Word};
 use ears::Ears;
 
@@ -50,7 +50,7 @@ const FIRST_WORD: Duration = Duration::from_secs(2);
 const ERRORS: Duration = Duration::from_secs(2);
 
 /// Attends the supervisor `parent` until `shutdown`.
-pub fn run(config: &Config, parent: Option<u32>, shutdown: &Shutdown) -> Result<()> {
+pub fn run(config: &Config, parent: Option<Parent>, shutdown: &Shutdown) -> Result<()> {
     let stranger = "`lager attend` is a part of `lager up`, which starts it";
     let line = Line::to_supervisor().context(stranger)?;
     supervisor::adopt(parent.context(stranger)?, shutdown)?;

@@ -29,6 +29,7 @@ pub use values::Fetch;
 
 use crate::config::{Body, PickBy};
 use crate::steer::Place;
+use crate::supervisor::Parent;
 
 /// The software of a small warehouse robot around a zero-copy shared-memory bus.
 #[derive(Debug, Parser)]
@@ -453,9 +454,9 @@ pub struct StationArgs {
     /// Told to every service that is started again; a station goes on where the last one was anyway
     #[arg(long, hide = true)]
     pub resume: bool,
-    /// End when this process, the supervisor, ends; standard output is then the socket for robots
-    #[arg(long, value_name = "PID", hide = true)]
-    pub parent: Option<u32>,
+    /// End when the supervisor ends; standard output is then the socket for robots
+    #[arg(long, value_name = "PID@NS", hide = true)]
+    pub parent: Option<Parent>,
 }
 
 /// `lager simulate`.

@@ -45,8 +45,6 @@ mod words;
 
 use std::io::Write;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use clap::FromArgMatches;
@@ -118,7 +116,7 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         return up::run(config, &args);
     }
     let shutdown = Shutdown::new();
-    stop_on_signals(&shutdown)?;
+    signals::end_in_order(&shutdown)?;
     // Whatever follows is a tool, and ends at the first Ctrl-C.
     let patience = || Patience::new(&config, &shutdown);
     let operator = || {
@@ -342,20 +340,6 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
     config.log.json |= global.log_json;
     config.validate()?;
     Ok(config)
-}
-
-/// Ctrl-C, SIGTERM and a closed terminal ask for an orderly end.
-fn stop_on_signals(shutdown: &Shutdown) -> Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let flag: Arc<AtomicBool> = shutdown.flag();
-    // A second Ctrl-C ends the process at once, should the orderly end hang.
-    signal_hook::flag::register_conditional_shutdown(SIGINT, exit::INTERRUPTED, Arc::clone(&flag))
-        .context("cannot listen to signals")?;
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
-        signal_hook::flag::register(signal, Arc::clone(&flag))
-            .context("cannot listen to signals")?;
-    }
-    Ok(())
 }
 
 /// Runs one service in this process until it is told to end.

@@ -12,16 +12,18 @@
 //! A service that ends by itself at every start is given up after five times where a mission is
 //! waited for. One that was killed is always started again.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{Seek, Write};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_ports::Shutdown;
+use lager_ports::{Clock, Shutdown};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{MemfdFlags, memfd_create};
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
@@ -47,10 +49,42 @@ pub const PATIENCE: Duration = Duration::from_secs(2);
 /// real-time load can keep it from its core.
 const LAST_PATIENCE: Duration = Duration::from_millis(500);
 
+/// The supervisor as its children know it: `PID@NS` on their command line.
+///
+/// When it began is told, because the kernel knows only when its process was made: `cargo run`
+/// becomes this program in the process that has compiled it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parent {
+    /// Its process.
+    pub pid: u32,
+    /// When it began, in ns of `CLOCK_MONOTONIC`.
+    pub started_ns: u64,
+}
+
+impl fmt::Display for Parent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}@{}", self.pid, self.started_ns)
+    }
+}
+
+impl FromStr for Parent {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let usage = || format!("`{text}` is no supervisor; `lager up` writes PID@NS, as in 4711@0");
+        let (pid, started_ns) = text.split_once('@').ok_or_else(usage)?;
+        Ok(Self {
+            pid: pid.parse().map_err(|_| usage())?,
+            started_ns: started_ns.parse().map_err(|_| usage())?,
+        })
+    }
+}
+
 /// All children of one robot, in the order in which they start.
 pub struct Supervisor {
     program: PathBuf,
     config: String,
+    parent: Parent,
     processes: Vec<Process>,
     /// The services that have been started at any time.
     known: Vec<Service>,
@@ -109,6 +143,10 @@ impl Supervisor {
         Ok(Self {
             program: std::env::current_exe().context("cannot find this program's own file")?,
             config,
+            parent: Parent {
+                pid: std::process::id(),
+                started_ns: Clock::monotonic_ns(),
+            },
             processes: Vec::new(),
             known: Vec::new(),
             restarts: 0,
@@ -130,7 +168,7 @@ impl Supervisor {
             self.processes.len() - 1
         });
         let process = &mut self.processes[place];
-        let started = process.spawn(&self.program, &self.config, start);
+        let started = process.spawn(&self.program, &self.config, self.parent, start);
         if started.is_err() {
             process.back_off(true);
         }
@@ -315,13 +353,13 @@ impl Process {
         self.start_at = now + self.wait;
     }
 
-    fn spawn(&mut self, program: &Path, config: &str, start: Start) -> Result<u32> {
+    fn spawn(&mut self, program: &Path, config: &str, parent: Parent, start: Start) -> Result<u32> {
         let name = self.service.command();
         let attempt = || -> Result<Child> {
             let mut command = Command::new(program);
             command
                 .args(["--config", "-", name, "--parent"])
-                .arg(std::process::id().to_string())
+                .arg(parent.to_string())
                 .stdin(in_memory(config)?)
                 .stdout(start.output)
                 // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
@@ -408,11 +446,11 @@ fn in_memory(text: &str) -> Result<Stdio> {
 ///
 /// # Errors
 /// When the supervisor was gone before the kernel could be asked.
-pub fn adopt(parent: u32, shutdown: &Shutdown) -> Result<()> {
+pub fn adopt(parent: Parent, shutdown: &Shutdown) -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(Signal::TERM))?;
     let actual = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get());
-    if actual != i32::try_from(parent)? {
-        bail!("the supervisor (process {parent}) is gone");
+    if actual != i32::try_from(parent.pid)? {
+        bail!("the supervisor (process {}) is gone", parent.pid);
     }
     let shutdown = shutdown.clone();
     std::thread::Builder::new()
@@ -425,4 +463,22 @@ pub fn adopt(parent: u32, shutdown: &Shutdown) -> Result<()> {
             std::process::exit(1);
         })?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parent_is_read_as_it_was_written() {
+        let parent = Parent {
+            pid: 4711,
+            started_ns: u64::MAX,
+        };
+        assert_eq!(parent.to_string().parse(), Ok(parent));
+        for text in ["", "4711", "@", "4711@", "@7", "-1@7", "4711@7 "] {
+            let refused = text.parse::<Parent>().expect_err(text);
+            assert!(refused.contains("PID@NS"), "{text}: {refused}");
+        }
+    }
 }

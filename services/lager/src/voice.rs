@@ -33,6 +33,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{Layer, Registry};
 
 use crate::config::{Config, LogSection};
+use crate::supervisor::Parent;
 
 /// What is traced into a file, or as JSON, where `RUST_LOG` does not say.
 const UNASKED: LevelFilter = LevelFilter::INFO;
@@ -61,12 +62,10 @@ pub enum Speaker {
 impl Speaker {
     /// The service `who`, which `parent` has started if there is one: the robot's time begins
     /// with its supervisor.
-    pub fn service(who: &'static str, parent: Option<u32>, config: &Config) -> Self {
+    pub fn service(who: &'static str, parent: Option<Parent>, config: &Config) -> Self {
         Self::Service {
             who,
-            started_ns: parent
-                .and_then(started_ns)
-                .unwrap_or_else(Clock::monotonic_ns),
+            started_ns: parent.map_or_else(Clock::monotonic_ns, |parent| parent.started_ns),
             speed: config.speed,
         }
     }
@@ -85,14 +84,6 @@ impl Speaker {
             }
         }
     }
-}
-
-/// When a process was started, in ns of the machine's clock.
-fn started_ns(process: u32) -> Option<u64> {
-    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name, in parentheses, may contain anything; the 20th field behind it is in ticks.
-    let ticks: u64 = stat.rsplit(") ").next()?.split(' ').nth(19)?.parse().ok()?;
-    Some(ticks * (1_000_000_000 / rustix::param::clock_ticks_per_second()))
 }
 
 /// From now on warnings of this process are lines of `speaker`, and traces go where they are

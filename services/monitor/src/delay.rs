@@ -19,9 +19,10 @@ use std::io::Write;
 use std::time::Duration;
 
 use hdrhistogram::Histogram;
+use lager_ports::Pace;
 use serde_json::{Value, json};
 
-use crate::measure::{Gauge, Limits, Pace, Plan, Seen};
+use crate::measure::{Gauge, Limits, Plan, Seen};
 use crate::{ToolError, Tools};
 
 /// Between two looks: a fifth of the other tools' pace, so that the own wait is short.
@@ -38,7 +39,7 @@ impl<W: Write> Tools<'_, W> {
     pub fn delay(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
         let plan = Plan {
             limits,
-            pace: Pace::Every(POLL),
+            pace: Pace::every(POLL),
             head: HEAD,
             gauge: |_| Delays::default(),
         };

@@ -4,19 +4,15 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use lager_ports::{Clock, Source, urgency};
+use lager_ports::{Clock, Pace, Source};
 use lager_topics::{Stamp, Topic, TopicVisitor, visit};
 use serde_json::{Value, json};
 
 use crate::source::Stamped;
-use crate::{POLL, ToolError, Tools};
+use crate::{ToolError, Tools};
 
 /// One line is printed for each window.
 const WINDOW: Duration = Duration::from_secs(1);
-
-/// The longest wait between two looks, and how much of it each place of the queue allows.
-const LONGEST_WAIT: Duration = Duration::from_millis(50);
-const PLACE: Duration = Duration::from_micros(200);
 
 /// When a tool ends by itself; whatever comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,38 +56,6 @@ pub(crate) trait Gauge {
     fn as_text(&self) -> String;
 }
 
-/// How long a tool waits between two looks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Pace {
-    /// So long.
-    Every(Duration),
-    /// As long as most of the queue stays free, for what is measured by stamps alone. Every look
-    /// takes a core from somebody, and sixty observers may look on at once.
-    AsTheQueueAllows,
-}
-
-impl Pace {
-    /// The wait before the first look.
-    fn first(self) -> Duration {
-        match self {
-            Self::Every(wait) => wait,
-            Self::AsTheQueueAllows => POLL,
-        }
-    }
-
-    /// The wait that follows `wait`, after which `samples` were found in a queue of `queue`.
-    fn next(self, wait: Duration, samples: u64, queue: usize) -> Duration {
-        let queue = queue as u64;
-        let most = POLL.max(PLACE * queue as u32).min(LONGEST_WAIT);
-        match self {
-            Self::Every(wait) => wait,
-            Self::AsTheQueueAllows if samples * 4 > queue => POLL.max(wait / 2),
-            Self::AsTheQueueAllows if samples * 8 <= queue => most.min(wait * 2),
-            Self::AsTheQueueAllows => wait.min(most),
-        }
-    }
-}
-
 /// What is measured and how.
 pub(crate) struct Plan<F> {
     pub(crate) limits: Limits,
@@ -129,10 +93,7 @@ impl<W: Write> Tools<'_, W> {
         let began = Instant::now();
         let (mut total, mut lost, mut is_over) = (0, 0, false);
         let mut heard = began;
-        let mut wait = plan.pace.first();
-        if plan.pace == Pace::AsTheQueueAllows {
-            urgency::wake_with_others(2 * POLL);
-        }
+        let mut pace = plan.pace;
         if !self.as_json && !plan.head.is_empty() {
             writeln!(self.out, "{}", plan.head)?;
         }
@@ -159,8 +120,8 @@ impl<W: Write> Tools<'_, W> {
                 }
                 is_over |= plan.limits.are_reached(began, total);
                 if !is_over {
-                    self.pause(heard, wait)?;
-                    wait = plan.pace.next(wait, total - so_far, from.queue());
+                    pace.found(total - so_far, from.queue());
+                    self.pause(heard, pace.wait())?;
                 }
             }
             let newly_lost = from.lost() - lost;
@@ -196,31 +157,5 @@ impl<W: Write, G: Gauge, F: Fn(usize) -> G> TopicVisitor for Measure<'_, '_, W, 
         let size = size_of::<T::Payload>();
         self.tools
             .measure_from(T::NAME, size, subscriber, self.plan)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The wait after some seconds of so many samples a second.
-    fn settled(per_second: u64, queue: usize) -> Duration {
-        let pace = Pace::AsTheQueueAllows;
-        (0..100).fold(pace.first(), |wait, _| {
-            let samples = per_second * wait.as_micros() as u64 / 1_000_000;
-            pace.next(wait, samples, queue)
-        })
-    }
-
-    #[test]
-    fn a_tool_looks_as_seldom_as_most_of_the_queue_stays_free() {
-        let ms = Duration::from_millis;
-        assert_eq!(settled(200, 256), ms(50));
-        assert_eq!(settled(1_000, 256), ms(40));
-        assert_eq!(settled(10_000, 256), ms(5));
-        // A place that each sample takes from the one before is looked at often.
-        assert_eq!(settled(50, 1), POLL);
-        assert_eq!(settled(0, 16), POLL);
-        assert_eq!(Pace::Every(ms(1)).next(ms(1), 0, 256), ms(1));
     }
 }

@@ -2,12 +2,19 @@
 //! they were published, once a second, from the stamps alone.
 
 use std::io::Write;
+use std::time::Duration;
 
+use lager_ports::{Pace, urgency};
 use lager_topics::Stamp;
 use serde_json::{Value, json};
 
-use crate::measure::{Gauge, Limits, Pace, Plan, Seen};
-use crate::{ToolError, Tools};
+use crate::measure::{Gauge, Limits, Plan, Seen};
+use crate::{POLL, ToolError, Tools};
+
+/// How often they look.
+const SELDOM: Pace = Pace::between(POLL, Duration::from_millis(50));
+/// How much later than wished for a look may come.
+const LATE: Duration = Duration::from_millis(10);
 
 impl<W: Write> Tools<'_, W> {
     /// `topic hz`: measures the rate of `name` until a limit or the shutdown.
@@ -15,13 +22,7 @@ impl<W: Write> Tools<'_, W> {
     /// # Errors
     /// No topic has that name, it cannot be read, or the output cannot be written.
     pub fn hz(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
-        let plan = Plan {
-            limits,
-            pace: Pace::AsTheQueueAllows,
-            head: "",
-            gauge: |_| Rate::default(),
-        };
-        self.measure(name, plan)
+        self.measure(name, plan(limits, |_| Rate::default()))
     }
 
     /// `topic bw`: measures the bytes a second of `name`, stamps included, until a limit or the
@@ -30,16 +31,22 @@ impl<W: Write> Tools<'_, W> {
     /// # Errors
     /// As [`Tools::hz`].
     pub fn bandwidth(&mut self, name: &str, limits: Limits) -> Result<(), ToolError> {
-        let plan = Plan {
-            limits,
-            pace: Pace::AsTheQueueAllows,
-            head: "",
-            gauge: |payload| Bandwidth {
-                payload,
-                rate: Rate::default(),
-            },
+        let gauge = |payload| Bandwidth {
+            payload,
+            rate: Rate::default(),
         };
-        self.measure(name, plan)
+        self.measure(name, plan(limits, gauge))
+    }
+}
+
+/// For what the stamps alone tell, it does not matter when somebody looks at them.
+fn plan<F>(limits: Limits, gauge: F) -> Plan<F> {
+    urgency::wake_with_others(LATE);
+    Plan {
+        limits,
+        pace: SELDOM,
+        head: "",
+        gauge,
     }
 }
 

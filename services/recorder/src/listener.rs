@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lager_journal::{Envelope, EnvelopeSchema, Times};
-use lager_ports::{Bus, BusWatch, Clock, Layout, Look, PortError, ReceiveError, Source, Watchdog};
+use lager_ports::{
+    Bus, BusWatch, Clock, Layout, Look, Pace, PortError, ReceiveError, Source, Watchdog,
+};
 use lager_topics::{Description, Stamp, TOPICS, Topic as TableTopic, TopicVisitor, visit};
 use serde::Serialize;
 
@@ -12,7 +14,7 @@ use crate::error::RecordError;
 use crate::tally::{Item, QueueIn, Topic, Topics};
 
 /// So many samples of one topic are taken before the next topic has its turn.
-const TURN: usize = 1_024;
+const TURN: u64 = 1_024;
 
 /// Everything that is listened to.
 pub(crate) struct Listener<'a> {
@@ -51,8 +53,8 @@ impl Timing {
 
 /// A topic that is listened to.
 pub(crate) trait Feed {
-    /// Queues what has come.
-    fn drain(&mut self, queue: &QueueIn) -> Result<(), RecordError>;
+    /// Queues what has come, and tells how full the topic's queue was.
+    fn drain(&mut self, queue: &QueueIn, pace: &mut Pace) -> Result<(), RecordError>;
 }
 
 impl Listener<'_> {
@@ -135,12 +137,12 @@ impl Listener<'_> {
     }
 
     /// Queues what has come on every topic.
-    pub(crate) fn drain(&mut self) -> Result<(), RecordError> {
+    pub(crate) fn drain(&mut self, pace: &mut Pace) -> Result<(), RecordError> {
         self.watchdog.enter("reading the topics");
         let drained = self
             .feeds
             .iter_mut()
-            .try_for_each(|feed| feed.drain(&self.queue));
+            .try_for_each(|feed| feed.drain(&self.queue, pace));
         self.watchdog.leave();
         drained
     }
@@ -184,8 +186,9 @@ struct FeedOf<S> {
 }
 
 impl<S: Source> Feed for FeedOf<S> {
-    fn drain(&mut self, queue: &QueueIn) -> Result<(), RecordError> {
-        for _ in 0..TURN {
+    fn drain(&mut self, queue: &QueueIn, pace: &mut Pace) -> Result<(), RecordError> {
+        let mut found = 0;
+        while found < TURN {
             let packing = Packing {
                 place: self.place,
                 dropped: self.topic.count().dropped,
@@ -194,11 +197,13 @@ impl<S: Source> Feed for FeedOf<S> {
             let Some(item) = self.from.next(packing).map_err(received)? else {
                 break;
             };
+            found += 1;
             self.topic.receive();
             if !queue.put(item?) {
                 self.topic.drop_one();
             }
         }
+        pace.found(found, self.from.queue());
         self.topic.lose(self.from.lost());
         Ok(())
     }

@@ -235,6 +235,13 @@ impl Arbiter {
         self.original_boards = accepted;
     }
 
+    /// The command in force is due now if it would be within `ahead`.
+    pub fn resend_early(&mut self, now: Duration, ahead: Duration) {
+        if self.next_send <= now + ahead {
+            self.next_send = self.next_send.min(now);
+        }
+    }
+
     /// Latches the stop: whatever runs is aborted, and nothing drives until
     /// [`Arbiter::resume_from_stop`].
     ///

@@ -8,7 +8,7 @@ use lager_wire::link::HostTransmitter;
 use lager_wire::{Callsign, SettingKey, SettingReply, SteerData, Version};
 
 use super::action::{News, ShownReport};
-use super::{BridgeCore, Handshake};
+use super::{BridgeCore, Handshake, REPORT_PERIOD};
 use crate::arbiter::ArmGate;
 use crate::events::{BoardUp, Moment, PortEvent};
 use crate::frames::ServoTable;
@@ -132,6 +132,10 @@ impl BridgeCore {
             }
         }
         self.due.state = Some(at.ns);
+        self.arbiter.resend_early(at.robot, REPORT_PERIOD);
+        if self.health_due <= at.robot + REPORT_PERIOD {
+            self.health_due = at.robot;
+        }
     }
 
     fn setting_answered(&mut self, now: Moment, reply: &SettingReply) {

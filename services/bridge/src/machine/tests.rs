@@ -139,6 +139,26 @@ fn the_state_is_told_before_the_bytes_unless_one_setpoint_takes_the_place_of_ano
 }
 
 #[test]
+fn what_falls_due_before_the_next_report_is_done_with_this_one() {
+    let mut core = core();
+    order(&mut core, 1_002, 1, FORWARD);
+    turn(&mut core, 1_002);
+    let again = ("command", code(FORWARD));
+    report(&mut core, 1_036, IDLE);
+    assert!(!turn(&mut core, 1_036).contains(&again));
+    report(&mut core, 1_037, IDLE);
+    assert!(turn(&mut core, 1_037).contains(&again));
+    // Nothing comes any more, and the command goes out on time.
+    assert!(!turn(&mut core, 1_076).contains(&again));
+    assert!(turn(&mut core, 1_077).contains(&again));
+    // The same with the health, told last when the order came.
+    report(&mut core, 1_096, IDLE);
+    assert!(!turn(&mut core, 1_096).contains(&("health", None)));
+    report(&mut core, 1_097, IDLE);
+    assert!(turn(&mut core, 1_097).contains(&("health", None)));
+}
+
+#[test]
 fn a_stop_in_the_middle_of_a_turn_overtakes_what_the_turn_decided() {
     let mut core = core();
     order(&mut core, 1_002, 1, FORWARD);

@@ -8,6 +8,7 @@ use lager_topics::Role;
 
 use crate::config::RealtimeSection;
 use crate::realtime::{CoreSet, CoreSetError, HIGHEST_PRIORITY, Wanted};
+use crate::supervisor::Parent;
 
 /// What every process on the path may want of the machine.
 #[derive(Debug, Default, Args)]
@@ -93,9 +94,9 @@ pub struct ServiceArgs {
     /// Take up the state that the supervisor kept of the process before this one
     #[arg(long)]
     pub resume: bool,
-    /// End when this process, the supervisor, ends
-    #[arg(long, value_name = "PID")]
-    pub parent: Option<u32>,
+    /// End when the supervisor ends; its process, and when it began in ns of the monotonic clock
+    #[arg(long, value_name = "PID@NS")]
+    pub parent: Option<Parent>,
     /// Priority and memory
     #[command(flatten)]
     pub realtime: RealtimeArgs,

@@ -97,6 +97,7 @@ pub(crate) struct Row {
     pub(crate) expected_hz: Option<f64>,
     /// Samples that wait at most.
     buffer: u64,
+    is_state: bool,
     /// Of a sample, with its stamp; 0 = not known.
     bytes: usize,
     /// Samples of which a reader is sure that they were lost.
@@ -139,6 +140,7 @@ impl Row {
             usual_hz,
             expected_hz: usual_hz,
             buffer: entry.map_or(u64::MAX, |(_, entry)| entry.qos.buffer as u64),
+            is_state: entry.is_some_and(|(_, entry)| entry.qos.history > 0),
             bytes: layout.unwrap_or_default(),
             lost: 0,
             overrun: 0,
@@ -236,9 +238,12 @@ impl Row {
     /// Takes what a recording lacks before a sample: what was lost before its recorder, which of a
     /// state is usual, and what that had no time for.
     pub(crate) fn lack(&mut self, lost: u64, dropped: u64, now_ns: u64) {
-        let is_state = self.buffer <= 1;
-        self.overrun += if is_state { lost } else { 0 };
-        let lost = if is_state { dropped } else { lost + dropped };
+        self.overrun += if self.is_state { lost } else { 0 };
+        let lost = if self.is_state {
+            dropped
+        } else {
+            lost + dropped
+        };
         if lost > 0 {
             self.lose(lost, now_ns);
         }
@@ -405,7 +410,7 @@ mod tests {
     #[test]
     fn losses_in_ones_own_full_queue_are_told_apart() {
         let mut state = row("nav/status");
-        state.look(1, 30, MS);
+        state.look(16, 30, MS);
         assert_eq!((state.lost, state.overrun), (0, 30));
         assert_eq!(state.trouble(MS), Trouble::None);
         let mut stream = row("steering/command");
