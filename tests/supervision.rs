@@ -384,6 +384,8 @@ fn a_second_ctrl_c_ends_what_does_not_stop() {
     std::thread::sleep(Duration::from_millis(400));
     up.signal(Signal::INT);
     assert_eq!(up.wait(), Some(0), "{}{}", up.log(), up.output());
+    let told = up.log() + &up.output();
+    assert!(!told.contains("does not stop"), "it waited: {told}");
     for process in frozen {
         assert!(has_ended(process));
     }

@@ -1,5 +1,5 @@
-//! What a recorder stands: kills at any moment, a full disk beside a robot that drives, a queue that
-//! is too short, and ten thousand frames a second. `tests/soak bag` runs the first and the last for
+//! What a recorder stands: one signal twice, kills at any moment, a full disk beside a robot that
+//! drives, a queue that is too short, and ten thousand frames a second. `tests/soak bag` runs the first and the last for
 //! longer, and only there their bounds are held: they want the machine to themselves.
 
 use std::fs;
@@ -16,6 +16,17 @@ use crate::{Noisy, done, end, guest, info, must_be_right, must_be_swept, read, r
 
 /// What `kill -9` may take at the most.
 const LOST_BY_A_KILL: Duration = Duration::from_millis(300);
+
+/// What `tests/soak bag` asks for, if it runs.
+fn soak(what: &str) -> Option<u64> {
+    std::env::var(what).ok()?.parse().ok()
+}
+
+/// Waits until that moment, without giving the core away for long.
+fn until(moment: Instant) {
+    let left = moment.saturating_duration_since(Instant::now());
+    std::thread::sleep(left);
+}
 
 #[test]
 fn a_recorder_that_gets_one_signal_twice_ends_in_order() {
@@ -35,17 +46,6 @@ fn a_recorder_that_gets_one_signal_twice_ends_in_order() {
     }
     drop(bus);
     must_be_swept(&domain);
-}
-
-/// What `tests/soak bag` asks for, if it runs.
-fn soak(what: &str) -> Option<u64> {
-    std::env::var(what).ok()?.parse().ok()
-}
-
-/// Waits until that moment, without giving the core away for long.
-fn until(moment: Instant) {
-    let left = moment.saturating_duration_since(Instant::now());
-    std::thread::sleep(left);
 }
 
 #[test]

@@ -103,7 +103,8 @@ class Reader(Generic[P]):
         return self._streams.lost
 
     def receive(self) -> Optional[Sample[P]]:
-        """The next sample, or None when there is none now. Gives the one before it back."""
+        """The next sample, oldest first, or None when there is none now. Gives the one before it
+        back. Of a state the older values come first, too; `latest` has the last one."""
         self._release()
         self._current = self._take()
         return self._current

@@ -13,8 +13,11 @@
 //! of locked memory for each service.
 //!
 //! Who wants to know a state asks for the latest; who keeps what has been reads them all. So states
-//! queue 8 samples, and 16 where they come many times a second: a recorder that looks a hundred
-//! times a second loses none, also on a robot at ten times its speed.
+//! queue 8 samples, and 16 where they come many times a second. With a queue of one, a recorder
+//! that looked every 2 ms missed 6 % of the states of a robot at ten times its speed, beside two busy
+//! processes on two cores; now it looks every 12 ms and misses 0.1 % (20 s each, AMD EPYC,
+//! 2026-11-26), and none on an idle machine. These queues cost 1.5 MiB of the bridge's locked memory
+//! and 3.3 MiB of logic's.
 
 use core::fmt;
 
@@ -69,12 +72,13 @@ impl Qos {
         }
     }
 
-    /// A state of one writer: readers see the last sample, also those that join late.
+    /// A state of one writer: readers see the last sample, also those that join late, and up to 8
+    /// that came before it.
     pub const fn state() -> Self {
         Self {
             history: 1,
             republish: true,
-            ..Self::stream(1)
+            ..Self::stream(8)
         }
     }
 

@@ -1,7 +1,7 @@
 //! The bus to the outside: figures for Prometheus, and live views for Foxglove.
 //!
 //! ```text
-//!            2 ms                              on request
+//!         1 to 50 ms                            on request
 //!   bus ───────────> listener ──> Figures <──────────────── /metrics: Prometheus
 //!                       └───────> Live ───── as they come ─────────> Foxglove
 //! ```

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
     Bus, BusWatch, Clock, Found, Layout, Look, Pace, PortError, ReceiveError, Shutdown, Source,
-    Subscriber, Watchdog, urgency,
+    Subscriber, Watchdog,
 };
 use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
 use serde::Serialize;
@@ -15,12 +15,6 @@ use serde::Serialize;
 use crate::figures::Figures;
 use crate::{GatewayError, Shared};
 
-/// How often it looks for a viewer, as often as the recorder.
-const VIEWED: Pace = Pace::between(Duration::from_millis(1), Duration::from_millis(12));
-/// How often it looks for its figures alone, which are made from stamps.
-const COUNTED: Pace = Pace::between(Duration::from_millis(5), Duration::from_millis(50));
-/// How much later than wished for a look may come, for a viewer and for figures.
-const LATE: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(10)];
 /// How often it looks whether topics have come.
 const LOOK: Duration = Duration::from_secs(1);
 /// So many samples of one topic are taken before the next topic has its turn.
@@ -47,11 +41,11 @@ pub(crate) fn listen(
     viewer: Option<Box<dyn Viewer>>,
     is_over: impl Fn() -> bool,
 ) -> Result<(), GatewayError> {
-    let (mut pace, late) = match viewer {
-        Some(_) => (VIEWED, LATE[0]),
-        None => (COUNTED, LATE[1]),
+    let mut pace = match viewer {
+        Some(_) => Pace::keeping(),
+        // Its own figures are made from stamps.
+        None => Pace::counting(),
     };
-    urgency::wake_with_others(late);
     let mut listener = Listener {
         bus,
         watchdog,

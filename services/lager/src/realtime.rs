@@ -27,7 +27,7 @@ pub use error::RealtimeError;
 /// The highest priority of `SCHED_FIFO`.
 pub const HIGHEST_PRIORITY: u8 = 99;
 
-/// What one service may lock, in bytes. Measured are 37 MiB for the bridge and 39 for logic, 18 of
+/// What one service may lock, in bytes. Measured are 39 MiB for the bridge and 43 for logic, 18 of
 /// them the program's file, and less than 1 MiB more with 64 observers; the rest is reserve for
 /// programs and topics that grow.
 pub const LOCKED_AT_MOST: usize = 64 << 20;

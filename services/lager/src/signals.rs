@@ -9,7 +9,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use lager_ports::{Clock, Shutdown};
@@ -18,26 +18,19 @@ use signal_hook::low_level::{self, pipe};
 
 use crate::exit;
 
-/// A second Ctrl-C that comes sooner is the first one: `timeout -s INT` sends each signal twice.
+/// A signal that comes sooner after a Ctrl-C is the same one: `timeout -s INT` sends each twice.
 const ONE_PRESS: Duration = Duration::from_millis(300);
 
-/// From now on the signals request `shutdown`, and a second Ctrl-C ends this process at once.
-#[allow(unsafe_code, reason = "a handler of signals has no safe binding")]
+/// From now on the signals request `shutdown`, and a Ctrl-C while it is requested ends this process
+/// at once.
 pub fn end_in_order(shutdown: &Shutdown) -> Result<()> {
     let listen = || -> std::io::Result<()> {
-        let first_ns = AtomicU64::new(0);
-        let interrupted = move || {
-            let now_ns = Clock::monotonic_ns();
-            let relaxed = Ordering::Relaxed;
-            if let Err(first_ns) = first_ns.compare_exchange(0, now_ns, relaxed, relaxed)
-                && now_ns.saturating_sub(first_ns) >= ONE_PRESS.as_nanos() as u64
-            {
+        let flag = shutdown.flag();
+        on_press(move || {
+            if flag.load(Ordering::SeqCst) {
                 low_level::exit(exit::INTERRUPTED);
             }
-        };
-        // SAFETY: it reads a clock and a number, and may end the process, all of which a handler of
-        // signals may.
-        unsafe { low_level::register(SIGINT, interrupted) }?;
+        })?;
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, shutdown.flag())?;
         }
@@ -46,11 +39,43 @@ pub fn end_in_order(shutdown: &Shutdown) -> Result<()> {
     listen().context("cannot listen to signals")
 }
 
+/// Has every Ctrl-C do what a handler of signals may do.
+#[allow(unsafe_code, reason = "a handler of signals has no safe binding")]
+fn on_press(act: impl Fn() + Send + Sync + 'static) -> std::io::Result<()> {
+    let last = Press::default();
+    let handler = move || {
+        if last.is_over(Clock::monotonic_ns()) {
+            act();
+        }
+    };
+    // SAFETY: it reads a clock, swaps a number, and does what its caller may have it do.
+    unsafe { low_level::register(SIGINT, handler) }?;
+    Ok(())
+}
+
+/// When Ctrl-C was pressed last, in ns of `CLOCK_MONOTONIC`; 0 if never.
+#[derive(Debug, Default)]
+struct Press(AtomicU64);
+
+impl Press {
+    /// Whether a signal that comes now is another press, which begins then.
+    fn is_over(&self, now_ns: u64) -> bool {
+        let began_ns = self.0.load(Ordering::Relaxed);
+        let is_over =
+            began_ns == 0 || now_ns.saturating_sub(began_ns) >= ONE_PRESS.as_nanos() as u64;
+        let order = Ordering::Relaxed;
+        is_over
+            && self
+                .0
+                .compare_exchange(began_ns, now_ns, order, order)
+                .is_ok()
+    }
+}
+
 /// The ends that have been asked for.
 pub struct Signals {
     wakes: UnixStream,
     interrupted: Arc<AtomicBool>,
-    forgotten: Option<Instant>,
     asked: bool,
 }
 
@@ -61,14 +86,14 @@ impl Signals {
             let (wakes, wake) = UnixStream::pair()?;
             wakes.set_nonblocking(true)?;
             let interrupted = Arc::new(AtomicBool::new(false));
-            signal_hook::flag::register(SIGINT, Arc::clone(&interrupted))?;
+            let pressed = Arc::clone(&interrupted);
+            on_press(move || pressed.store(true, Ordering::SeqCst))?;
             for signal in [SIGINT, SIGTERM, SIGHUP] {
                 pipe::register(signal, wake.try_clone()?)?;
             }
             Ok(Self {
                 wakes,
                 interrupted,
-                forgotten: None,
                 asked: false,
             })
         };
@@ -87,15 +112,11 @@ impl Signals {
     /// Whether Ctrl-C has come since it was forgotten.
     pub fn interrupted(&mut self) -> bool {
         self.end_asked();
-        if self.forgotten.is_some_and(|at| at.elapsed() < ONE_PRESS) {
-            self.interrupted.store(false, Ordering::SeqCst);
-        }
         self.interrupted.load(Ordering::SeqCst)
     }
 
     /// Only what comes from now on is another Ctrl-C.
     pub fn forget_interrupt(&mut self) {
-        self.forgotten = Some(Instant::now());
         self.interrupted.store(false, Ordering::SeqCst);
     }
 }
@@ -103,5 +124,18 @@ impl Signals {
 impl AsFd for Signals {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.wakes.as_fd()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_shortly_after_a_press_is_the_same_press() {
+        let ms = |count: u64| count * 1_000_000;
+        let press = Press::default();
+        let over = [1_000, 1_002, 1_299, 1_300, 1_599, 5_000].map(|now| press.is_over(ms(now)));
+        assert_eq!(over, [true, false, false, true, false, true]);
     }
 }

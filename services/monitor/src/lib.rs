@@ -38,7 +38,7 @@ pub use publish::{Payloads, PublishError, Publishing};
 pub use python::write_python;
 pub use top::{Lacking, Recorded, TopConfig, leave_screen};
 
-/// The pace at which an observer polls.
+/// How often `topic echo` and `top` look.
 const POLL: Duration = Duration::from_millis(5);
 
 /// What a tool works with. Each tool is a method of it.

@@ -93,7 +93,7 @@ impl<W: Write> Tools<'_, W> {
         let began = Instant::now();
         let (mut total, mut lost, mut is_over) = (0, 0, false);
         let mut heard = began;
-        let mut pace = plan.pace;
+        let mut pace = plan.pace.clone();
         if !self.as_json && !plan.head.is_empty() {
             writeln!(self.out, "{}", plan.head)?;
         }

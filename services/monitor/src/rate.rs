@@ -2,19 +2,13 @@
 //! they were published, once a second, from the stamps alone.
 
 use std::io::Write;
-use std::time::Duration;
 
-use lager_ports::{Pace, urgency};
+use lager_ports::Pace;
 use lager_topics::Stamp;
 use serde_json::{Value, json};
 
 use crate::measure::{Gauge, Limits, Plan, Seen};
-use crate::{POLL, ToolError, Tools};
-
-/// How often they look.
-const SELDOM: Pace = Pace::between(POLL, Duration::from_millis(50));
-/// How much later than wished for a look may come.
-const LATE: Duration = Duration::from_millis(10);
+use crate::{ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
     /// `topic hz`: measures the rate of `name` until a limit or the shutdown.
@@ -39,12 +33,10 @@ impl<W: Write> Tools<'_, W> {
     }
 }
 
-/// For what the stamps alone tell, it does not matter when somebody looks at them.
 fn plan<F>(limits: Limits, gauge: F) -> Plan<F> {
-    urgency::wake_with_others(LATE);
     Plan {
         limits,
-        pace: SELDOM,
+        pace: Pace::counting(),
         head: "",
         gauge,
     }

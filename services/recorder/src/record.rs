@@ -9,7 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use lager_journal::{Count, Start};
-use lager_ports::{Bus, BusWatch, Clock, Pace, Shutdown, Watchdog, urgency};
+use lager_ports::{Bus, BusWatch, Clock, Pace, Shutdown, Watchdog};
 
 use crate::config::RecordConfig;
 use crate::error::RecordError;
@@ -17,10 +17,6 @@ use crate::keeper::Keeper;
 use crate::listener::{Listener, Timing};
 use crate::tally::{Topics, queue};
 
-/// How often the listener looks.
-const SELDOM: Pace = Pace::between(Duration::from_millis(1), Duration::from_millis(12));
-/// How much later than wished for a look may come.
-const LATE: Duration = Duration::from_millis(1);
 /// How often it tells how things stand, and looks for topics that have come.
 const TELL: Duration = Duration::from_secs(1);
 
@@ -168,8 +164,7 @@ fn listen<R>(
     is_over: impl Fn() -> bool,
     stands: &mut impl FnMut(Vec<String>) -> R,
 ) -> Result<(), RecordError> {
-    urgency::wake_with_others(LATE);
-    let (mut pace, mut refused) = (SELDOM, listener.open_table()?);
+    let (mut pace, mut refused) = (Pace::keeping(), listener.open_table()?);
     let mut told: Option<Instant> = None;
     while !shutdown.is_requested() && !is_over() {
         listener.drain(&mut pace)?;

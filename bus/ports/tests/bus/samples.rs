@@ -4,7 +4,7 @@ use std::sync::Barrier;
 use std::time::Duration;
 
 use lager_ports::{Bus, BusConfig, Cause, Clock, Policy, ReceiveError, SendError, Wake};
-use lager_topics::{NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine};
+use lager_topics::{NavStatus, NavigatorStatus, OperatorInput, Role, SensorLine, Topic};
 
 use crate::domain::{Domain, drain, send};
 
@@ -133,6 +133,30 @@ fn each_writer_is_counted_for_itself() {
     assert_eq!(subscriber.lost(), 4);
     assert_eq!(subscriber.received(), 16 + 10);
     assert_eq!(subscriber.writers_heard(), 2);
+}
+
+#[test]
+fn who_reads_every_sample_of_a_state_may_look_seldom() {
+    let domain = Domain::new();
+    let bus = domain.open(Role::Guest);
+    let publisher = bus.publisher::<NavStatus>().unwrap();
+    let mut subscriber = bus.subscriber::<NavStatus>().unwrap();
+    let places = NavStatus::QOS.buffer as u32;
+    for (sent, lost) in [(places, 0), (places + 1, 1)] {
+        for command_id in 1..=sent {
+            let status = NavigatorStatus {
+                command_id,
+                ..NavigatorStatus::default()
+            };
+            publisher.send(Cause::OWN, status).unwrap();
+        }
+        let mut seen = Vec::new();
+        while let Some(status) = subscriber.receive().unwrap() {
+            seen.push(status.command_id);
+        }
+        assert_eq!(seen, (1 + lost..=sent).collect::<Vec<_>>());
+        assert_eq!(subscriber.lost(), u64::from(lost));
+    }
 }
 
 #[test]

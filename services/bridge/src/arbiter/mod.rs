@@ -77,8 +77,8 @@ pub const REPORT_DEADLINE: Duration = Duration::from_millis(200);
 /// refused. A process that was held up for longer must not move the robot when it goes on.
 pub const STALE: Duration = Duration::from_secs(1);
 
-/// How often the command in force is written again to a version-1 board, so that its age stays
-/// below the board's limit of 150 ms.
+/// When the command in force is written again to a version-1 board at the latest, so that its age
+/// stays below the board's limit of 150 ms.
 pub const RESEND: Duration = Duration::from_millis(40);
 
 /// Whether the arm may be moved.

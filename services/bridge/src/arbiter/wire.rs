@@ -155,9 +155,10 @@ impl Arbiter {
     /// What to write now, if anything; ask again until there is nothing. Time has passed before, by
     /// [`Arbiter::advance`].
     ///
-    /// A version-1 board gets a change at once, and the command in force every [`RESEND`]. An
-    /// original board would carry out a repetition, so it gets each command once. Standby it gets
-    /// as often as the other, because nothing else makes it stand.
+    /// A version-1 board gets a change at once, and the command in force again after [`RESEND`],
+    /// or a little sooner ([`Arbiter::resend_early`]). An original board would carry out a repetition,
+    /// so it gets each command once. Standby it gets as often as the other, because nothing else
+    /// makes it stand.
     ///
     /// Only a standby that ends a movement is written while a packet is on the wire. Whoever orders
     /// faster than the wire carries would fill the driver's buffer otherwise, and a standby would

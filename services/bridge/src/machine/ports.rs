@@ -134,7 +134,7 @@ impl BridgeCore {
         self.due.state = Some(at.ns);
         self.arbiter.resend_early(at.robot, REPORT_PERIOD);
         if self.health_due <= at.robot + REPORT_PERIOD {
-            self.health_due = at.robot;
+            self.health_due = self.health_due.min(at.robot);
         }
     }
 

@@ -13,8 +13,8 @@ use crate::counts::Counts;
 use crate::events::Moment;
 use crate::frames::steering_report;
 
-/// A report that has waited longer to be published is out of date, in robot time; reports come
-/// every 5 ms.
+/// A report that has waited longer to be published is out of date, in robot time; they come every
+/// [`REPORT_PERIOD`](super::REPORT_PERIOD).
 const FRESH: Duration = Duration::from_millis(20);
 
 impl BridgeCore {

@@ -41,7 +41,7 @@ const HELP: &[&str] = &[
     "!  samples were lost in the last 30 s    x  its writer is dead or frozen",
     "~  less than half of what is expected    ?  cannot be read    -  closed",
     "LOST counts what was lost on the way, SKIP what this screen was too late",
-    "for, which is usual for a state. QUEUE is how many samples waited at most.",
+    "for. QUEUE is how many samples waited at most.",
 ];
 
 /// Draws everything.

@@ -97,12 +97,11 @@ pub(crate) struct Row {
     pub(crate) expected_hz: Option<f64>,
     /// Samples that wait at most.
     buffer: u64,
-    is_state: bool,
     /// Of a sample, with its stamp; 0 = not known.
     bytes: usize,
     /// Samples of which a reader is sure that they were lost.
     pub(crate) lost: u64,
-    /// Samples that were overwritten in this process's own full queue; usual for a state.
+    /// Samples that were overwritten in this process's own full queue.
     pub(crate) overrun: u64,
     lost_at_ns: Option<u64>,
     pub(crate) samples: u64,
@@ -140,7 +139,6 @@ impl Row {
             usual_hz,
             expected_hz: usual_hz,
             buffer: entry.map_or(u64::MAX, |(_, entry)| entry.qos.buffer as u64),
-            is_state: entry.is_some_and(|(_, entry)| entry.qos.history > 0),
             bytes: layout.unwrap_or_default(),
             lost: 0,
             overrun: 0,
@@ -235,17 +233,11 @@ impl Row {
         }
     }
 
-    /// Takes what a recording lacks before a sample: what was lost before its recorder, which of a
-    /// state is usual, and what that had no time for.
+    /// Takes what a recording lacks before a sample: what was lost before its recorder, and what
+    /// that had no time for.
     pub(crate) fn lack(&mut self, lost: u64, dropped: u64, now_ns: u64) {
-        self.overrun += if self.is_state { lost } else { 0 };
-        let lost = if self.is_state {
-            dropped
-        } else {
-            lost + dropped
-        };
-        if lost > 0 {
-            self.lose(lost, now_ns);
+        if lost + dropped > 0 {
+            self.lose(lost + dropped, now_ns);
         }
     }
 
