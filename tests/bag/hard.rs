@@ -1,6 +1,7 @@
 //! What a recorder stands: one signal twice, kills at any moment, a full disk beside a robot that
-//! drives, a queue that is too short, and ten thousand frames a second. `tests/soak bag` runs the first and the last for
-//! longer, and only there their bounds are held: they want the machine to themselves.
+//! drives, a queue that is too short, and ten thousand frames a second. `tests/soak bag` runs the
+//! kills and the frames for longer, and only there their bounds are held: they want the machine to
+//! themselves.
 
 use std::fs;
 use std::process::{Child, Command, Stdio};

@@ -1,5 +1,5 @@
-//! The signals that end this program in order: Ctrl-C, SIGTERM and a closed terminal. A second Ctrl-C
-//! does not wait for that end, should it hang.
+//! The signals that end this program in order: Ctrl-C, SIGTERM and a closed terminal. A second
+//! Ctrl-C does not wait for that end, should it hang.
 //!
 //! `lager up` waits for them ([`Signals`]): it sleeps in one place and must wake there, whichever
 //! thread gets the signal. For all other commands they set a flag ([`end_in_order`]).
@@ -44,7 +44,7 @@ pub fn end_in_order(shutdown: &Shutdown) -> Result<()> {
 fn on_press(act: impl Fn() + Send + Sync + 'static) -> std::io::Result<()> {
     let last = Press::default();
     let handler = move || {
-        if last.is_over(Clock::monotonic_ns()) {
+        if last.begins(Clock::monotonic_ns()) {
             act();
         }
     };
@@ -58,13 +58,13 @@ fn on_press(act: impl Fn() + Send + Sync + 'static) -> std::io::Result<()> {
 struct Press(AtomicU64);
 
 impl Press {
-    /// Whether a signal that comes now is another press, which begins then.
-    fn is_over(&self, now_ns: u64) -> bool {
+    /// Whether a signal that comes now begins another press.
+    fn begins(&self, now_ns: u64) -> bool {
         let began_ns = self.0.load(Ordering::Relaxed);
-        let is_over =
+        let is_another =
             began_ns == 0 || now_ns.saturating_sub(began_ns) >= ONE_PRESS.as_nanos() as u64;
         let order = Ordering::Relaxed;
-        is_over
+        is_another
             && self
                 .0
                 .compare_exchange(began_ns, now_ns, order, order)
@@ -135,7 +135,7 @@ mod tests {
     fn a_signal_shortly_after_a_press_is_the_same_press() {
         let ms = |count: u64| count * 1_000_000;
         let press = Press::default();
-        let over = [1_000, 1_002, 1_299, 1_300, 1_599, 5_000].map(|now| press.is_over(ms(now)));
-        assert_eq!(over, [true, false, false, true, false, true]);
+        let begun = [1_000, 1_002, 1_299, 1_300, 1_599, 5_000].map(|now| press.begins(ms(now)));
+        assert_eq!(begun, [true, false, false, true, false, true]);
     }
 }

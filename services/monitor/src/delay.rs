@@ -25,7 +25,7 @@ use serde_json::{Value, json};
 use crate::measure::{Gauge, Limits, Plan, Seen};
 use crate::{ToolError, Tools};
 
-/// Between two looks: a fifth of the other tools' shortest, so that the own wait is short.
+/// Between two looks: a fifth of the other tools' shortest wait, so that its own is short.
 const POLL: Duration = Duration::from_millis(1);
 
 /// The longest delay that is told from longer ones, in ns: a minute.
