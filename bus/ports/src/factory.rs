@@ -12,10 +12,11 @@ use crate::error::PortError;
 use crate::found::Found;
 use crate::keeper::Keeper;
 use crate::kept::{self, KeptError};
+use crate::policy::Policy;
 use crate::publisher::Publisher;
 use crate::request::{Client, Server};
 use crate::subscriber::Subscriber;
-use crate::waiter::{Policy, Waiter};
+use crate::waiter::Waiter;
 
 impl Bus {
     /// A writer of `T`, to be used in this thread. It rings the actors of `T`, now and later.

@@ -30,7 +30,7 @@ use std::io;
 
 use rustix::thread::set_current_timer_slack;
 
-use crate::waiter::Policy;
+use crate::policy::Policy;
 
 /// The shortest time slice that Linux gives; the default was 1.4 ms where this was measured.
 const SLICE: Duration = Duration::from_micros(100);
@@ -108,6 +108,13 @@ pub fn wake_with_others(late_at_most: Duration) {
     let _ = set_current_timer_slack(NonZeroU64::new(late_at_most));
 }
 
+/// Whether the calling thread goes before all threads of the normal scheduler. Where the kernel does
+/// not say, no.
+pub(crate) fn is_real_time() -> bool {
+    let real_time = [libc::SCHED_FIFO, libc::SCHED_RR, libc::SCHED_DEADLINE];
+    scheduled().is_ok_and(|how| real_time.iter().any(|one| *one as u32 == how.sched_policy))
+}
+
 /// How the calling thread is scheduled.
 fn scheduled() -> io::Result<libc::sched_attr> {
     // SAFETY: all of its fields are numbers.
@@ -133,6 +140,17 @@ fn set(how: &libc::sched_attr) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_thread_knows_whether_it_has_real_time() {
+        std::thread::spawn(|| {
+            assert!(!is_real_time());
+            let may = set_fifo(1).is_ok();
+            assert_eq!(is_real_time(), may);
+        })
+        .join()
+        .expect("it knows");
+    }
 
     #[test]
     fn a_slice_is_kept_or_unknown_to_the_kernel_and_changes_nothing_else() {

@@ -11,9 +11,8 @@
 //! distance that is too long halves the streak. A look in vain halves it too, and doubles the
 //! streak that is needed next time. So a quiet robot sleeps, a stream that ends costs one look in
 //! vain, and a single late ring is forgiven. A waiter that takes the core from the very writer it
-//! waits for soon stops looking; for the same reason at most one waiter fewer than the machine has
-//! cores looks at a time. Between two rings the waiter sleeps for as long as none is due, which
-//! leaves the core to others.
+//! waits for soon stops looking. Between two rings the waiter sleeps for as long as none is due,
+//! which leaves the core to others.
 //!
 //! **Invariant:** pure; the clock is an argument, in nanoseconds, and the answer is a plan.
 

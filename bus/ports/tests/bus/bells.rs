@@ -94,7 +94,7 @@ fn a_killed_spinner_gives_its_right_back() {
     let bridge = domain.open(Role::Bridge);
     // As many as may spin at a time; none is left to this one unless they give it back.
     let cores = std::thread::available_parallelism().unwrap().get();
-    for _ in 1..cores.min(8) {
+    for _ in 0..cores.min(8) {
         process::start(&domain, "navigator-spins").kill();
     }
     bridge.sweep();
