@@ -1,6 +1,6 @@
-//! `latency/<what>/<mode>/<row>`: every row of every scenario on two cores, as `lager bench` has it.
-//! criterion measures one after the other, so compare what `lager bench` prints, where they take
-//! turns.
+//! `latency/<what>/<mode>/<row>`: every row of every scenario on two cores, as `lager bench` has
+//! it. criterion measures one after the other, so compare what `lager bench` prints, where they
+//! take turns.
 
 use std::time::Duration;
 

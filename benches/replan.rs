@@ -1,9 +1,9 @@
 //! `replan/*`: a way is found blocked, and the way to the goal is planned anew (L6), on the largest
-//! floor that a robot takes: 100 x 100 nodes. Beside it looking once at every way of that floor, which
-//! is the least that any search can do that has to be sure.
+//! floor that a robot takes: 100 x 100 nodes. Beside it looking once at every way of that floor,
+//! which is the least that any search can do that has to be sure.
 //!
-//! `far` has the goal in the opposite corner. `walled` has it straight ahead behind a wall of as many
-//! blocks as there is room for, so that the way leads around it. One iteration is two plans.
+//! `far` has the goal in the opposite corner. `walled` has it straight ahead behind a wall of as
+//! many blocks as there is room for, so that the way leads around it. One iteration is two plans.
 
 use std::hint::black_box;
 use std::time::Duration;

@@ -23,8 +23,8 @@ pub fn compare<W>(domain: &Domain, what: &str, begin: impl FnMut() -> W) -> [f64
     in_turns(what, || bench(domain), begin)
 }
 
-/// The same with the path of robot `r1`, which is up in `domain` and must stay so, as its logic counts
-/// it. Prints how many frames a second it had, too.
+/// The same with the path of robot `r1`, which is up in `domain` and must stay so, as its logic
+/// counts it. Prints how many frames a second it had, too.
 ///
 /// # Panics
 /// When the robot is not up.

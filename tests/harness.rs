@@ -283,7 +283,8 @@ impl Domain {
 }
 
 impl Drop for Domain {
-    /// A test that fails shows what its processes logged, before its folder and its bus are removed.
+    /// A test that fails shows what its processes logged, before its folder and its bus are
+    /// removed.
     fn drop(&mut self) {
         if std::thread::panicking() {
             self.show_logs();

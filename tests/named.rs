@@ -1,4 +1,5 @@
-//! Goods that people call by the names of the warehouse's file, at each place where they order some.
+//! Goods that people call by the names of the warehouse's file, at each place where they order
+//! some.
 
 use std::fs;
 use std::process::Output;

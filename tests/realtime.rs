@@ -1,8 +1,8 @@
 //! Real time as the kernel sees it: what `/proc` says of the services that `up` starts and of their
 //! successors after `kill -9`, and what users without the rights are told.
 //!
-//! What needs those rights is ignored, unless it is asked for as `tests/run` does where it has them;
-//! then it fails without them.
+//! What needs those rights is ignored, unless it is asked for as `tests/run` does where it has
+//! them; then it fails without them.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! A machine that vanishes: it says nothing more, and nobody says for it that it has gone, as when a
-//! cable is pulled or a battery is empty.
+//! A machine that vanishes: it says nothing more, and nobody says for it that it has gone, as when
+//! a cable is pulled or a battery is empty.
 //!
 //! ```text
 //!   a network of the test's own              another one

@@ -82,8 +82,8 @@ impl Trace {
             ms: (unit == "cycles").then_some(value / hertz * 1e3),
         };
         let mut figures = Vec::new();
-        // Over all phases tried, from the tape's jump to another duty, and to the first start bit of
-        // the packet that tells the line.
+        // Over all phases tried, from the tape's jump to another duty, and to the first start bit
+        // of the packet that tells the line.
         for (what, place) in [
             ("tape-to-duty", "/tape_to_duty"),
             ("tape-to-uart", "/tape_to_uart"),

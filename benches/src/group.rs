@@ -89,7 +89,8 @@ impl Group {
 
     /// Measures every entry against the others, in a thread of its own: `options.runs` runs of some
     /// rounds each, every entry once in each round, each round beginning with another one. Without
-    /// the right to real time, what needs it is left out, with a sentence: the rest is worth having.
+    /// the right to real time, what needs it is left out, with a sentence: the rest is worth
+    /// having.
     ///
     /// # Errors
     /// A session failed, or somebody wants to stop.

@@ -7,8 +7,8 @@
 //!   received ─ receive <────── the same back ──────── send      one way = (received - sent) / 2
 //! ```
 //!
-//! Both ends are the same contender and wait the same way, except for `adaptive`: of two cores only
-//! one is ever given to adaptive spinning, so there the receiver adapts and the sender spins. Then
+//! Both ends are the same contender and wait the same way, except for `adaptive`: there the
+//! receiver adapts, and the sender spins, so that it sends at the pace that the row names. Then
 //! only the way to the receiver is timed, for the contender and for its baseline (both ends read
 //! the same clock, CLOCK_MONOTONIC); half a round trip would hide half of a delay at one end.
 //!

@@ -73,8 +73,8 @@ const OBSERVED: [(Entry, usize); 3] = [
     ),
 ];
 
-/// The groups of one regime. A spinning path is not measured: bridge and logic would keep two cores,
-/// and the boards need one.
+/// The groups of one regime. A spinning path is not measured: bridge and logic would keep two
+/// cores, and the boards need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     let group = |what: &str, rows: &[(Entry, usize)], is_real_time: bool| {
         let rows = rows.to_vec();

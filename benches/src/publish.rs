@@ -11,16 +11,16 @@
 //! The readers live in a process of their own and are drained after each publish, so that no buffer
 //! is ever full and the writer finds its queues as readers leave them.
 //!
-//! **`publish-N`**: our typed ports and bare iceoryx2 with the same user header, the same limits and
-//! the same number of subscribers, in turn. Both fill in the whole payload from memory of their own.
-//! Rows are called `publish-64` for 64 bytes to 64 subscribers, `publish-8@1MiB`, and so on.
+//! **`publish-N`**: our typed ports and bare iceoryx2 with the same user header, the same limits
+//! and the same number of subscribers, in turn. Both fill in the whole payload from memory of their
+//! own. Rows are called `publish-64` for 64 bytes to 64 subscribers, `publish-8@1MiB`, and so on.
 //!
 //! **`ring-64`**: what it costs a writer to wake the one actor of a topic that 64 observers read,
 //! for which the writer is kept from its work. The cost of the ring alone is the difference between
 //! publishing while the actor waits for a ring and publishing on the same ports while it sleeps for
-//! something else, measured in pairs (`lager/ring`). It compares with iceoryx2 notifying without publishing
-//! anything: a listener for each reader (`notify`), or, as the typed ports do it, one listener for
-//! the actor while 64 readers poll (`notify-1`).
+//! something else, measured in pairs (`lager/ring`). It compares with iceoryx2 notifying without
+//! publishing anything: a listener for each reader (`notify`), or, as the typed ports do it, one
+//! listener for the actor while 64 readers poll (`notify-1`).
 
 mod readers;
 mod writer;

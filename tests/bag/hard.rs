@@ -96,8 +96,8 @@ fn a_kill_at_any_moment_takes_what_came_since_the_last_flush() {
     must_be_swept(&domain);
 }
 
-/// Starts `lager bag record` with `args` onto a disk of its own with so many KiB, of which a copy is
-/// left as `full.mcap`. The disk is gone when it ends.
+/// Starts `lager bag record` with `args` onto a disk of its own with so many KiB, of which a copy
+/// is left as `full.mcap`. The disk is gone when it ends.
 pub(crate) fn record_on_a_small_disk(domain: &Domain, kib: u32, args: &[&str]) -> Child {
     fs::create_dir(domain.folder().join("disk")).expect("a folder");
     let script = format!(

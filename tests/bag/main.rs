@@ -1,5 +1,5 @@
-//! Recordings as people make them: of a mission, of somebody's own topic, cut short by `kill -9` and
-//! by a full disk, played onto another robot's name, and proved.
+//! Recordings as people make them: of a mission, of somebody's own topic, cut short by `kill -9`
+//! and by a full disk, played onto another robot's name, and proved.
 
 mod hard;
 mod outside;

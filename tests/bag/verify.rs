@@ -29,8 +29,8 @@ fn verified(domain: &Domain, file: &str, with: &[&str]) -> (Value, Option<i32>) 
     (told, output.status.code())
 }
 
-/// Records missions as [`record_mission`] does until the recorder has missed none of the inputs, which
-/// it does where others keep it from its core. Whatever it has is the same again.
+/// Records missions as [`record_mission`] does until the recorder has missed none of the inputs,
+/// which it does where others keep it from its core. Whatever it has is the same again.
 fn record_all_of_a_mission(domain: &Domain, seed: u64, things: &str, file: &str) -> (Value, u64) {
     for _ in 0..10 {
         let killed = record_mission(domain, seed, things, file);
@@ -61,8 +61,8 @@ fn record_all_of_a_mission(domain: &Domain, seed: u64, things: &str, file: &str)
     panic!("this machine is too busy to record a mission");
 }
 
-/// Records a mission with so many things that come and go, in which logic and bridge are killed in turn
-/// at moments that no two missions share. Returns how often logic was.
+/// Records a mission with so many things that come and go, in which logic and bridge are killed in
+/// turn at moments that no two missions share. Returns how often logic was.
 fn record_mission(domain: &Domain, seed: u64, things: &str, file: &str) -> u64 {
     let recorder = recorder(domain, &[file]);
     let seed_text = seed.to_string();

@@ -16,12 +16,13 @@ use crate::station_at;
 
 /// How long the attack lasts.
 const ATTACK: Duration = Duration::from_secs(10);
-/// What a station may need in addition: for each of 64 connections a line, what is read at a time and
-/// the answers that wait, some 70 KiB, and as much again for the allocator.
+/// What a station may need in addition: for each of 64 connections a line, what is read at a time
+/// and the answers that wait, some 70 KiB, and as much again for the allocator.
 const MOST_KIB: u64 = 64 * 70 * 2;
 
-/// What a robot's comm may need in addition: sixteen pieces of lines, what it answers to them, pages
-/// of its program, and what the allocator keeps. It took 7 to 13 MiB for some 40 MiB that it was sent.
+/// What a robot's comm may need in addition: sixteen pieces of lines, what it answers to them,
+/// pages of its program, and what the allocator keeps. It took 7 to 13 MiB for some 40 MiB that it
+/// was sent.
 const MOST_COMM_KIB: u64 = 32 << 10;
 
 /// The most memory that a process has had so far, in KiB.

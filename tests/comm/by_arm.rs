@@ -1,5 +1,5 @@
-//! Goods that a person picks up step by step, over the document's language: the robot drives to them
-//! by itself, asks for one step of the arm after the other, and delivers what is in its claw.
+//! Goods that a person picks up step by step, over the document's language: the robot drives to
+//! them by itself, asks for one step of the arm after the other, and delivers what is in its claw.
 //!
 //! The test is the external computer. As a person would, it looks at the arm to know which step is
 //! next; what it says is in the document's grammar alone.
@@ -76,8 +76,8 @@ impl Asking {
         panic!("servo {servo} does not come to {to}");
     }
 
-    /// Gives an answer that the robot refuses, saying `why`, and asks again. Where logic refuses it,
-    /// the question may come first.
+    /// Gives an answer that the robot refuses, saying `why`, and asks again. Where logic refuses
+    /// it, the question may come first.
     fn is_refused(&mut self, answer: &str, why: &str) {
         self.robot.says(answer);
         let (mut is_told, mut asks) = (false, false);

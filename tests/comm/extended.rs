@@ -102,7 +102,8 @@ impl Station {
 #[test]
 fn a_station_sees_the_robot_drive_to_what_it_has_ordered() {
     let scene = Scene::new();
-    // A machine that is held up loses the link by hand, and it is made anew; logic knows its map then.
+    // A machine that is held up loses the link by hand, and it is made anew; logic knows its map
+    // then.
     let mut station = loop {
         let mut station = Station::new(scene.robot());
         let is_ready = station.hears_until("it waits for an order", |station| {

@@ -1,5 +1,5 @@
-//! A station whose disk is full: it goes on answering, says that nothing is saved, keeps the file as
-//! it was, and saves when there is room again.
+//! A station whose disk is full: it goes on answering, says that nothing is saved, keeps the file
+//! as it was, and saves when there is room again.
 
 use std::fs;
 use std::io::BufReader;

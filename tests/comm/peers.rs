@@ -1,5 +1,6 @@
-//! Peers that were written from the document's grammar alone, in another language: a GaG, a robot and
-//! a Robert of strangers (`peers.py`). What they say and must hear stands in the transcripts beside it.
+//! Peers that were written from the document's grammar alone, in another language: a GaG, a robot
+//! and a Robert of strangers (`peers.py`). What they say and must hear stands in the transcripts
+//! beside it.
 
 use std::fs::{self, File};
 use std::io::Write;

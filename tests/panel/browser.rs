@@ -121,8 +121,8 @@ impl Browser {
 
 /// What it takes of the machine.
 impl Browser {
-    /// On all cores, since they began: the processes of its pages, and all. What a process took that
-    /// has ended meanwhile is not in it.
+    /// On all cores, since they began: the processes of its pages, and all. What a process took
+    /// that has ended meanwhile is not in it.
     pub(crate) fn processor_times(&self) -> [Duration; 2] {
         let second = rustix::param::clock_ticks_per_second() as f64;
         let (mut pages, mut all) = (0.0, 0.0);

@@ -1,9 +1,11 @@
-//! What the panel costs, and how long it takes from a key to the motors, from STOP to motors at 0, and
-//! from a pose to the picture: with a browser, the station, comm and the simulated boards between.
+//! What the panel costs, and how long it takes from a key to the motors, from STOP to motors at 0,
+//! and from a pose to the picture: with a browser, the station, comm and the simulated boards
+//! between.
 //!
-//! A pose is that of the simulator's truth, whose outline is drawn where it is told; the robot itself
-//! glides there within 100 ms. The times of motors are those of the first report of the steering board that shows it, which it
-//! sends every few ms. A pose is told twenty times a second, so up to 50 ms of its time are waiting.
+//! A pose is that of the simulator's truth, whose outline is drawn where it is told; the robot
+//! itself glides there within 100 ms. The times of motors are those of the first report of the
+//! steering board that shows it, which it sends every few ms. A pose is told twenty times a second,
+//! so up to 50 ms of its time are waiting.
 
 use std::fmt;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};

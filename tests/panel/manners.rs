@@ -11,8 +11,8 @@ use crate::browser::{Browser, Page};
 
 const TABS: [&str; 5] = ["missions", "drive", "setup", "line", "log"];
 
-/// Where STOP is nearer than 16 px to what can be pressed, to the screen's edge or to what it is not
-/// to be hit instead of.
+/// Where STOP is nearer than 16 px to what can be pressed, to the screen's edge or to what it is
+/// not to be hit instead of.
 const NEAR_STOP: &str = "(() => { \
     const stop = document.querySelector('#stop').getBoundingClientRect(); \
     const near = [...document.querySelectorAll('button, select, input, a, [tabindex]')].filter((other) => { \

@@ -1,5 +1,5 @@
-//! Why something is not done is told in the reader's language: whatever robot, station and panel say
-//! of it the page knows in Swedish.
+//! Why something is not done is told in the reader's language: whatever robot, station and panel
+//! say of it the page knows in Swedish.
 
 use std::fmt::Display;
 

@@ -9,13 +9,13 @@ use serde_json::json;
 use crate::Scene;
 use crate::browser::Page;
 
-/// How long a robot may drive on after a release, in ms of its clock, which at this speed is that of
-/// the stamps.
+/// How long a robot may drive on after a release, in ms of its clock, which at this speed is that
+/// of the stamps.
 const RELEASE_MS: f64 = 200.0;
 /// Older than this is nothing that a page shows as true, in ms.
 const STALE_MS: f64 = 500.0;
-/// How often one way is tried until it is quick enough: this machine may be held up meanwhile. A way
-/// that does not end a hold never is.
+/// How often one way is tried until it is quick enough: this machine may be held up meanwhile. A
+/// way that does not end a hold never is.
 const TRIES: usize = 3;
 
 /// Expressions that press and let go, or a step of a test for what only the browser can do.
@@ -193,7 +193,8 @@ fn take_hold(scene: &mut Scene, page: &mut Page, hold: &By) {
     });
 }
 
-/// Gamepads are not looked at before the box is ticked, and what is held then is to be let go first.
+/// Gamepads are not looked at before the box is ticked, and what is held then is to be let go
+/// first.
 fn a_stick_held_before_drives_nothing(page: &mut Page) {
     page.value(
         "document.querySelector('#armed').click(); pad.axes = [-1, 0]; window.looks = 0; \

@@ -1,5 +1,6 @@
-//! Setting up and ordering from the page: the warehouse by form, file and strings, the line control's
-//! gains, the calibration, the queue, the goods that cannot be reached, and the map's own controls.
+//! Setting up and ordering from the page: the warehouse by form, file and strings, the line
+//! control's gains, the calibration, the queue, the goods that cannot be reached, and the map's own
+//! controls.
 
 use lager_tests::wait_for;
 use serde_json::{Value, json};
@@ -353,7 +354,8 @@ pub(crate) fn the_map_is_moved_and_zoomed_by_hand_and_keys_and_obstacles_are_put
         "false"
     );
 
-    // Beside every way there is nothing to put, and it says so; a way in the middle takes it by Enter.
+    // Beside every way there is nothing to put, and it says so; a way in the middle takes it by
+    // Enter.
     page.click("#fit");
     page.click_at_mm(250.0, 250.0);
     page.wait_for("#map-said", "there is no way");

@@ -1,5 +1,5 @@
-//! What it costs that somebody watches: the robot's path while ten pages are open, and a page's share
-//! of a core and its memory while the robot drives.
+//! What it costs that somebody watches: the robot's path while ten pages are open, and a page's
+//! share of a core and its memory while the robot drives.
 
 use std::net::TcpStream;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! Observers of a robot that fetches goods at a thousand frames a second: what it costs its path that
-//! they listen.
+//! Observers of a robot that fetches goods at a thousand frames a second: what it costs its path
+//! that they listen.
 
 use std::fs;
 use std::io::Write;
@@ -12,8 +12,8 @@ use lager_tests::{Domain, Running, compare_on_robot, free, lager, pid, wait_for}
 use lager_topics::{MissionQueue, OBSERVERS, SensorLine, Topic};
 use rustix::process::{Signal, kill_process};
 
-/// Prints what the path of a robot on a mission takes, alone and with what `begin` starts, each time
-/// as soon as so many observers are on the line. The robot is started with these `flags`, too.
+/// Prints what the path of a robot on a mission takes, alone and with what `begin` starts, each
+/// time as soon as so many observers are on the line. The robot is started with these `flags`, too.
 fn compare<W>(what: &str, flags: &str, observers: usize, begin: impl Fn(&Domain) -> W) {
     let domain = Domain::new();
     // Goods for longer than it is measured.

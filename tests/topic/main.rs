@@ -1,5 +1,5 @@
-//! `lager topic` and `lager top` on topics of one's own and beside a robot: what is measured, what may
-//! be published, and that a topic that loses samples is seen at once.
+//! `lager topic` and `lager top` on topics of one's own and beside a robot: what is measured, what
+//! may be published, and that a topic that loses samples is seen at once.
 
 mod listened;
 mod screen;

@@ -28,8 +28,8 @@ use crate::error::{BenchError, Fault, broken};
 use crate::sample::{SIZE, Sample};
 
 /// An end that puts to `out` and subscribes to `back`; the first one makes the socket, the other
-/// connects as soon as it is there. Returns when the other end subscribes to `out`, so that not even
-/// the first sample is lost. The socket is gone when the end is.
+/// connects as soon as it is there. Returns when the other end subscribes to `out`, so that not
+/// even the first sample is lost. The socket is gone when the end is.
 pub(crate) fn meet(
     socket: &Path,
     is_first: bool,

@@ -85,8 +85,7 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
         one.exchange(memory::cache_line(out, back))
     }),
     (Entry::new("lager", Mode::Adaptive, TO_HEADER), |one| {
-        // One of two cores at most is given to adaptive spinning, and it is the receiver's wait
-        // that is timed.
+        // It is the receiver's wait that is timed.
         one.ours(match one.side.is_first {
             true => Policy::Spin,
             false => Policy::ADAPTIVE,

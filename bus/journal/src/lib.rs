@@ -24,11 +24,13 @@
 //! and `lager.recording` says of which robot it is ([`Start`]).
 //!
 //! Beside the topics stand channels with the exact `foxglove.*` schemas ([`View`]), derived from
-//! what the topics say ([`Scene`]) so that viewers show map and robot without set-up. Their channel's
-//! metadata has the key `lager.derived`. They are no samples: nobody counts, plays or exports them.
+//! what the topics say ([`Scene`]) so that viewers show map and robot without set-up. Their
+//! channel's metadata has the key `lager.derived`. They are no samples: nobody counts, plays or
+//! exports them.
 //!
-//! A message's publish time is its stamp's and its log time the same, but never before the recording
-//! began nor after the sample was received; both are ns since 1970, so that tools show a date.
+//! A message's publish time is its stamp's and its log time the same, but never before the
+//! recording began nor after the sample was received; both are ns since 1970, so that tools show a
+//! date.
 //!
 //! Whole chunks are what survives: a file that was cut off has all of them and no index, and
 //! [`Recovery`] makes a new file of them.

@@ -1,8 +1,8 @@
 //! A new file of what is whole in another one that was cut off or damaged.
 //!
-//! Every chunk whose CRC is right is copied, message by message, and the new file gets an index, its
-//! counts and an end. The old file is not touched. Whoever uses this reads the new file again with a
-//! [`crate::Check`] before it says that anything was saved.
+//! Every chunk whose CRC is right is copied, message by message, and the new file gets an index,
+//! its counts and an end. The old file is not touched. Whoever uses this reads the new file again
+//! with a [`crate::Check`] before it says that anything was saved.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -58,8 +58,8 @@ impl Recovery {
         let Some(journal) = self.journal.take() else {
             return Ok((Vec::new(), self.recovered));
         };
-        // What the old file says itself is right as long as all of it was copied. That is counted, as
-        // a chunk whose kind was changed by a flipped bit is no damaged chunk.
+        // What the old file says itself is right as long as all of it was copied. That is counted,
+        // as a chunk whose kind was changed by a flipped bit is no damaged chunk.
         let is_copied = |(name, count): (&String, &Count)| {
             let stored = self.numbers.get(name).map_or(0, |numbers| numbers.stored);
             stored == count.received.saturating_sub(count.dropped)

@@ -1,8 +1,8 @@
 //! A file read from its first byte to its last, without its index.
 //!
-//! Bytes come in pieces of any size. A chunk is opened and its CRC compared before any message of it
-//! is handed on, so a message that comes out is as it was written. A chunk that is damaged is told,
-//! and the walk goes on behind it.
+//! Bytes come in pieces of any size. A chunk is opened and its CRC compared before any message of
+//! it is handed on, so a message that comes out is as it was written. A chunk that is damaged is
+//! told, and the walk goes on behind it.
 //!
 //! The topics' names stand in a file's first chunk and again in its index. So if the first chunk is
 //! damaged, a second walk that has [`Learnt`] from the first knows them.

@@ -236,9 +236,9 @@ impl Journal {
         self.chunk.bytes
     }
 
-    /// How many bytes the file grows at the most, if `more` bytes of messages are added to the chunk
-    /// that is open and the file is then ended. A message is no shorter than a stamp in JSON, so a
-    /// chunk's index is shorter than the chunk.
+    /// How many bytes the file grows at the most, if `more` bytes of messages are added to the
+    /// chunk that is open and the file is then ended. A message is no shorter than a stamp in JSON,
+    /// so a chunk's index is shorter than the chunk.
     pub fn room(&self, more: u64) -> u64 {
         let chunk = self.chunk.bytes + more;
         // LZ4 adds one byte in 255 to what it cannot pack; the index has 16 bytes for a message.

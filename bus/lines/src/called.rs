@@ -1,8 +1,8 @@
 //! What a person calls a product: its number, or the name that its warehouse gives it (AMB-38).
 //!
-//! Robot and GaG know numbers only, so a name is looked up where a person uses it, and a number goes
-//! on from there. A name is no number, has neither comma, semicolon nor line break and no blank at an
-//! end, as in the goods string (M3), and no two products of a warehouse share one.
+//! Robot and GaG know numbers only, so a name is looked up where a person uses it, and a number
+//! goes on from there. A name is no number, has neither comma, semicolon nor line break and no
+//! blank at an end, as in the goods string (M3), and no two products of a warehouse share one.
 //!
 //! ```
 //! use lager_lines::{Called, ProductId};

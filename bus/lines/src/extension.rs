@@ -50,15 +50,16 @@
 //! `drive` is renewed by a further `do` before its time is over, with or without another command;
 //! code 8 and 9 are turns that run once and need no renewal. A robot counts the time by its own
 //! clock from when it has read the line, and stands when it is over. A setpoint is done when the
-//! steering board has it, a turn or a step of the arm when it has ended, a calibration likewise, and
-//! everything else when the robot shows the effect.
+//! steering board has it, a turn or a step of the arm when it has ended, a calibration likewise,
+//! and everything else when the robot shows the effect.
 //!
 //! **A stop has a lane of its own.** Whoever sends puts it before all lines that wait to be sent;
 //! whoever receives reads on to the end of what has arrived and carries out every stop in it before
-//! anything else. It is never queued, and commands to wheels and arm that wait are dropped (C5); the
-//! products to fetch still wait. A `resume`, `drive` or `arm` that arrives together with a stop is
-//! refused, whichever of the two was sent first. A line whose first word is `stop` is a stop even if what follows
-//! cannot be read; then it has no number and is not confirmed. Only `resume` ends it.
+//! anything else. It is never queued, and commands to wheels and arm that wait are dropped (C5);
+//! the products to fetch still wait. A `resume`, `drive` or `arm` that arrives together with a stop
+//! is refused, whichever of the two was sent first. A line whose first word is `stop` is a stop
+//! even if what follows cannot be read; then it has no number and is not confirmed. Only `resume`
+//! ends it.
 //!
 //! # Robot to station
 //!

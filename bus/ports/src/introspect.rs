@@ -77,6 +77,8 @@ pub struct TopicInfo {
     pub subscribers: usize,
     /// Number of readers that are observers.
     pub observers: usize,
+    /// How many may read under its public name; not known of a topic without ends.
+    pub places: Option<usize>,
     /// The writers.
     pub writers: Vec<Peer>,
     /// The readers.
@@ -97,6 +99,7 @@ impl TopicInfo {
             publishers: 0,
             subscribers: 0,
             observers: 0,
+            places: None,
             writers: Vec::new(),
             readers: Vec::new(),
             woken: Vec::new(),
@@ -105,11 +108,14 @@ impl TopicInfo {
 }
 
 impl TopicInfo {
-    /// Counts the ends at all services of a topic. A reader reads one of them; a writer writes to
-    /// all, so what one process has there is the most that it has at any of them.
+    /// Counts the ends at all services of a topic, of which the public one comes first. A reader
+    /// reads one of them; a writer writes to all, so what one process has there is the most that it
+    /// has at any of them.
     fn look_at_ends<'a>(&mut self, services: impl IntoIterator<Item = &'a TopicService>) {
         let mut writers: Vec<(u128, Peer)> = Vec::new();
         for service in services {
+            let places = service.static_config().max_subscribers();
+            self.places.get_or_insert(places);
             let ends = service.dynamic_config();
             let mut counted = writers.clone();
             ends.list_publishers(|details| {

@@ -3,8 +3,8 @@
 //! A file that is removed stays with every process that has it mapped. The robot drives on and
 //! nothing fails, but no new process can see it, stop it with a tool, or take over from a service
 //! that ends. So once a second the attendant looks at what the robot's processes have mapped
-//! (`/proc/PID/maps`) and at the files that describe it. It opens nothing of the bus but descriptions
-//! that are new or have changed, and waits for nothing.
+//! (`/proc/PID/maps`) and at the files that describe it. It opens nothing of the bus but
+//! descriptions that are new or have changed, and waits for nothing.
 //!
 //! | file | is missed when |
 //! |---|---|

@@ -1,6 +1,7 @@
 //! How a service that acts on topics waits for them, as its configuration says.
 //!
-//! It is apart from the waiter because a thread's urgency depends on it as well ([`crate::urgency`]).
+//! It is apart from the waiter because a thread's urgency depends on it as well
+//! ([`crate::urgency`]).
 
 use core::fmt;
 use core::str::FromStr;

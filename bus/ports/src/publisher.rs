@@ -160,8 +160,8 @@ impl<T: Topic> Loan<'_, T> {
     /// Sends the sample to the topic's actors and rings them, then sends it to everybody else.
     ///
     /// # Errors
-    /// The transport failed; the sample's number is used up, so those who did not get it count it as
-    /// lost.
+    /// The transport failed; the sample's number is used up, so those who did not get it count it
+    /// as lost.
     pub fn send(self) -> Result<(), SendError> {
         self.deliver(Clock::monotonic_ns(), To::All)
     }

@@ -1,9 +1,9 @@
 //! What a service says of its samples, in its attributes.
 //!
 //! `lager.schema` holds two hashes of layouts; a process that has others is refused. Only who
-//! creates a topic adds `lager.fields.0` to `.6`, the description of the payload in pieces, by which
-//! tools read samples that they have no type for. Nobody requires it, so that a process of plain
-//! iceoryx2 may create a topic without it.
+//! creates a topic adds `lager.fields.0` to `.6`, the description of the payload in pieces, by
+//! which tools read samples that they have no type for. Nobody requires it, so that a process of
+//! plain iceoryx2 may create a topic without it.
 
 use std::fmt::Write;
 

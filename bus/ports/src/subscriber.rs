@@ -27,8 +27,8 @@ impl<T: Topic> Subscriber<T> {
         })
     }
 
-    /// The next sample, oldest first; `None` when there is nothing more. Of a state the older values
-    /// come first, too: whoever acts on it calls [`Subscriber::latest`].
+    /// The next sample, oldest first; `None` when there is nothing more. Of a state the older
+    /// values come first, too: whoever acts on it calls [`Subscriber::latest`].
     ///
     /// # Errors
     /// Too many samples are held, or the transport failed.

@@ -108,8 +108,8 @@ pub fn wake_with_others(late_at_most: Duration) {
     let _ = set_current_timer_slack(NonZeroU64::new(late_at_most));
 }
 
-/// Whether the calling thread goes before all threads of the normal scheduler. Where the kernel does
-/// not say, no.
+/// Whether the calling thread goes before all threads of the normal scheduler. Where the kernel
+/// does not say, no.
 pub(crate) fn is_real_time() -> bool {
     let real_time = [libc::SCHED_FIFO, libc::SCHED_RR, libc::SCHED_DEADLINE];
     scheduled().is_ok_and(|how| real_time.iter().any(|one| *one as u32 == how.sched_policy))
@@ -120,8 +120,8 @@ fn scheduled() -> io::Result<libc::sched_attr> {
     // SAFETY: all of its fields are numbers.
     let mut how: libc::sched_attr = unsafe { core::mem::zeroed() };
     let size = size_of_val(&how);
-    // SAFETY: the pointer is to a live local of the size that is told, which the kernel fills during
-    // the call; the first 0 names the calling thread.
+    // SAFETY: the pointer is to a live local of the size that is told, which the kernel fills
+    // during the call; the first 0 names the calling thread.
     match unsafe { libc::syscall(libc::SYS_sched_getattr, 0, &raw mut how, size, 0) } {
         0 => Ok(how),
         _ => Err(io::Error::last_os_error()),

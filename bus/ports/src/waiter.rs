@@ -117,9 +117,9 @@ impl Waiter {
         })
     }
 
-    /// Waits until rung, at most `timeout` of real time (see [`crate::Clock::real`]). At a time-out,
-    /// and now and then after a ring, readers that have come late get the states that this thread
-    /// publishes.
+    /// Waits until rung, at most `timeout` of real time (see [`crate::Clock::real`]). At a
+    /// time-out, and now and then after a ring, readers that have come late get the states that
+    /// this thread publishes.
     pub fn wait(&self, timeout: Duration) -> Wake {
         let rung = self.wait_while_not(timeout, || self.bell.rung());
         let wakes = self.wakes.get().wrapping_add(1);

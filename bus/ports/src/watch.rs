@@ -1,7 +1,8 @@
 //! Whether something has come to a bus or gone from it, by a look at the folder of its files.
 //!
-//! It is for whoever waits for topics or for their ends: [`crate::Bus::topics`] opens every service,
-//! which takes a core for tens of milliseconds, and a look at a folder a hundredth of that.
+//! It is for whoever waits for topics or for their ends: [`crate::Bus::topics`] opens every
+//! service, which takes a core for tens of milliseconds, and a look at a folder a hundredth of
+//! that.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -58,9 +59,9 @@ impl BusWatch {
         }
     }
 
-    /// Whether one has come, was finished or has gone. At the first call, and where the folder cannot
-    /// be read, yes. Each change is told by two calls, because a port has its tag a moment before it
-    /// can be seen on its topic, and because two changes at once may have the same time.
+    /// Whether one has come, was finished or has gone. At the first call, and where the folder
+    /// cannot be read, yes. Each change is told by two calls, because a port has its tag a moment
+    /// before it can be seen on its topic, and because two changes at once may have the same time.
     pub fn has_changed(&mut self, place: &Place) -> bool {
         let now = (self.look)(place).ok();
         let is_same = now.is_some() && now == self.seen;

@@ -14,10 +14,10 @@
 //!
 //! Who wants to know a state asks for the latest; who keeps what has been reads them all. So states
 //! queue 8 samples, and 16 where they come many times a second. With a queue of one, a recorder
-//! that looked every 2 ms missed 6 % of the states of a robot at ten times its speed, beside two busy
-//! processes on two cores; now it looks every 12 ms and misses 0.1 % (20 s each, AMD EPYC,
-//! 2026-11-26), and none on an idle machine. These queues cost 1.5 MiB of the bridge's locked memory
-//! and 3.3 MiB of logic's.
+//! that looked every 2 ms missed 6 % of the states of a robot at ten times its speed, beside two
+//! busy processes on two cores; now it looks every 12 ms and misses 0.1 % (20 s each, AMD EPYC,
+//! 2026-11-26), and none on an idle machine. These queues cost 1.5 MiB of the bridge's locked
+//! memory and 3.3 MiB of logic's.
 
 use core::fmt;
 
@@ -312,8 +312,8 @@ topics! {
     "The ways on which something stands.",
     { buffer: 8, history: 1, publishers: 1, actors: &[], republish: true, copied: false };
 
-    // Some forty samples a second, a hundred and fifty at a chip's rates: who misses one has to wait
-    // for the next navigator.
+    // Some forty samples a second, a hundred and fifty at a chip's rates: who misses one has to
+    // wait for the next navigator.
     NavInputs = "nav/inputs", ToldInputs,
     "What the navigator was told, in pieces, with proofs of what it did: for `bag play --verify`.",
     { buffer: 64, history: 0, publishers: 1, actors: &[], republish: false, copied: false };

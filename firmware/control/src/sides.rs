@@ -9,11 +9,11 @@
 //! mean counts only when a mark comes, and neither at the delivery's bar, where the line ends, nor
 //! at the next mark behind it, where the way back does. The corrections that bring the robot to its
 //! line after a turn say nothing about the sides, and a station's mark may come soon after a turn.
-//! The bias is exact to a fraction of a duty step, and is rounded up and down in turn: near the duty
-//! at which the wheels break loose, one step may be a tenth of the speed, and half a step too much
-//! bends a way without a line by 5 degrees in 150 mm.
-//! The bias is added wherever both sides should turn alike: to every correction, to turns on the
-//! spot, which would otherwise wander, and to the commands by hand.
+//! The bias is exact to a fraction of a duty step, and is rounded up and down in turn: near the
+//! duty at which the wheels break loose, one step may be a tenth of the speed, and half a step too
+//! much bends a way without a line by 5 degrees in 150 mm. The bias is added wherever both sides
+//! should turn alike: to every correction, to turns on the spot, which would otherwise wander, and
+//! to the commands by hand.
 
 use lager_wire::LineState;
 
@@ -116,8 +116,8 @@ impl Sides {
         self.seen = 0;
     }
 
-    /// What is added to the left side and taken from the right, in duty steps: over all `round`s the
-    /// mean is exact to a 256th of a step.
+    /// What is added to the left side and taken from the right, in duty steps: over all `round`s
+    /// the mean is exact to a 256th of a step.
     pub fn bias(&self, round: u8) -> i16 {
         (self.bias + i16::from(round)) >> 8
     }

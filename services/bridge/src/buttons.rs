@@ -1,18 +1,19 @@
-//! The robot's reset button and mode switch (B1, E14), as lines of a GPIO chip that a closed contact
-//! pulls to ground.
+//! The robot's reset button and mode switch (B1, E14), as lines of a GPIO chip that a closed
+//! contact pulls to ground.
 //!
 //! ```text
 //!   reset    open -> closed    the robot has been put on the delivery node
 //!   switch   open              manual mode
 //!            closed            autonomous mode
 //! ```
-//! - A switch's position is a mode and no toggle. What is seen first is the mode of a robot that has
-//!   just been started; a bridge that takes up an earlier one's state keeps that mode until somebody
-//!   moves the switch. Others may change the mode meanwhile, and the next movement of the switch
-//!   counts again.
+//! - A switch's position is a mode and no toggle. What is seen first is the mode of a robot that
+//!   has just been started; a bridge that takes up an earlier one's state keeps that mode until
+//!   somebody moves the switch. Others may change the mode meanwhile, and the next movement of the
+//!   switch counts again.
 //! - A press that is read a second late is not taken: whoever pressed has given it up.
 //! - The kernel debounces the lines, and dates each change by `CLOCK_MONOTONIC`.
-//! - A chip that cannot be had is no reason to end. It is tried again for ever, and the log says so.
+//! - A chip that cannot be had is no reason to end. It is tried again for ever, and the log says
+//!   so.
 //!
 //! The edge of this is [`Lines`]: whoever has no chip can move contacts there, as a test does.
 

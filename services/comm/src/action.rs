@@ -9,8 +9,8 @@ use lager_topics::{Ask, Input, Order, SteeringOrder, WarehouseMap, WorldAsk};
 pub enum Action {
     /// Say a line to the peer.
     Say(RobotLine),
-    /// Tell the peer how things are, after what is to be said. If it has not taken the last report of
-    /// this kind yet, this one takes its place.
+    /// Tell the peer how things are, after what is to be said. If it has not taken the last report
+    /// of this kind yet, this one takes its place.
     Show(Report),
     /// Give the connection up; another one is made.
     HangUp(&'static str),

@@ -28,9 +28,9 @@
 //!   ms without a word while something is carried out are a lost link. A peer that speaks only the
 //!   document's language may be silent as long as it likes, so there only the end of its connection
 //!   counts, which the kernel finds some 3 s after the last sign of the peer's machine.
-//! - In autonomous mode the document leaves open what a lost link means (AMB-49), so it is configured
-//!   ([`LinkLost`]): the order is carried out all the same, or logic is told to stand at the next node
-//!   until the link is there again.
+//! - In autonomous mode the document leaves open what a lost link means (AMB-49), so it is
+//!   configured ([`LinkLost`]): the order is carried out all the same, or logic is told to stand at
+//!   the next node until the link is there again.
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
 //!   commands among these are dropped. It is carried out even where comm was held up and has given
 //!   the link up before it was read.
@@ -40,9 +40,9 @@
 //!   followed by the next question at once.
 //!
 //! A station that has answered the extension's first line is told states, events and lists besides
-//! (`telling.rs`), and its numbered actions are carried out and answered (`conversation/orders.rs`):
-//! what is waited for stands in `tasks.rs`, what moves the robot in `driving.rs`. No other peer hears
-//! anything of that.
+//! (`telling.rs`), and its numbered actions are carried out and answered
+//! (`conversation/orders.rs`): what is waited for stands in `tasks.rs`, what moves the robot in
+//! `driving.rs`. No other peer hears anything of that.
 
 use core::time::Duration;
 

@@ -10,12 +10,12 @@
 //!                          └─────────────────────┘
 //! ```
 //!
-//! A setpoint that answers a question of the document ends with the next command or the link. One of
-//! an action holds for the time that came with it, in real time from its receipt, unless a further
-//! action renews it; then the robot is made to stand.
+//! A setpoint that answers a question of the document ends with the next command or the link. One
+//! of an action holds for the time that came with it, in real time from its receipt, unless a
+//! further action renews it; then the robot is made to stand.
 //!
-//! Whoever was held up for as long as the bridge's lease of 120 ms has lost the command, and does not
-//! take it up again.
+//! Whoever was held up for as long as the bridge's lease of 120 ms has lost the command, and does
+//! not take it up again.
 
 use core::time::Duration;
 

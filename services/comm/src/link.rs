@@ -5,9 +5,10 @@
 //!   connecting ──> up, reading ──> ended ──> waits 0.1, 0.2 .. 5 s, ± a quarter ──> connecting
 //! ```
 //!
-//! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing is
-//! the other thread's, which never waits: what the peer does not take stays with [`Link`], bounded.
-//! Of what only shows how things are the newest alone is kept, and goes after all that is said.
+//! What it reads goes to the thread of the bus through a bounded channel, and rings that. Writing
+//! is the other thread's, which never waits: what the peer does not take stays with [`Link`],
+//! bounded. Of what only shows how things are the newest alone is kept, and goes after all that is
+//! said.
 
 use std::io;
 use std::net::{Shutdown as Direction, TcpStream, ToSocketAddrs};

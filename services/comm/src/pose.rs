@@ -1,4 +1,5 @@
-//! Where the robot is between nodes, as the external computer is told it, and whether that is known.
+//! Where the robot is between nodes, as the external computer is told it, and whether that is
+//! known.
 
 use lager_lines::extension::Degrees;
 use lager_topics::{NavigatorStatus, Phase, WarehouseMap};

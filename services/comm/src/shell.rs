@@ -5,8 +5,8 @@
 //! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with
 //! its orders.
 //!
-//! Nobody listens whether it lives, so its turns run under a watch: a call that does not return ends
-//! the process, and `up` starts it again.
+//! Nobody listens whether it lives, so its turns run under a watch: a call that does not return
+//! ends the process, and `up` starts it again.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -236,7 +236,8 @@ impl Shell {
         }
     }
 
-    /// Takes what only a station hears that speaks the extension; the last sample of each is enough.
+    /// Takes what only a station hears that speaks the extension; the last sample of each is
+    /// enough.
     fn take_senses(&mut self) {
         let senses = Senses {
             line: self.next(|shell| shell.line.latest()).map(|line| *line),

@@ -235,8 +235,8 @@ impl Tasks {
         self.list.iter().any(is_it)
     }
 
-    /// Nobody is left who wants to hear of actions. What was given stays given, and a request is known
-    /// until it is answered.
+    /// Nobody is left who wants to hear of actions. What was given stays given, and a request is
+    /// known until it is answered.
     pub(crate) fn forget_actions(&mut self) {
         self.list.retain_mut(|one| {
             let is_kept = one.asker == Asker::Question || matches!(one.task, Task::Ask(_));
@@ -378,7 +378,8 @@ impl Tasks {
         });
     }
 
-    /// The bridge has answered, or has not in time. `calibrated` is how many calibrations have ended.
+    /// The bridge has answered, or has not in time. `calibrated` is how many calibrations have
+    /// ended.
     pub(crate) fn answered(&mut self, id: u32, answer: Result<Answer, String>, calibrated: u8) {
         self.end(|one| {
             let Task::Ask(kind) = one.task else {

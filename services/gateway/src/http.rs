@@ -1,7 +1,8 @@
 //! The server of the figures.
 //!
-//! It answers to a number and to `localhost`, and not to a name: a page of somebody else could point
-//! its own name to this machine, and read through its reader's browser what only this machine may.
+//! It answers to a number and to `localhost`, and not to a name: a page of somebody else could
+//! point its own name to this machine, and read through its reader's browser what only this machine
+//! may.
 
 use std::convert::Infallible;
 use std::io;
@@ -23,8 +24,8 @@ use crate::exposition::{self, MEDIA_TYPE};
 /// How often the end is looked for.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Serves everybody until `over` is set: who asks for figures, if there is a `listener`, and whoever
-/// else is served in `runtime`.
+/// Serves everybody until `over` is set: who asks for figures, if there is a `listener`, and
+/// whoever else is served in `runtime`.
 pub(crate) fn serve(
     runtime: &Runtime,
     listener: Option<TcpListener>,

@@ -15,8 +15,8 @@
 //!   `foxglove`.
 //! - `processes`: what each process of the robot takes of the machine.
 //!
-//! It never writes to the bus, and nobody waits for it. Whoever asks gets what was known at the last
-//! poll; nothing is sampled away, and what the gateway itself has missed is a figure, too.
+//! It never writes to the bus, and nobody waits for it. Whoever asks gets what was known at the
+//! last poll; nothing is sampled away, and what the gateway itself has missed is a figure, too.
 
 #![forbid(unsafe_code)]
 

@@ -1,15 +1,17 @@
-//! Live views for Foxglove, by the server of its own crate: each topic is a channel, and beside them
-//! stand the views that a recording has, of the same definition ([`Scene`]).
+//! Live views for Foxglove, by the server of its own crate: each topic is a channel, and beside
+//! them stand the views that a recording has, of the same definition ([`Scene`]).
 //!
 //! ```text
 //!   listener ──JSON──> Live ──> channels ──queue──> client
 //!                       └─> Kept: the last message of what lasts ──> who subscribes later
 //! ```
 //!
-//! **Nobody is waited for.** Each client has a queue of its own. What finds it full pushes the oldest
-//! message out, so a client that is slow or reads nothing loses messages and holds nobody up.
+//! **Nobody is waited for.** Each client has a queue of its own. What finds it full pushes the
+//! oldest message out, so a client that is slow or reads nothing loses messages and holds nobody
+//! up.
 //!
-//! **A client can only look.** The server offers nothing that a client could write, ask for or call.
+//! **A client can only look.** The server offers nothing that a client could write, ask for or
+//! call.
 
 use std::collections::{BTreeMap, HashMap};
 use std::net::SocketAddr;

@@ -83,6 +83,7 @@ mod tests {
             publishers: 1,
             subscribers: 2,
             observers: 0,
+            places: None,
             writers: vec![here],
             readers: vec![here, stranger],
             woken: Vec::new(),

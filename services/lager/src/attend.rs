@@ -3,9 +3,9 @@
 //! Opening and sweeping can hang where shared memory is damaged, and a mapping whose file was cut
 //! short ends the process. So the supervisor stays away from the bus. This child of it keeps each
 //! service's last state for a successor, sweeps what dead processes leave, listens whether every
-//! service is heard, prints what the robot does, and watches its mission. Where there is no external
-//! computer it tells the robot its warehouse. If this process fails, the supervisor starts another
-//! one, and the mission is watched on where it was.
+//! service is heard, prints what the robot does, and watches its mission. Where there is no
+//! external computer it tells the robot its warehouse. If this process fails, the supervisor starts
+//! another one, and the mission is watched on where it was.
 //!
 //! It decides nothing about processes: it reports what it hears (`words.rs`), and the supervisor
 //! acts.

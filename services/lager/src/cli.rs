@@ -165,11 +165,13 @@ the queue. It then goes home, or for the next order.")]
     },
     /// Tell the robot that the product has been picked up
     Picked {
-        /// Believe it even if the claw does not feel the product and the arm is not where it is carried
+        /// Believe it even if the claw does not feel the product and the arm is not where it is
+        /// carried
         #[arg(long)]
         force: bool,
     },
-    /// Choose who picks the goods up, from the next ones on: a person (`lager picked`), or the robot
+    /// Choose who picks the goods up, from the next ones on: a person (`lager picked`), or the
+    /// robot
     Pick {
         /// Who
         by: PickBy,
@@ -201,7 +203,8 @@ What stands there outlives a restart of the simulator.")]
 The robot must stand: take the manual mode, or stop it. `lager reset` is the reset button of a
 real robot that has been put on the delivery node.")]
     Place {
-        /// Column, row and heading (left, up, right, down) [default: the delivery node of a simulated robot]
+        /// Column, row and heading (left, up, right, down) [default: the delivery node of a
+        /// simulated robot]
         #[arg(value_name = "X,Y,HEADING", allow_hyphen_values = true)]
         place: Option<Place>,
     },
@@ -234,7 +237,8 @@ real robot that has been put on the delivery node.")]
         #[arg(long)]
         iceoryx2: bool,
     },
-    /// The service that talks to the external computer, and the only one with a socket to the network
+    /// The service that talks to the external computer, and the only one with a socket to the
+    /// network
     #[command(after_help = "Examples:
   lager comm --station 192.168.1.5:7420
 
@@ -267,8 +271,8 @@ whole line or with what stands behind the word: to `fetchprod` with 3 or with `f
 typed before it is asked for waits, but `styrcomm 1` stops at once and drops the commands that wait.
 One GaG is connected at a time.")]
     Gag {
-        /// The station's unix socket [default: that of the robot's own station, else gag in the folder
-        /// of the bus]
+        /// The station's unix socket [default: that of the robot's own station, else gag in the
+        /// folder of the bus]
         #[arg(long, value_name = "SOCKET", help_heading = "Station")]
         socket: Option<PathBuf>,
     },
@@ -364,7 +368,8 @@ pub struct UpArgs {
     /// So many things come and go on a simulated floor with squares of 50 cm or more [default: 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::obstacles, help_heading = "Body")]
     pub obstacles: Option<u32>,
-    /// Run the clock of a simulated robot this many times as fast, that of an emulated one at most [default: 1]
+    /// Run the clock of a simulated robot this many times as fast, that of an emulated one at most
+    /// [default: 1]
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = values::speed, help_heading = "Body")]
     pub speed: Option<f64>,
     /// The external computer that runs at this address, instead of one that `up` starts
@@ -373,15 +378,16 @@ pub struct UpArgs {
     /// Do without an external computer; `up` tells the robot its warehouse
     #[arg(long, help_heading = "Station")]
     pub no_station: bool,
-    /// Where robots connect to the station that `up` starts [default: 127.0.0.1:7420, or a free port]
+    /// Where robots connect to the station that `up` starts [default: 127.0.0.1:7420, or a free
+    /// port]
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
     pub listen: Option<std::net::SocketAddr>,
     /// Where a GaG connects to it: the path of a unix socket [default: gag in the robot's folder of
     /// the bus]
     #[arg(long, value_name = "SOCKET", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
     pub gag: Option<PathBuf>,
-    /// Where the operator panel answers browsers of this machine [default: 127.0.0.1:7410, or a free
-    /// port]
+    /// Where the operator panel answers browsers of this machine [default: 127.0.0.1:7410, or a
+    /// free port]
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["headless", "no_station", "station"], help_heading = "Station")]
     pub panel: Option<std::net::SocketAddr>,
     /// Do without a panel
@@ -390,15 +396,16 @@ pub struct UpArgs {
     /// Show the robot's figures to Prometheus, there or at 127.0.0.1:7430
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, help_heading = "Outside")]
     pub metrics: Option<std::net::SocketAddr>,
-    /// Show the robot live to Foxglove, there or at 127.0.0.1:8765; `lager gateway --help` says more
+    /// Show the robot live to Foxglove, there or at 127.0.0.1:8765; `lager gateway --help` says
+    /// more
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, help_heading = "Outside")]
     pub foxglove: Option<std::net::SocketAddr>,
     /// Let real boards carry out --mission by themselves, with nobody in their way; a simulated or
     /// emulated robot does so anyway
     #[arg(long, help_heading = "Mission")]
     pub script: bool,
-    /// The products that wait to be fetched from the start, by number or name, in this order [default:
-    /// the first of the warehouse; with the station of somebody else, none]
+    /// The products that wait to be fetched from the start, by number or name, in this order
+    /// [default: the first of the warehouse; with the station of somebody else, none]
     #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<Called>,
     /// End when the mission is delivered (0) or has failed (3)
@@ -441,8 +448,8 @@ pub struct StationArgs {
     /// and nothing is saved]
     #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub warehouse: Option<PathBuf>,
-    /// Products that a robot is to fetch after what waits for it already, by number or name, such as
-    /// r1=3,screws; may be given several times
+    /// Products that a robot is to fetch after what waits for it already, by number or name, such
+    /// as r1=3,screws; may be given several times
     #[arg(long, value_name = "ROBOT=GOODS,GOODS", value_parser = values::fetch, help_heading = "Station")]
     pub fetch: Vec<Fetch>,
     /// Where the operator panel answers browsers [default: 127.0.0.1:7410, or a free port]
@@ -468,7 +475,8 @@ pub struct SimulateArgs {
     /// Built-in warehouse or warehouse file; may be given several times
     #[arg(long, value_name = "FILE", help_heading = "Mission")]
     pub warehouse: Vec<String>,
-    /// The products to fetch, by number or name, in this order [default: the first of the warehouse]
+    /// The products to fetch, by number or name, in this order [default: the first of the
+    /// warehouse]
     #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<Called>,
     /// What is left of the battery's charge at the start [default: what the seed says]
@@ -510,7 +518,8 @@ pub struct BenchArgs {
     /// Print one line of JSON instead of a table
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// How often to measure everything; every figure is the median over the runs (not `chip`) [default: 5]
+    /// How often to measure everything; every figure is the median over the runs (not `chip`)
+    /// [default: 5]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::runs)]
     pub runs: Option<usize>,
     /// Take few samples, for a first look (not `chip`)
@@ -529,11 +538,13 @@ pub struct BenchArgs {
 pub enum Scenario {
     /// One sample from a writer to a waiting reader in another process
     Hop,
-    /// A sensor packet on one port until its steering command on the other, through bridge and logic
+    /// A sensor packet on one port until its steering command on the other, through bridge and
+    /// logic
     Path,
     /// What publishing costs with 1 to 64 subscribers and observers
     Fanout,
-    /// Cycles of the boards' real images, from tape to duty and to UART; `.ci/firmware` builds what it runs
+    /// Cycles of the boards' real images, from tape to duty and to UART; `.ci/firmware` builds what
+    /// it runs
     Chip,
     /// From the start of `lager stop` until a robot at full speed reports wheels at rest
     Stop,

@@ -12,7 +12,8 @@
 //! nobody asks for commands while a robot turns or moves its arm. It is the next answer as well,
 //! for a station that passes over what it has not asked for.
 //!
-//! [`Desk`] is pure: lines in, lines out. The shell around it waits for the terminal and the socket.
+//! [`Desk`] is pure: lines in, lines out. The shell around it waits for the terminal and the
+//! socket.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};

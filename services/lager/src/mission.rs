@@ -7,9 +7,9 @@
 //!   it has none, or somebody else's,       they are given to the robot's own queue, one after the
 //!   and in virtual time                    other, as `lager queue add` does
 //! ```
-//! Either way it is watched here. A product counts as delivered when logic says so. The robot is put
-//! into autonomous mode at the beginning, unless somebody has set its mode before; from then on that
-//! is a person's.
+//! Either way it is watched here. A product counts as delivered when logic says so. The robot is
+//! put into autonomous mode at the beginning, unless somebody has set its mode before; from then on
+//! that is a person's.
 //!
 //! A process that takes a mission over from a killed one starts from its [`Mission`]: an order that
 //! logic has not shown yet is given again under its number, which logic takes for a repeat.
@@ -334,7 +334,8 @@ impl Watch {
         now - *self.stuck_since.get_or_insert(now) >= patience
     }
 
-    /// For what the robot has stood too long, where nobody ends it. Who picks by hand moves the arm.
+    /// For what the robot has stood too long, where nobody ends it. Who picks by hand moves the
+    /// arm.
     fn unhelped(&mut self, now: Duration, status: &NavigatorStatus) -> Option<Hold> {
         let hold = status.hold.get().filter(|hold| match hold {
             Hold::Battery => self.helper == Helper::Nobody,

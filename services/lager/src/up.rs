@@ -71,8 +71,8 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     })
 }
 
-/// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move off by
-/// themselves: there somebody has to ask for it twice.
+/// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move
+/// off by themselves: there somebody has to ask for it twice.
 fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
     let warehouse = config.warehouse()?;
     if config.station.wanted && config.station.address.is_some() {

@@ -33,7 +33,8 @@ use crate::mission::Mission;
 use crate::report::Note;
 use crate::services::Service;
 
-/// The longest message. A mission with all products of a large warehouse has some hundreds of bytes.
+/// The longest message. A mission with all products of a large warehouse has some hundreds of
+/// bytes.
 const LONGEST: usize = 32 * 1_024;
 
 /// From the supervisor to the attendant.

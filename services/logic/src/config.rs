@@ -78,8 +78,8 @@ pub struct LogicConfig {
     /// How far a joint may be from the carry pose while the robot drives with goods, in servo
     /// units of 0.29 degrees.
     pub carry_tolerance: u16,
-    /// Where the shoulder's servo is when the claw is around goods that stand as they should in front
-    /// of the robot, in servo units.
+    /// Where the shoulder's servo is when the claw is around goods that stand as they should in
+    /// front of the robot, in servo units.
     pub reach_shoulder: u16,
     /// The elbow's servo for that.
     pub reach_elbow: u16,

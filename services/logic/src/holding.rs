@@ -1,6 +1,6 @@
 //! Why the robot stands although its phase would turn the wheels: the steering board is unheard,
-//! the arm is not in the carry pose, the battery is low, the external computer is out of reach, or no
-//! line frames come.
+//! the arm is not in the carry pose, the battery is low, the external computer is out of reach, or
+//! no line frames come.
 //!
 //! ```text
 //!   no report for 200 ms ------> Unheard ---- a report; a turn that was under way is judged --->

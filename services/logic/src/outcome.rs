@@ -14,7 +14,8 @@ pub(crate) enum Outcome {
     Missed,
     /// Something stands on the way ahead.
     Blocked,
-    /// What had to come first is done: the phase's manoeuvre begins now. The mission learns nothing.
+    /// What had to come first is done: the phase's manoeuvre begins now. The mission learns
+    /// nothing.
     Ready,
     /// It cannot go on: what, what was expected, and what was seen.
     Failed(FailureKind, f32, f32),

@@ -9,13 +9,13 @@
 //! one number out when it takes up a status. An unchanged order is renewed every 40 ms of robot
 //! time, with the frame before that moment if there is one.
 //!
-//! A turn takes one decision for each sample and, only if there was none, one for the time that
-//! has passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`), and
-//! a renewal those of the newest frame since its order was given. How long frames took is counted
+//! A turn takes one decision for each sample and, only if there was none, one for the time that has
+//! passed. What follows from a sample carries that sample's stamps on (`lager_ports::Cause`), and a
+//! renewal those of the newest frame since its order was given. How long frames took is counted
 //! when the turn's orders are out ([`FrameMeter`]).
 //!
-//! Last of all the journal is told (`nav/inputs`): the input, its time, and a proof of what became of
-//! it.
+//! Last of all the journal is told (`nav/inputs`): the input, its time, and a proof of what became
+//! of it.
 //!
 //! **Safe state**: silence. When this process ends, for whatever reason, the order in force is no
 //! longer renewed, and the bridge stops the robot when the lease is over, 120 ms later.

@@ -13,9 +13,9 @@
 //! One turn makes two quarters when there was no tape at the first, or when an interrupted turn is
 //! given again.
 //!
-//! A quarter that ended by time, with no tape in sight, has not told where the robot really looks. So
-//! what dead reckoning is wrong by in the first of two adds to that of the second: tape that comes in
-//! sight 15 degrees before a half turn is over may seem to come after only 140 degrees.
+//! A quarter that ended by time, with no tape in sight, has not told where the robot really looks.
+//! So what dead reckoning is wrong by in the first of two adds to that of the second: tape that
+//! comes in sight 15 degrees before a half turn is over may seem to come after only 140 degrees.
 
 use lager_wire::LineState;
 

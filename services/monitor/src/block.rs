@@ -14,8 +14,8 @@
 //! Nothing here knows a topic; [`crate::sentence`] says what a sample means. The table gives order,
 //! names and kinds of the fields, and the end of a field's name is its unit. A value that equals
 //! the payload's blank value is unknown and shown as `-`. Enums are words, and fields of the same
-//! structure stand beside each other. A histogram is shown by its quantiles. Numbers are exact, except for floating-point ones, which have
-//! three decimals; programs take the JSON.
+//! structure stand beside each other. A histogram is shown by its quantiles. Numbers are exact,
+//! except for floating-point ones, which have three decimals; programs take the JSON.
 
 use std::fmt::Write;
 

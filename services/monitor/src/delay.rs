@@ -1,8 +1,8 @@
 //! `topic delay`: how old samples are when they are published and when an observer has them.
 //!
 //! An observer is never woken: it looks every millisecond, and a sample waits for its look. That
-//! wait is the observer's own and says nothing of the bus, so it is told apart by the moment at which
-//! each look begins:
+//! wait is the observer's own and says nothing of the bus, so it is told apart by the moment at
+//! which each look begins:
 //!
 //! ```text
 //!  source_time --> publish_time ~~~~> look --> received

@@ -1,13 +1,13 @@
 //! The topic tools: list, info, echo, hz, bw, delay and pub, for any topic of any robot, by name;
-//! `lager top`, which shows all of them at once (`top`); and the table of topics for Python programs
-//! (`python.rs`), which needs no robot.
+//! `lager top`, which shows all of them at once (`top`); and the table of topics for Python
+//! programs (`python.rs`), which needs no robot.
 //!
 //! All but pub are observers: they poll, hold no listener and never slow the path. They know no
-//! topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`. The table leads from a name to its
-//! static type; a topic that is in no table brings its description along. Each tool writes text or
-//! one JSON value a line to the writer that it is given, and says how many samples it lost. Every
-//! call into the bus is made under a watchdog, so that a tool reports a bus that does not answer and
-//! does not wait for it.
+//! topic, except for the sentences of some samples (`sentence.rs`) and the head of `top`. The table
+//! leads from a name to its static type; a topic that is in no table brings its description along.
+//! Each tool writes text or one JSON value a line to the writer that it is given, and says how many
+//! samples it lost. Every call into the bus is made under a watchdog, so that a tool reports a bus
+//! that does not answer and does not wait for it.
 
 mod block;
 mod delay;

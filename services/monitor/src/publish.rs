@@ -1,13 +1,13 @@
 //! `topic pub`: samples of any topic from JSON, on the command line or from standard input.
 //!
 //! **What moves a robot is not published beside it by mistake.** A topic of the table is published
-//! under the locks of the robot's name and of its bridge, as a player does, so while a robot of that
-//! name is up it is refused, and none can start. Beside a robot that is up, only `--live` publishes,
-//! and only what the table lets several write (orders and inputs, which the arbiter and the navigator
-//! judge like anybody's). What one service alone writes, such as `sensor/line` or `nav/status`, is
-//! never published beside a robot: readers would see two worlds, and a successor would resume from
-//! the wrong one. Other people's topics move no robot of ours; one that somebody else writes takes
-//! `--live` as well.
+//! under the locks of the robot's name and of its bridge, as a player does, so while a robot of
+//! that name is up it is refused, and none can start. Beside a robot that is up, only `--live`
+//! publishes, and only what the table lets several write (orders and inputs, which the arbiter and
+//! the navigator judge like anybody's). What one service alone writes, such as `sensor/line` or
+//! `nav/status`, is never published beside a robot: readers would see two worlds, and a successor
+//! would resume from the wrong one. Other people's topics move no robot of ours; one that somebody
+//! else writes takes `--live` as well.
 
 use std::io::Write;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -109,11 +109,12 @@ pub enum PublishError {
 }
 
 impl<W: Write> Tools<'_, W> {
-    /// `topic pub`: publishes on `name` until there is no more, a limit or the shutdown, and says how
-    /// much that was.
+    /// `topic pub`: publishes on `name` until there is no more, a limit or the shutdown, and says
+    /// how much that was.
     ///
     /// # Errors
-    /// A robot is up or somebody else writes the topic, nobody knows it, or a payload does not fit it.
+    /// A robot is up or somebody else writes the topic, nobody knows it, or a payload does not fit
+    /// it.
     pub fn publish(&mut self, name: &str, what: &Publishing) -> Result<(), PublishError> {
         let permit = || permit(self.bus, name, what.live);
         let _locks = self.watchdog.over("looking at the topic", permit)?;

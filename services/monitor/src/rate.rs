@@ -55,8 +55,8 @@ struct Rate {
 }
 
 impl Rate {
-    /// Samples a second since the last one before the window, or in the first window since its first
-    /// one, up to the last. A topic that comes once a second has a rate, too.
+    /// Samples a second since the last one before the window, or in the first window since its
+    /// first one, up to the last. A topic that comes once a second has a rate, too.
     fn hz(&self) -> f64 {
         if self.samples == 0 {
             return 0.0;

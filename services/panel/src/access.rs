@@ -1,12 +1,12 @@
 //! Who may open the page, and what he may do there.
 //!
 //! On loopback everybody may drive: who can connect there has a shell on this machine. Beyond it a
-//! token is asked for, one of two: a viewer's looks and stops, a driver's drives as well. The page's
-//! address carries it once (`http://HOST/?token=...`); from then on a cookie does.
+//! token is asked for, one of two: a viewer's looks and stops, a driver's drives as well. The
+//! page's address carries it once (`http://HOST/?token=...`); from then on a cookie does.
 //!
-//! A page of somebody else must not reach the panel through its reader's browser. So the `Host` that
-//! a browser sends must be an address of this panel and not a name that somebody has pointed here,
-//! and the socket's `Origin` must be that host.
+//! A page of somebody else must not reach the panel through its reader's browser. So the `Host`
+//! that a browser sends must be an address of this panel and not a name that somebody has pointed
+//! here, and the socket's `Origin` must be that host.
 
 use std::fmt::Write as _;
 use std::io;

@@ -1,8 +1,8 @@
 //! The socket at which the panel is asked: how many may be in at once, and for how long.
 //!
 //! Somebody who connects and says nothing, or his request a byte at a time, must not keep others
-//! out. So there is room for [`MOST`] connections, and each ends after [`STAY`] unless it has become
-//! a page's socket, which has limits of its own (`socket`).
+//! out. So there is room for [`MOST`] connections, and each ends after [`STAY`] unless it has
+//! become a page's socket, which has limits of its own (`socket`).
 
 use std::future::Future;
 use std::io;

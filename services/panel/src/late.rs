@@ -2,8 +2,9 @@
 //!
 //! Nobody compares that clock with the panel's. What is compared is the difference of both from one
 //! line to the next: the least difference of the last [`SPAN`] is that of a line that nothing held
-//! up, and whatever comes with a greater one was held up by so much more. Two clocks drift apart, so
-//! the least is forgotten in time; a page says `here` once a second, so that there always is one.
+//! up, and whatever comes with a greater one was held up by so much more. Two clocks drift apart,
+//! so the least is forgotten in time; a page says `here` once a second, so that there always is
+//! one.
 
 use std::time::Duration;
 
@@ -65,7 +66,8 @@ mod tests {
     #[test]
     fn clocks_that_drift_apart_make_nothing_late() {
         let mut late = Late::default();
-        // One second in ten thousand is the worst that a tuned clock does; this is five times as bad.
+        // One second in ten thousand is the worst that a tuned clock does; this is five times as
+        // bad.
         for second in 0..3_600 {
             let said = second * 1_000;
             let now = at(u64::from(said) + u64::from(second) / 2);

@@ -1,4 +1,5 @@
-//! The page's files, in the program itself: nothing is built for it and nothing fetched from elsewhere.
+//! The page's files, in the program itself: nothing is built for it and nothing fetched from
+//! elsewhere.
 
 /// Name, type and content of each.
 const FILES: &[(&str, &str, &str)] = &[

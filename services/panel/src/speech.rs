@@ -1,5 +1,6 @@
 //! The lines that a page and the panel say to each other: the station's extension
-//! ([`lager_lines::extension`]) with the robot's name in it, and a few words about the station itself.
+//! ([`lager_lines::extension`]) with the robot's name in it, and a few words about the station
+//! itself.
 //!
 //! # Page to panel, one line in a message
 //!
@@ -28,7 +29,8 @@
 //!
 //! `lost`: it was given to the robot, and nobody knows what came of it.
 //!
-//! A line that cannot be read is refused if it has a number; a page that goes on like this is closed.
+//! A line that cannot be read is refused if it has a number; a page that goes on like this is
+//! closed.
 
 use lager_lines::Name;
 use lager_lines::extension::{Action, Order};

@@ -16,8 +16,8 @@ use crate::bag::{Bag, BagError};
 /// The columns in front of the payload's.
 const STAMP: &str = "unix_ns,sequence,writer,epoch,source_time_ns,publish_time_ns,lost,dropped";
 
-/// Writes a table for each of `topics`, or of all if none are given, into the folder `to`, and names
-/// them.
+/// Writes a table for each of `topics`, or of all if none are given, into the folder `to`, and
+/// names them.
 ///
 /// # Errors
 /// The file cannot be read, has no such topic or is not ours, or a table cannot be written.

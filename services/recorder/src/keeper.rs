@@ -1,8 +1,8 @@
 //! The thread that writes: it takes what the listener has queued, and lets it survive.
 //!
 //! It sleeps for a flush period and then writes all that has come. So it costs few wake-ups, and a
-//! disk that is slow for a while fills the queue and nothing else. What it takes at once it sorts by
-//! time, so that a file is in order except across two flushes.
+//! disk that is slow for a while fills the queue and nothing else. What it takes at once it sorts
+//! by time, so that a file is in order except across two flushes.
 
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -1,4 +1,5 @@
-//! The recorder: what is on the bus into a file, and what is in a file back onto a bus or into text.
+//! The recorder: what is on the bus into a file, and what is in a file back onto a bus or into
+//! text.
 //!
 //! ```text
 //!   bus ──polls──> listener ──queue──> keeper ──> file            (record)
@@ -11,8 +12,8 @@
 //! entry. The structure of a file is `lager-journal`'s; here are threads, clocks and files.
 //!
 //! **What is lost is counted, and where.** A sample may be overwritten before the listener looks
-//! (lost, from the stamps), or find the queue full because the disk is slow (dropped). Both stand in
-//! each message and in the file's counts.
+//! (lost, from the stamps), or find the queue full because the disk is slow (dropped). Both stand
+//! in each message and in the file's counts.
 //!
 //! **What survives.** The keeper ends a chunk and calls `fdatasync` every 150 ms. A recorder
 //! that is killed loses at most what came since, and its file needs `lager bag recover`. On a full

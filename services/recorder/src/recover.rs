@@ -10,8 +10,8 @@ use crate::bag::{Bag, BagError};
 use crate::disk::Disk;
 use crate::look::report;
 
-/// Copies every whole chunk of `file` to `copy` (beside it, as `NAME.recovered.mcap`, unless given),
-/// reads the copy again, and says what it has. The file itself is not touched.
+/// Copies every whole chunk of `file` to `copy` (beside it, as `NAME.recovered.mcap`, unless
+/// given), reads the copy again, and says what it has. The file itself is not touched.
 ///
 /// # Errors
 /// The file cannot be read or has nothing to recover, the copy is there already or cannot be

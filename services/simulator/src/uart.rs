@@ -4,9 +4,10 @@
 //!   Pi --write--> [byte, arrives at t] [..] --> board     every byte takes 10 bits (8N1)
 //!   Pi <--read--- [byte, arrives at t] [..] <-- board     queued whole or not at all
 //! ```
-//! A byte exists for a board from the moment its last bit is over. The Pi's UART hands on what it has
-//! when the line falls idle, so the Pi gets what was queued in one piece in one piece. Nothing waits
-//! for a reader: what the Pi does not fetch in time is lost, as on a real port nobody has open.
+//! A byte exists for a board from the moment its last bit is over. The Pi's UART hands on what it
+//! has when the line falls idle, so the Pi gets what was queued in one piece in one piece. Nothing
+//! waits for a reader: what the Pi does not fetch in time is lost, as on a real port nobody has
+//! open.
 
 use std::collections::VecDeque;
 

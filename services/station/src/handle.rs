@@ -102,8 +102,8 @@ impl Handle {
         self.lock().outlets.subscribe(false)
     }
 
-    /// What robots have said lately, the last [`Subscription::KEPT`] of all robots together, and then
-    /// what they say from now on.
+    /// What robots have said lately, the last [`Subscription::KEPT`] of all robots together, and
+    /// then what they say from now on.
     pub fn recall(&self) -> Subscription {
         self.lock().outlets.subscribe(true)
     }
@@ -118,8 +118,8 @@ impl Handle {
         self.ask(robot, |station| station.act(robot, action))
     }
 
-    /// Stops a robot, whoever drives it. `None`: it is told, and speaks only the document's language,
-    /// which confirms nothing.
+    /// Stops a robot, whoever drives it. `None`: it is told, and speaks only the document's
+    /// language, which confirms nothing.
     ///
     /// # Errors
     ///

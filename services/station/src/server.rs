@@ -51,7 +51,8 @@ pub struct ServerConfig {
     /// The file of the warehouse, in which changes are saved. It need not be there yet: then a GaG
     /// or another user of the station describes the warehouse. The robots' queues lie beside it.
     pub warehouse: Option<PathBuf>,
-    /// What robots are to fetch after what waits for them already. A name needs the warehouse's file.
+    /// What robots are to fetch after what waits for them already. A name needs the warehouse's
+    /// file.
     pub fetch: Vec<(Name, Called)>,
 }
 

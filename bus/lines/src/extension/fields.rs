@@ -1,6 +1,6 @@
 //! Lines of fields, `key=value`: they stand in any order, each at most once, and what is not known
-//! is left out. A field that a reader does not know is passed over, so that there may be more of them
-//! one day.
+//! is left out. A field that a reader does not know is passed over, so that there may be more of
+//! them one day.
 
 use core::fmt;
 

@@ -61,7 +61,8 @@ pub enum Action {
     Resume,
     /// `reset`: the robot stands on the delivery corner and looks into the warehouse (B1).
     Reset,
-    /// `place`: the robot stands on a crossing and looks along the grid; a simulated one is put there.
+    /// `place`: the robot stands on a crossing and looks along the grid; a simulated one is put
+    /// there.
     Place(Edge),
     /// `picked`: the goods are in the gripper (L7).
     Picked {

@@ -17,8 +17,8 @@ use crate::warehouse::{Coord, ProductId};
 /// What a robot tells.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Report {
-    /// The steering board reports both motors off under the stop. An original board reports nothing,
-    /// so nobody says this for it.
+    /// The steering board reports both motors off under the stop. An original board reports
+    /// nothing, so nobody says this for it.
     Stopped {
         /// The stop's number.
         number: u32,

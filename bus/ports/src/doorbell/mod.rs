@@ -184,8 +184,8 @@ pub(crate) struct RoleRinger {
 }
 
 impl RoleRinger {
-    /// A ringer of the bells of `role`, present and future, for samples of the topic or request with
-    /// the number `id`.
+    /// A ringer of the bells of `role`, present and future, for samples of the topic or request
+    /// with the number `id`.
     pub(crate) fn to(board: &Board, role: Role, id: u32) -> Result<Self, PortError> {
         Ok(Self {
             segment: board.open(role)?,

@@ -148,10 +148,10 @@ impl Lent {
 
 /// The only place that sends, so that the compiler puts iceoryx2's loop over the places of
 /// subscribers in here. Called from several places, that loop stayed a function of its own and kept
-/// its counter in memory: 21 instructions for each place that is not taken instead of 14. For the 74
-/// places of a topic without actors, a publish took 4 760 instructions instead of 4 290, and 1.2 to
-/// 1.3 times as long as bare iceoryx2 instead of 1.05 to 1.1 (one process, 64 bytes, one reader).
-/// `publish/to-1` in `benches/limits.toml` shows if a compiler does it otherwise.
+/// its counter in memory: 21 instructions for each place that is not taken instead of 14. For the
+/// 74 places of a topic without actors, a publish took 4 760 instructions instead of 4 290, and 1.2
+/// to 1.3 times as long as bare iceoryx2 instead of 1.05 to 1.1 (one process, 64 bytes, one
+/// reader). `publish/to-1` in `benches/limits.toml` shows if a compiler does it otherwise.
 #[inline(never)]
 fn sent(sample: Loaned) -> Result<(), SendError> {
     match sample.send() {

@@ -1,6 +1,7 @@
 //! Actors have a service of their own and are served first; everybody else gets the same samples,
 //! as exactly.
 
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use lager_ports::{Cause, Peer, Policy, PortError, Wake};
@@ -52,6 +53,48 @@ fn actors_and_observers_get_the_same_samples_with_the_same_stamps() {
         assert_eq!(seen[0].0, frame(number));
         assert_eq!(seen[0].1.sequence, u64::from(number));
     }
+}
+
+#[test]
+fn an_actor_that_looks_without_pause_is_there_before_the_observers_have_the_sample() {
+    const ROUNDS: u32 = 100_000;
+    let domain = Domain::new();
+    let publisher = domain.open(Role::Bridge).publisher::<SensorLine>().unwrap();
+    let looked_at = AtomicU32::new(0);
+    let was_first = AtomicBool::new(false);
+    if std::thread::available_parallelism().unwrap().get() == 1 {
+        // Nobody is there while the writer runs.
+        return;
+    }
+    std::thread::scope(|scope| {
+        let actor = scope.spawn(|| {
+            let (logic, observing) = (domain.open(Role::Logic), domain.open(Role::Observer));
+            let waiter = logic.waiter(Policy::Spin).unwrap();
+            let observers = (0..20).map(|_| observing.subscriber::<SensorLine>().unwrap());
+            let mut observers: Vec<_> = observers.collect();
+            let last = observers.last_mut().unwrap();
+            looked_at.store(1, Ordering::Release);
+            for number in 1..=ROUNDS {
+                assert_eq!(waiter.wait(Duration::from_secs(60)), Wake::Rung);
+                if drain(last).is_empty() {
+                    // With the copies first, the ring that was heard would say that it is there.
+                    was_first.store(true, Ordering::Release);
+                    break;
+                }
+                looked_at.store(number + 1, Ordering::Release);
+            }
+        });
+        for number in 1..=ROUNDS {
+            while looked_at.load(Ordering::Acquire) < number {
+                if actor.is_finished() {
+                    return;
+                }
+                std::thread::yield_now();
+            }
+            send(&publisher, number);
+        }
+    });
+    assert!(was_first.load(Ordering::Acquire), "in {ROUNDS} rounds");
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! A payload from what people write: JSON, or anything else that serde reads, into bytes.
 //!
-//! What is refused names the field and what it may be: `invalid value: integer 300, expected a whole
-//! number from 0 to 255 in `sensor.version``. A field that is not named keeps what the bytes had, and
-//! a list may end early, as the payloads' own types have it. A field that there is not is refused, and
-//! so are `reserved` ones, which nobody sees.
+//! What is refused names the field and what it may be: `invalid value: integer 300, expected a
+//! whole number from 0 to 255 in `sensor.version``. A field that is not named keeps what the bytes
+//! had, and a list may end early, as the payloads' own types have it. A field that there is not is
+//! refused, and so are `reserved` ones, which nobody sees.
 
 use core::fmt;
 

@@ -2,9 +2,9 @@
 //!
 //! It fits what [`Described`](super::Described) writes and what the payload's own type writes, in
 //! which a list may end early and `reserved` fields are left out. Each type says one word, since
-//! Foxglove reads no unions. So two samples fit no schema, and no program of ours writes one: a code
-//! that no variant has, which JSON shows as its number, and a fraction that is no number, which
-//! JSON shows as null.
+//! Foxglove reads no unions. So two samples fit no schema, and no program of ours writes one: a
+//! code that no variant has, which JSON shows as its number, and a fraction that is no number,
+//! which JSON shows as null.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};

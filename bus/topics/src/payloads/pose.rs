@@ -1,5 +1,5 @@
-//! Where the robot is between nodes, from what logic tells: the node last passed, the way since then
-//! and where it looks.
+//! Where the robot is between nodes, from what logic tells: the node last passed, the way since
+//! then and where it looks.
 
 use super::nav::{Heading, MapProduct, NavigatorStatus, Phase, Side, WarehouseMap};
 
@@ -15,8 +15,8 @@ pub struct Pose {
 }
 
 impl NavigatorStatus {
-    /// Where the middle of the axle is, if what the robot does is known. `map` is the warehouse that
-    /// it drives in.
+    /// Where the middle of the axle is, if what the robot does is known. `map` is the warehouse
+    /// that it drives in.
     pub fn pose(&self, map: &WarehouseMap) -> Option<Pose> {
         pose(self, map)
     }

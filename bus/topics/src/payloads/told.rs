@@ -39,7 +39,8 @@ coded! {
         MoveUp = 8,
         /// All waiting orders are taken back.
         ClearQueue = 9,
-        /// The goods are in the gripper (`number`: the order; `flag`: whether or not it feels them).
+        /// The goods are in the gripper (`number`: the order; `flag`: whether or not it feels
+        /// them).
         PickupDone = 10,
         /// Who picks the goods up (`value`: a [`Pick`](super::Pick)).
         Pick = 11,

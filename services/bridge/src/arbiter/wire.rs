@@ -155,8 +155,8 @@ impl Arbiter {
     /// What to write now, if anything; ask again until there is nothing. Time has passed before, by
     /// [`Arbiter::advance`].
     ///
-    /// A version-1 board gets a change at once, and the command in force again after [`RESEND`],
-    /// or a little sooner ([`Arbiter::resend_early`]). An original board would carry out a repetition,
+    /// A version-1 board gets a change at once, and the command in force again after [`RESEND`], or
+    /// a little sooner ([`Arbiter::resend_early`]). An original board would carry out a repetition,
     /// so it gets each command once. Standby it gets as often as the other, because nothing else
     /// makes it stand.
     ///
@@ -377,7 +377,8 @@ impl Arbiter {
         }
     }
 
-    /// Whether a command is written only once the wire is free. Whatever ends a movement does not wait.
+    /// Whether a command is written only once the wire is free. Whatever ends a movement does not
+    /// wait.
     fn waits_for_wire(&self, command: SteerCommand) -> bool {
         let is_standby = |command: SteerCommand| command.code == STANDBY.code();
         !is_standby(command) || self.written.is_some_and(is_standby)

@@ -60,9 +60,9 @@ use rest::Rest;
 /// When `link/health` is published at the latest if nothing changes, in robot time.
 const HEALTH_PERIOD: Duration = Duration::from_millis(100);
 
-/// How often the steering board reports at 500 000 Bd, in robot time. What falls due before the next
-/// report is done with this one: no timer has to wake the bridge for it, least of all in the middle
-/// of a frame's way.
+/// How often the steering board reports at 500 000 Bd, in robot time. What falls due before the
+/// next report is done with this one: no timer has to wake the bridge for it, least of all in the
+/// middle of a frame's way.
 const REPORT_PERIOD: Duration = Duration::from_millis(5);
 
 /// How often a shutdown writes standby at least, if there is a board.

@@ -1,5 +1,5 @@
-//! The buttons through the whole bridge: contacts move at the edge of the service, and the bus shows
-//! what came of it.
+//! The buttons through the whole bridge: contacts move at the edge of the service, and the bus
+//! shows what came of it.
 
 use std::io;
 use std::sync::{Arc, Condvar, Mutex};

@@ -1,9 +1,10 @@
-//! `lager bench command`: how long it takes from a command that a GaG sends to the station until the
-//! robot's motors turn, over the station's socket, TCP on this machine, comm, bridge and boards.
+//! `lager bench command`: how long it takes from a command that a GaG sends to the station until
+//! the robot's motors turn, over the station's socket, TCP on this machine, comm, bridge and
+//! boards.
 //!
-//! The robot is in manual mode and asks for one command after the other. A GaG, this process, lets it
-//! drive and stand in turn. Both ends of a time are of `CLOCK_MONOTONIC`: just before the line is
-//! written, and when a sample was published on the robot's bus.
+//! The robot is in manual mode and asks for one command after the other. A GaG, this process, lets
+//! it drive and stand in turn. Both ends of a time are of `CLOCK_MONOTONIC`: just before the line
+//! is written, and when a sample was published on the robot's bus.
 
 use std::fmt;
 use std::io::{BufRead, BufReader, Write};

@@ -8,9 +8,10 @@
 //! ```
 //!
 //! This process plays the station in the first two, and is the GaG of a real one in the third. Each
-//! cut has a comm of its own, which connects at once: one that was cut off before waits for longer and
-//! longer. All else is the same robot. A time begins just before the cut, and ends with the first sample of the simulated world
-//! (`truth/pose`, every 20 ms) in which both motors are at duty 0. It is up to 20 ms too long.
+//! cut has a comm of its own, which connects at once: one that was cut off before waits for longer
+//! and longer. All else is the same robot. A time begins just before the cut, and ends with the
+//! first sample of the simulated world (`truth/pose`, every 20 ms) in which both motors are at duty
+//! 0. It is up to 20 ms too long.
 
 use std::fmt;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};

@@ -1,5 +1,5 @@
-//! What the boards have sent is recorded and played to another bridge and navigator: the same inputs
-//! must give the same commands, byte for byte.
+//! What the boards have sent is recorded and played to another bridge and navigator: the same
+//! inputs must give the same commands, byte for byte.
 
 use std::collections::VecDeque;
 use std::time::Duration;

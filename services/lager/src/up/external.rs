@@ -9,8 +9,9 @@
 //!                           by anything else: one of this robot's own, at a port that is free
 //!   no port can be had, or no line can tell the warehouse: none
 //! ```
-//! A station of its own shows a panel, unless the robot is headless: at 127.0.0.1:7410, or at a port
-//! that is free. Everybody on this machine may drive from there, so it answers this machine alone.
+//! A station of its own shows a panel, unless the robot is headless: at 127.0.0.1:7410, or at a
+//! port that is free. Everybody on this machine may drive from there, so it answers this machine
+//! alone.
 //!
 //! The socket is opened here and handed to the station as its standard output, so the port stays
 //! the same when a station dies, and a robot that connects meanwhile waits for its successor.
@@ -159,8 +160,8 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
     }
 }
 
-/// A robot of this user's on this bus that is up, has a station of its own at the usual address, and
-/// drives in the same warehouse; and where its panel is.
+/// A robot of this user's on this bus that is up, has a station of its own at the usual address,
+/// and drives in the same warehouse; and where its panel is.
 fn neighbour(config: &Config) -> Result<Option<(String, Option<SocketAddr>)>> {
     let bus = config.bus()?;
     let place = bus.place()?;

@@ -7,8 +7,8 @@
 //!              +-- aim elsewhere, five times -+------------------------------+-------> Failed
 //! ```
 //!
-//! What was gripped badly slips out after seconds. So the goods are held over their stand until they
-//! would have slipped: there they fall back onto it, and can be gripped better.
+//! What was gripped badly slips out after seconds. So the goods are held over their stand until
+//! they would have slipped: there they fall back onto it, and can be gripped better.
 //!
 //! The robot stands while the arm works. Its progress is published, so that a successor goes on
 //! with the same attempt; it repeats a move that may already have been made.

@@ -1,5 +1,5 @@
-//! Driving straight back until the odometer reads so many mm: away from the cross bar, to turn round,
-//! or to where there is room for a turn.
+//! Driving straight back until the odometer reads so many mm: away from the cross bar, to turn
+//! round, or to where there is room for a turn.
 
 use core::time::Duration;
 

@@ -15,10 +15,10 @@
 //!
 //! At a pick station the mark alone says where the robot is. The document would also have it use
 //! its distance to the shelf (L7, L9), which would place it worse. Of 300 simulated robots that
-//! turned in by the mark none stood more than 7 mm from its place, while their rangers, as they come
-//! out of the box, were up to 25 mm wrong about it: a board's table is the datasheet's typical one, and
-//! the shelf is 11 cm away, where a ranger tells whole centimetres and nothing under 10 (2026-11-24,
-//! `services/lager/src/simulate/placed.rs`). A claw grips firmly within 25 mm.
+//! turned in by the mark none stood more than 7 mm from its place, while their rangers, as they
+//! come out of the box, were up to 25 mm wrong about it: a board's table is the datasheet's typical
+//! one, and the shelf is 11 cm away, where a ranger tells whole centimetres and nothing under 10
+//! (2026-11-24, `services/lager/src/simulate/placed.rs`). A claw grips firmly within 25 mm.
 
 use core::time::Duration;
 

@@ -54,9 +54,9 @@ impl Mission {
         is_at_work && self.order.id == id
     }
 
-    /// A person takes the order under way back, whose goods the robot does not hold. It ends what it
-    /// is about, and goes home from the next place where it decides, or on the next order. Whether
-    /// another manoeuvre begins at once.
+    /// A person takes the order under way back, whose goods the robot does not hold. It ends what
+    /// it is about, and goes home from the next place where it decides, or on the next order.
+    /// Whether another manoeuvre begins at once.
     pub(crate) fn cancel_under_way(&mut self, out: &mut Output) -> bool {
         think_of_product(ThoughtKind::OrderCancelled, self.order.product, out);
         out.queue_changed = true;
@@ -189,8 +189,8 @@ impl Mission {
         self.put_off(out) || self.begin_on_the_way_home(out)
     }
 
-    /// Begins a waiting order from where it stands instead of going home first. Whether there is one
-    /// that can be reached.
+    /// Begins a waiting order from where it stands instead of going home first. Whether there is
+    /// one that can be reached.
     pub(super) fn begin_on_the_way_home(&mut self, out: &mut Output) -> bool {
         if self.goal != Goal::Home {
             return false;

@@ -18,8 +18,8 @@ pub enum Input<'a> {
     Map(&'a WarehouseMap),
     /// A product is to be fetched.
     Order(&'a Order),
-    /// The order with this number, which waits or whose goods are not held yet, is not to be carried
-    /// out.
+    /// The order with this number, which waits or whose goods are not held yet, is not to be
+    /// carried out.
     Cancel(u32),
     /// The waiting order with this number is to change places with the one before it.
     MoveUp(u32),

@@ -227,8 +227,8 @@ fn killed(mut trial: Trial, kills: impl IntoIterator<Item = (u64, u64)>) -> Tria
     trial
 }
 
-/// Two robots on their way back, pushed aside so shortly before the delivery corner that they pass it
-/// without seeing its mark: on their side of the line it is too short for the sensors.
+/// Two robots on their way back, pushed aside so shortly before the delivery corner that they pass
+/// it without seeing its mark: on their side of the line it is too short for the sensors.
 fn beside_their_lines() -> [Trial; 2] {
     let robot = |size, delivery, product, aside_mm: f64| {
         let map = warehouse(size, delivery, 50, &[product]);

@@ -1,7 +1,7 @@
 //! The bus end of `lager top`: reads the topics that the model wants, and looks who is on them.
 //!
-//! A row that is closed or filtered out has no subscription; of it only the bus is asked, which knows
-//! its ends. The head takes four states of the robot and the stop word.
+//! A row that is closed or filtered out has no subscription; of it only the bus is asked, which
+//! knows its ends. The head takes four states of the robot and the stop word.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -192,7 +192,8 @@ impl<S: Source> Pull for Pulled<S> {
         let lost = self.from.lost() - self.lost;
         self.lost = self.from.lost();
         if found > 0 || lost > 0 {
-            model.row(name).look(found, lost, Clock::monotonic_ns());
+            let seen = (found, self.from.queue());
+            model.row(name).look(seen, lost, Clock::monotonic_ns());
         }
         Ok(())
     }
@@ -226,7 +227,8 @@ impl Ends {
         })
     }
 
-    /// Whether no writer has gone since the look. One that was killed has its ports until it is swept.
+    /// Whether no writer has gone since the look. One that was killed has its ports until it is
+    /// swept.
     fn writers_are_there(&self) -> bool {
         let mut writers = self.topics.iter().flat_map(|topic| &topic.writers);
         let is_there = |pid: u32| pid == 0 || Path::new("/proc").join(pid.to_string()).exists();

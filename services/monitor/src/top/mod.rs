@@ -8,8 +8,8 @@
 //!
 //! [`model`] and [`render`] are pure; `feed` reads the bus and this file the terminal. It is an
 //! observer like the other tools and looks at the queues every 5 ms. What a row that is not shown
-//! would tell is not read; the figures come from stamps, so no payload is looked at but those of the
-//! head.
+//! would tell is not read; the figures come from stamps, so no payload is looked at but those of
+//! the head.
 
 mod feed;
 mod head;

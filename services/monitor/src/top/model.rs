@@ -1,5 +1,5 @@
-//! What `lager top` knows and how it is looked at. Pure: samples, ends, keys and times go in; rows in
-//! an order, and which topics are to be read, come out.
+//! What `lager top` knows and how it is looked at. Pure: samples, ends, keys and times go in; rows
+//! in an order, and which topics are to be read, come out.
 
 use std::collections::BTreeMap;
 

@@ -155,7 +155,8 @@ fn head(model: &Model, page: &mut Page<'_>) {
     path(model, page);
 }
 
-/// The latencies of the last second, or of all of a recording: of frames to their decision, or with room each stage.
+/// The latencies of the last second, or of all of a recording: of frames to their decision, or with
+/// room each stage.
 fn path(model: &Model, page: &mut Page<'_>) {
     if !model.head.has_path() {
         return page.put("path      not measured", dim());

@@ -96,7 +96,6 @@ pub(crate) struct Row {
     usual_hz: Option<f64>,
     pub(crate) expected_hz: Option<f64>,
     /// Samples that wait at most.
-    buffer: u64,
     /// Of a sample, with its stamp; 0 = not known.
     bytes: usize,
     /// Samples of which a reader is sure that they were lost.
@@ -138,7 +137,6 @@ impl Row {
             unread: None,
             usual_hz,
             expected_hz: usual_hz,
-            buffer: entry.map_or(u64::MAX, |(_, entry)| entry.qos.buffer as u64),
             bytes: layout.unwrap_or_default(),
             lost: 0,
             overrun: 0,
@@ -154,6 +152,7 @@ impl Row {
     /// Takes who writes and reads it now.
     pub(crate) fn take_ends(&mut self, info: &TopicInfo, life: impl Fn(u32) -> Life) {
         self.readers = Some(info.subscribers);
+        self.places = self.places.or(info.places);
         let why = match info.layout {
             Layout::Ours | Layout::Described | Layout::Unused => None,
             Layout::Other => Some("the processes that use it are of another build"),
@@ -176,8 +175,8 @@ impl Row {
         (self.authors, self.readers) = (Vec::new(), Some(0));
     }
 
-    /// Its samples were those of a recording up to that moment: of its ends only a stamp is left, and
-    /// what it lost at any time is to be seen.
+    /// Its samples were those of a recording up to that moment: of its ends only a stamp is left,
+    /// and what it lost at any time is to be seen.
     pub(crate) fn end_recording(&mut self, now_ns: u64) {
         self.authors = vec![Author {
             role: None,
@@ -219,14 +218,14 @@ impl Row {
         self.window = Window::default();
     }
 
-    /// Takes what one look has found: so many samples, and so many losses before them. Losses while
-    /// as many waited as the queue holds are this process's own: it was late.
-    pub(crate) fn look(&mut self, found: u64, lost: u64, now_ns: u64) {
+    /// Takes what one look has found in a queue for so many samples, and how many were lost before.
+    /// Losses while the queue was full are this process's own: it was late.
+    pub(crate) fn look(&mut self, (found, queue): (u64, usize), lost: u64, now_ns: u64) {
         self.window.queue = self.window.queue.max(found);
         if lost == 0 {
             return;
         }
-        if found >= self.buffer {
+        if found >= queue as u64 {
             self.overrun += lost;
         } else {
             self.lose(lost, now_ns);
@@ -385,7 +384,7 @@ mod tests {
         for at in [0, 10, 20, 34, 40_u64] {
             row.hear(&stamp((100 + at) * MS));
         }
-        row.look(5, 0, 140 * MS);
+        row.look((5, 16), 0, 140 * MS);
         row.end_window(1_100 * MS);
         assert!((row.figures.hz - 100.0).abs() < 1e-6, "{:?}", row.figures);
         assert_eq!(row.figures.jitter_p99_ns / MS, 4);
@@ -402,17 +401,23 @@ mod tests {
     #[test]
     fn losses_in_ones_own_full_queue_are_told_apart() {
         let mut state = row("nav/status");
-        state.look(16, 30, MS);
+        state.look((16, 16), 30, MS);
         assert_eq!((state.lost, state.overrun), (0, 30));
         assert_eq!(state.trouble(MS), Trouble::None);
         let mut stream = row("steering/command");
-        stream.look(3, 2, MS);
+        stream.look((3, 16), 2, MS);
         assert_eq!((stream.lost, stream.overrun), (2, 0));
         assert_eq!(stream.trouble(MS), Trouble::Losing);
         let later = MS + REMEMBERED.as_nanos() as u64;
         assert_eq!(stream.trouble(later), Trouble::None);
-        stream.look(16, 5, MS);
+        stream.look((16, 16), 5, MS);
         assert_eq!((stream.lost, stream.overrun), (2, 5));
+        // A topic of somebody's own, of which the table says nothing.
+        let mut own = Row::new("weather/now", None);
+        own.look((4, 4), 9, MS);
+        assert_eq!((own.lost, own.overrun), (0, 9));
+        own.look((3, 4), 1, MS);
+        assert_eq!((own.lost, own.overrun), (1, 9));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The screen as text at two sizes, and what the keys do to it.
 //!
-//! The pictures in `pictures/` are what the screen showed when they were taken; `LAGER_PICTURES=take`
-//! takes them anew.
+//! The pictures in `pictures/` are what the screen showed when they were taken;
+//! `LAGER_PICTURES=take` takes them anew.
 
 use std::path::Path;
 
@@ -43,6 +43,7 @@ fn info(topic: &str, writers: Vec<Peer>) -> TopicInfo {
         publishers: writers.len(),
         subscribers: 3,
         observers: 1,
+        places: Some(74),
         writers,
         readers: Vec::new(),
         woken: Vec::new(),
@@ -79,7 +80,7 @@ fn driving() -> Model {
                 ..Stamp::default()
             };
             model.hear(entry.name, &stamp);
-            model.row(entry.name).look(1, 0, at);
+            model.row(entry.name).look((1, entry.qos.buffer), 0, at);
         }
     }
     for number in (0..100_u64).filter(|number| number % 5 > 0) {
@@ -92,7 +93,7 @@ fn driving() -> Model {
         };
         model.hear("weather/now", &stamp);
         let lost = u64::from(number % 5 == 1);
-        model.row("weather/now").look(1, lost, at);
+        model.row("weather/now").look((1, 16), lost, at);
     }
     let mut health = Health {
         mode: Mode::Autonomous.into(),

@@ -181,7 +181,8 @@ fn the_wheel_is_handed_over_when_its_driver_says_so() {
     anna.say("free r1 3");
     assert_eq!(bo.line("answer 3").unwrap(), "answer 3 done");
 
-    // A driver whose page is gone has handed over, too; so has one whose asker is gone nobody to ask.
+    // A driver whose page is gone has handed over, too; so has one whose asker is gone nobody to
+    // ask.
     cy.say("take r1 2");
     bo.line("about r1 connected=1 speaks=1 driver=panel-2 asks=panel-3")
         .unwrap();

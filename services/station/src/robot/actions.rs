@@ -12,7 +12,8 @@ use crate::shown::{Reply, Told};
 use crate::wheel::{Key, LEASE};
 
 impl Robot {
-    /// Gives it an action, whose number is returned. To drive it and to move its arm is its driver's.
+    /// Gives it an action, whose number is returned. To drive it and to move its arm is its
+    /// driver's.
     ///
     /// # Errors
     ///

@@ -1,8 +1,9 @@
 //! The GaG that speaks for one of the robots.
 //!
-//! A GaG may send commands faster than its robot takes them, and then it has not been asked for them.
-//! Those wait in the robot's queue of commands ([`Robot::command`]), in their order, and so does the
-//! `pickup_done` behind them (C5). The robot takes them before the GaG is asked for another one.
+//! A GaG may send commands faster than its robot takes them, and then it has not been asked for
+//! them. Those wait in the robot's queue of commands ([`Robot::command`]), in their order, and so
+//! does the `pickup_done` behind them (C5). The robot takes them before the GaG is asked for
+//! another one.
 
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
 use lager_lines::{Map, Name, Products, SideLength, Text};
@@ -47,7 +48,8 @@ impl Station {
         }
     }
 
-    /// Lets a command wait that nobody has asked for; `None` where this is none, or no robot is there.
+    /// Lets a command wait that nobody has asked for; `None` where this is none, or no robot is
+    /// there.
     fn queue(&mut self, name: Option<Name>, answer: &Answer) -> Option<Result<(), CommandRefused>> {
         let name = name?;
         let robot = self.robots.get_mut(&name)?;

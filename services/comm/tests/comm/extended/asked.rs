@@ -1,5 +1,5 @@
-//! Actions that other services answer or show: the bridge, the simulated world, and logic where it is
-//! told its place.
+//! Actions that other services answer or show: the bridge, the simulated world, and logic where it
+//! is told its place.
 
 use lager_comm::Senses;
 use lager_topics::{
