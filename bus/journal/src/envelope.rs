@@ -56,6 +56,12 @@ impl EnvelopeSchema {
 }
 
 impl EnvelopeSchema {
+    /// The payload's layout, if the schema `text` has it.
+    pub fn payload(text: &[u8]) -> Option<Description> {
+        let schema: serde_json::Value = serde_json::from_slice(text).ok()?;
+        Description::parse(schema["$comment"].as_str()?).ok()
+    }
+
     /// Whether messages of a topic with the schema `text` are read and written as these are.
     pub fn fits(&self, text: &[u8]) -> bool {
         let parsed = |text| {
@@ -104,8 +110,7 @@ mod tests {
     fn a_schema_has_the_layout_in_its_comment_and_fits_one_without() {
         let schema = EnvelopeSchema::of(&Description::of::<LineFrame>());
         let mut value: serde_json::Value = serde_json::from_slice(&schema.text).expect("JSON");
-        let layout = value["$comment"].as_str().expect("a text");
-        let layout = Description::parse(layout).expect("a layout");
+        let layout = EnvelopeSchema::payload(&schema.text).expect("a layout");
         assert_eq!(layout.name(), "LineFrame");
         assert_eq!(layout.size(), size_of::<LineFrame>());
         value.as_object_mut().expect("an object").remove("$comment");

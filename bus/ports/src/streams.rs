@@ -5,8 +5,8 @@
 //!
 //! - **received + lost = sent**, once a stream's last sample has been received, for every stream
 //!   that began after its reader attached. Of a stream that was there before, the reader counts
-//!   from the first sample that it receives: of those overwritten earlier it does not know how many
-//!   were sent after it attached.
+//!   from the first sample that it receives. Samples that were overwritten before that are not
+//!   counted as lost, since it does not know how many of them were sent after it attached.
 //! - **A stamp may be false**, if its writer is damaged or foreign. So a gap counts only if that
 //!   many samples could have been sent since the stream was last heard; a later, lower number shows
 //!   that there was no gap; and a sample from the future is not newer than the present

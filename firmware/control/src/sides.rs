@@ -5,9 +5,9 @@
 //!   settled corrections --> mean of the last second --- at a mark --> bias: left + b, right - b
 //! ```
 //!
-//! The line before a mark of the grid is straight; the way out to the delivery need not be. So the
-//! mean counts only when a mark comes, and neither at the delivery's bar, where the line ends, nor
-//! at the next mark behind it, where the way back does. The corrections that bring the robot to its
+//! The line before a mark of the grid is straight; the way to the delivery need not be. So the mean
+//! counts only when a mark comes, and counts neither at the delivery's bar nor at the first mark
+//! after it, since the line between those two may be curved. The corrections that bring the robot to its
 //! line after a turn say nothing about the sides, and a station's mark may come soon after a turn.
 //! The bias is exact to a fraction of a duty step, and is rounded up and down in turn: near the
 //! duty at which the wheels break loose, one step may be a tenth of the speed, and half a step too

@@ -50,7 +50,7 @@ pub fn run(config: &Config, args: &TopArgs, patience: &Patience) -> Result<()> {
 fn over(file: &Path, args: &TopArgs, patience: &Patience) -> Result<()> {
     let name = file.display().to_string();
     let mut recorded = None;
-    lager_recorder::samples(file, &mut |robot, topic, envelope| {
+    let layouts = lager_recorder::samples(file, &mut |robot, topic, envelope| {
         let recorded = recorded.get_or_insert_with(|| Recorded::new(&name, robot, &args.filter));
         let lacking = Lacking {
             lost: envelope.lost,
@@ -58,7 +58,10 @@ fn over(file: &Path, args: &TopArgs, patience: &Patience) -> Result<()> {
         };
         recorded.take(topic, &envelope.stamp, lacking, envelope.payload);
     })?;
-    let recorded = recorded.with_context(|| format!("{name} has no samples"))?;
+    let mut recorded = recorded.with_context(|| format!("{name} has no samples"))?;
+    for (topic, layout) in &layouts {
+        recorded.describe(topic, layout);
+    }
     let out = &mut BufWriter::new(std::io::stdout());
     let shown = recorded
         .show(args.once, args.json, &patience.shutdown, out)

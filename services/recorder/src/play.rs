@@ -13,7 +13,7 @@
 //!
 //! A user's own topic is played onto the bus of those who have it open, laid out as its creator
 //! says. One that nobody has open when the player starts is not played: nobody would hear it, and a
-//! recording does not say how its bytes lie.
+//! recording does not say how many may write and read it, nor how many samples may wait there.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,20 +1,23 @@
 //! Every sample of a recording in the order of its time, for tools that show one.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use lager_journal::{Envelope, Selection};
+use lager_journal::{Envelope, EnvelopeSchema, Selection, TopicOverview};
+use lager_topics::Description;
 use serde_json::Value;
 
 use crate::bag::{Bag, BagError};
 
-/// Hands each sample over: the robot, the topic and the message.
+/// Hands each sample over: the robot, the topic and the message. Returns the layout of each topic
+/// whose layout the file has.
 ///
 /// # Errors
 /// The file cannot be read, was cut off, or another program recorded it.
 pub fn samples(
     file: &Path,
     take: &mut dyn FnMut(&str, &str, Envelope<Value>),
-) -> Result<(), BagError> {
+) -> Result<BTreeMap<String, Description>, BagError> {
     let bag = Bag::open(file)?;
     let overview = bag.overview()?;
     let foreign = || BagError::Foreign {
@@ -27,5 +30,10 @@ pub fn samples(
             take(&start.robot, topic, envelope);
         }
         Ok::<bool, BagError>(true)
-    })
+    })?;
+    let layout = |topic: &TopicOverview| {
+        let layout = EnvelopeSchema::payload(&topic.schema_text)?;
+        Some((topic.name.clone(), layout))
+    };
+    Ok(overview.topics.iter().filter_map(layout).collect())
 }

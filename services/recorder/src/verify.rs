@@ -10,12 +10,11 @@
 //! of all the rest. The samples of the three topics are compared as well, as far as the recording
 //! has them: `nav/inputs` says which number each of them has, so a lost one shifts no other.
 //!
-//! A navigator is followed from its begin, since only there all of its state is told. What
-//! `nav/status` has of it later is what a successor goes on with, which is less: it begins the
-//! manoeuvre anew, and has not seen what this one has of wheels, line and distance. Told the same
-//! inputs it gives other orders, so from there nothing could be proved. Where a recording begins
-//! later, or pieces are missing, nothing is compared until the next navigator begins;
-//! [`Verified::gaps`] says where.
+//! A navigator is followed from its start, since only there all of its state is told. Later
+//! `nav/status` holds only the part with which a successor goes on: neither how far a manoeuvre has
+//! come, nor what was seen of wheels, line and distance. With that part alone the same inputs lead
+//! to other orders. So where a recording begins later, or pieces are missing, nothing is compared
+//! until the next navigator starts; [`Verified::gaps`] says where.
 //!
 //! `frames_lost` in a status counts what the shell has missed, which no navigator knows. It is not
 //! compared.

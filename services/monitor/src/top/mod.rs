@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use lager_ports::{Clock, Shutdown, urgency};
 use lager_topics::{
-    LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic,
+    Description, LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Stamp, Topic,
 };
 use ratatui::DefaultTerminal;
 use ratatui::buffer::Buffer;
@@ -182,6 +182,11 @@ impl Recorded {
             }
             _ => {}
         }
+    }
+
+    /// Takes how a topic's samples lie, by which rates are told in bytes.
+    pub fn describe(&mut self, topic: &str, layout: &Description) {
+        self.model.row(topic).lies_like(layout);
     }
 
     /// Prints the table, or shows it until a key or the shutdown.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lager_ports::{Layout, TopicInfo};
-use lager_topics::{Role, Stamp, TopicEntry};
+use lager_topics::{Description, Role, Stamp, TopicEntry};
 use serde_json::{Value, json};
 
 use crate::delay::Stage;
@@ -160,7 +160,7 @@ impl Row {
         };
         self.unread = why.map(str::to_owned);
         if let Some(description) = &info.description {
-            self.bytes = description.size() + size_of::<Stamp>();
+            self.lies_like(description);
         }
         let authors = info.writers.iter().map(|peer| Author {
             role: peer.role,
@@ -168,6 +168,11 @@ impl Row {
             life: life(peer.pid),
         });
         self.authors = authors.collect();
+    }
+
+    /// Takes how its samples lie.
+    pub(crate) fn lies_like(&mut self, layout: &Description) {
+        self.bytes = layout.size() + size_of::<Stamp>();
     }
 
     /// Nobody is on it any more.
