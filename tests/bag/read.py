@@ -1,4 +1,5 @@
-"""Reads a recording with other people's packages, and prints how many messages each topic has.
+"""Reads a recording with other people's packages, and prints how many messages each topic has,
+and how many samples its writers had numbered up to the last one.
 
 Every CRC is compared and every message validated against its schema.
 """
@@ -12,6 +13,7 @@ from mcap.reader import make_reader
 
 validators = {}
 counts = collections.Counter()
+numbered = collections.defaultdict(dict)
 with open(sys.argv[1], "rb") as file:
     reader = make_reader(file, validate_crcs=True)
     for schema, channel, message in reader.iter_messages():
@@ -19,7 +21,13 @@ with open(sys.argv[1], "rb") as file:
             text = json.loads(schema.data)
             jsonschema.Draft202012Validator.check_schema(text)
             validators[schema.id] = jsonschema.Draft202012Validator(text)
-        validators[schema.id].validate(json.loads(message.data))
+        content = json.loads(message.data)
+        validators[schema.id].validate(content)
         counts[channel.topic] += 1
+        if stamp := content.get("stamp"):
+            stream = stamp["writer"], stamp["epoch"]
+            last = numbered[channel.topic].get(stream, 0)
+            numbered[channel.topic][stream] = max(last, stamp["sequence"] + 1)
     assert reader.get_summary().statistics.message_count == sum(counts.values())
-print(json.dumps(counts))
+sums = {topic: sum(streams.values()) for topic, streams in numbered.items()}
+print(json.dumps({"messages": counts, "numbered": sums}))

@@ -77,7 +77,7 @@ pub struct TopicInfo {
     pub subscribers: usize,
     /// Number of readers that are observers.
     pub observers: usize,
-    /// How many may read under its public name; not known of a topic without ends.
+    /// How many may read under its public name; known of topics that are not in the table only.
     pub places: Option<usize>,
     /// The writers.
     pub writers: Vec<Peer>,
@@ -108,14 +108,12 @@ impl TopicInfo {
 }
 
 impl TopicInfo {
-    /// Counts the ends at all services of a topic, of which the public one comes first. A reader
+    /// Counts the ends at all services of a topic. A reader
     /// reads one of them; a writer writes to all, so what one process has there is the most that it
     /// has at any of them.
     fn look_at_ends<'a>(&mut self, services: impl IntoIterator<Item = &'a TopicService>) {
         let mut writers: Vec<(u128, Peer)> = Vec::new();
         for service in services {
-            let places = service.static_config().max_subscribers();
-            self.places.get_or_insert(places);
             let ends = service.dynamic_config();
             let mut counted = writers.clone();
             ends.list_publishers(|details| {
@@ -290,6 +288,7 @@ fn look_at_other(bus: &Bus, robot: &RobotName, topic: &str) -> TopicInfo {
     let actors = actors.ok().flatten().map(|(service, _)| service);
     let mut info = TopicInfo::without_ends(robot, topic, Layout::Described);
     info.description = Some(description);
+    info.places = Some(public.static_config().max_subscribers());
     info.look_at_ends([&public].into_iter().chain(&actors));
     info
 }

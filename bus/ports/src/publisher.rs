@@ -8,7 +8,7 @@
 //! What a publish costs: for each sample iceoryx2 visits every place for a subscriber of the
 //! service three times, whether it is taken or not. With one service of 74 places that was most of
 //! the 4 939 instructions of `publish/to-1`; with the 10 places of the actors' service it took
-//! 2 955, 2 344 since the places of observers are counted only when one has come or gone
+//! 2 957, 2 363 since the places of observers are counted only when one has come or gone
 //! (`untyped/anyone`), and 2 272 since the compiler keeps iceoryx2's loop in registers
 //! (`untyped/outlet`). With 63 observers beside the actor it takes 35 489; what they cost comes
 //! after the ring. The cost is instructions, not cache misses: boxing what stands in the places, so

@@ -7,8 +7,9 @@
 //!
 //! The line before a mark of the grid is straight; the way to the delivery need not be. So the mean
 //! counts only when a mark comes, and counts neither at the delivery's bar nor at the first mark
-//! after it, since the line between those two may be curved. The corrections that bring the robot to its
-//! line after a turn say nothing about the sides, and a station's mark may come soon after a turn.
+//! after it, since the line between those two may be curved. The corrections that bring the robot
+//! to its line after a turn say nothing about the sides, and a station's mark may come soon after a
+//! turn.
 //! The bias is exact to a fraction of a duty step, and is rounded up and down in turn: near the
 //! duty at which the wheels break loose, one step may be a tenth of the speed, and half a step too
 //! much bends a way without a line by 5 degrees in 150 mm. The bias is added wherever both sides

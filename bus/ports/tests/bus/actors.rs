@@ -57,15 +57,15 @@ fn actors_and_observers_get_the_same_samples_with_the_same_stamps() {
 
 #[test]
 fn an_actor_that_looks_without_pause_is_there_before_the_observers_have_the_sample() {
-    const ROUNDS: u32 = 100_000;
-    let domain = Domain::new();
-    let publisher = domain.open(Role::Bridge).publisher::<SensorLine>().unwrap();
-    let looked_at = AtomicU32::new(0);
-    let was_first = AtomicBool::new(false);
+    const ROUNDS: u32 = 10_000;
     if std::thread::available_parallelism().unwrap().get() == 1 {
         // Nobody is there while the writer runs.
         return;
     }
+    let domain = Domain::new();
+    let publisher = domain.open(Role::Bridge).publisher::<SensorLine>().unwrap();
+    let looked_at = AtomicU32::new(0);
+    let was_first = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let actor = scope.spawn(|| {
             let (logic, observing) = (domain.open(Role::Logic), domain.open(Role::Observer));

@@ -92,14 +92,17 @@ fn waiters_killed_anywhere_give_their_seats_to_their_successors() {
 fn a_killed_spinner_gives_its_right_back() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
-    // As many as may spin at a time; none is left to this one unless they give it back.
+    let waiter = bridge.waiter(Policy::ADAPTIVE).unwrap();
+    // As many as may spin at a time, or as there are seats. None is left to this one unless they give
+    // it back.
     let cores = std::thread::available_parallelism().unwrap().get();
-    for _ in 0..cores.min(8) {
-        process::start(&domain, "navigator-spins").kill();
-    }
+    let spinners: Vec<_> = (0..cores.min(8))
+        .map(|_| process::start(&domain, "navigator-spins"))
+        .collect();
+    spinners.into_iter().for_each(Process::kill);
     bridge.sweep();
     if cores > 1 {
-        spins_under_quick_rings(&bridge);
+        spins_under_quick_rings(&waiter);
     }
 }
 

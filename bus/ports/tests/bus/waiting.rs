@@ -4,7 +4,7 @@ use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_ports::{Bus, Cause, Policy, PortError, Shutdown, Wake};
+use lager_ports::{Cause, Policy, PortError, Shutdown, Waiter, Wake};
 use lager_topics::{OperatorInput, Role, SensorDistance, SensorLine, SteeringCommand};
 
 use crate::domain::{Domain, drain, send, until};
@@ -111,18 +111,18 @@ fn a_quiet_adaptive_waiter_sleeps_for_every_ring() {
 fn an_adaptive_waiter_does_not_sleep_under_quick_rings() {
     let domain = Domain::new();
     let logic = domain.open(Role::Logic);
+    let waiter = logic.waiter(Policy::ADAPTIVE).unwrap();
     // On one core nobody may spin, since the ringer needs it.
     if std::thread::available_parallelism().unwrap().get() > 1 {
-        spins_under_quick_rings(&logic);
+        spins_under_quick_rings(&waiter);
     }
 }
 
-/// Rings at 10 kHz until a waiter has waited for three in a row without a sleep. On a busy machine
+/// Rings at 10 kHz until the waiter has waited for three in a row without a sleep. On a busy machine
 /// neither thread keeps its core for long and sleeping is right, so it is tried many times.
-pub(crate) fn spins_under_quick_rings(bus: &Bus) {
+pub(crate) fn spins_under_quick_rings(waiter: &Waiter) {
     const DISTANCE: Duration = Duration::from_micros(100);
     let waited_awake = || {
-        let waiter = bus.waiter(Policy::ADAPTIVE).unwrap();
         let ringer = waiter.ringer().unwrap();
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {

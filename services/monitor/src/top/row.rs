@@ -95,7 +95,6 @@ pub(crate) struct Row {
     /// What a robot sends in a second of its own time, and in one of real time.
     usual_hz: Option<f64>,
     pub(crate) expected_hz: Option<f64>,
-    /// Samples that wait at most.
     /// Of a sample, with its stamp; 0 = not known.
     bytes: usize,
     /// Samples of which a reader is sure that they were lost.
@@ -152,7 +151,9 @@ impl Row {
     /// Takes who writes and reads it now.
     pub(crate) fn take_ends(&mut self, info: &TopicInfo, life: impl Fn(u32) -> Life) {
         self.readers = Some(info.subscribers);
-        self.places = self.places.or(info.places);
+        if info.entry.is_none() {
+            self.places = info.places;
+        }
         let why = match info.layout {
             Layout::Ours | Layout::Described | Layout::Unused => None,
             Layout::Other => Some("the processes that use it are of another build"),
