@@ -53,9 +53,7 @@ impl EnvelopeSchema {
             text: schema.to_string().into_bytes(),
         }
     }
-}
 
-impl EnvelopeSchema {
     /// The payload's layout, if the schema `text` has it.
     pub fn payload(text: &[u8]) -> Option<Description> {
         let schema: serde_json::Value = serde_json::from_slice(text).ok()?;

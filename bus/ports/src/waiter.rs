@@ -8,10 +8,10 @@
 //! that waits for that core, such as the kernel thread that delivers a serial port's bytes; without
 //! the yield that thread waited 2 ms and more. On a machine where this happened every look was in
 //! vain, so waiters stopped looking and adaptive waiting gained nothing: 0.96 to 1.06 of blocking,
-//! also with the code of 2026-11-21. With the yield it was 0.68 to 0.87 there, and 0.69 to 0.73
-//! since both bridge and logic may look on two cores. Whoever else is ready to run on that core gets
-//! it as well, even a process of SCHED_IDLE, and keeps it until the kernel's next tick, 4 ms at
-//! 250 Hz: keep such processes off a core that is to look. Under a real-time scheduler the yield
+//! also with the code of 2026-11-21. With the yield it was 0.68 to 0.87 there, and 0.69 to 0.76
+//! since both bridge and logic may look on two cores. Whoever else is ready to run on that core
+//! gets it as well, even a process of SCHED_IDLE, and keeps it until the kernel's next tick, 4 ms
+//! at 250 Hz: keep such processes off a core that is to look. Under a real-time scheduler the yield
 //! reaches only threads of the same priority, so others wait until the look ends.
 
 use core::cell::{Cell, RefCell};
@@ -346,8 +346,8 @@ fn is_actor(role: Role) -> bool {
 /// How many waiters may look at a time. Whoever looks gives way to who wants its core, so there may
 /// be as many as cores; with one less, of bridge and logic on two cores one always slept, and the
 /// path took 0.8 times as long as with both asleep instead of 0.7. Under a real-time scheduler
-/// nobody of a lower priority is given way to, so one core is left to the others. On a single core a
-/// look would only pass the core to and fro.
+/// nobody of a lower priority is given way to, so one core is left to the others. On a single core
+/// a look would only pass the core to and fro.
 fn who_may_look() -> usize {
     match cores() {
         1 => 0,

@@ -165,13 +165,11 @@ the queue. It then goes home, or for the next order.")]
     },
     /// Tell the robot that the product has been picked up
     Picked {
-        /// Believe it even if the claw does not feel the product and the arm is not where it is
-        /// carried
+        /// Believe it even if the claw feels nothing and the arm is not in its carry pose
         #[arg(long)]
         force: bool,
     },
-    /// Choose who picks the goods up, from the next ones on: a person (`lager picked`), or the
-    /// robot
+    /// Choose who picks the next goods up: a person (`lager picked`) or the robot
     Pick {
         /// Who
         by: PickBy,

@@ -93,8 +93,8 @@ fn a_killed_spinner_gives_its_right_back() {
     let domain = Domain::new();
     let bridge = domain.open(Role::Bridge);
     let waiter = bridge.waiter(Policy::ADAPTIVE).unwrap();
-    // As many as may spin at a time, or as there are seats. None is left to this one unless they give
-    // it back.
+    // As many as may spin at a time, or as there are seats. None is left to this one unless they
+    // give it back.
     let cores = std::thread::available_parallelism().unwrap().get();
     let spinners: Vec<_> = (0..cores.min(8))
         .map(|_| process::start(&domain, "navigator-spins"))

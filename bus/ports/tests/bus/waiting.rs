@@ -118,8 +118,8 @@ fn an_adaptive_waiter_does_not_sleep_under_quick_rings() {
     }
 }
 
-/// Rings at 10 kHz until the waiter has waited for three in a row without a sleep. On a busy machine
-/// neither thread keeps its core for long and sleeping is right, so it is tried many times.
+/// Rings at 10 kHz until the waiter has waited for three in a row without a sleep. On a busy
+/// machine neither thread keeps its core for long and sleeping is right, so it is tried many times.
 pub(crate) fn spins_under_quick_rings(waiter: &Waiter) {
     const DISTANCE: Duration = Duration::from_micros(100);
     let waited_awake = || {
