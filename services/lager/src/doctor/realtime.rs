@@ -21,6 +21,9 @@ const INTERRUPT_PRIORITY: u8 = 50;
 const LATE_IDLE_US: u64 = 20;
 /// The kernel's default slack, in ns.
 const USUAL_SLACK_NS: u64 = 50_000;
+/// On which cores the kernel's workers may run, among them those that hand a serial port's bytes to
+/// who reads them: hexadecimal numbers of 32 bits with commas between them.
+const WORKERS: &str = "/sys/devices/virtual/workqueue/cpumask";
 
 /// All of them, each with its name.
 pub fn findings(config: &Config) -> Vec<(&'static str, Finding)> {
@@ -30,6 +33,7 @@ pub fn findings(config: &Config) -> Vec<(&'static str, Finding)> {
         ("locked memory", memory(config.realtime.lock_memory)),
         ("cores", cores(config)),
         ("waiting", waiting(config)),
+        ("serial workers", workers(line(Path::new(WORKERS)), config)),
         ("real-time share", share(realtime::throttle(), config)),
         ("core speed", governor(&governors(cpus))),
         ("core idling", idling(&idle_states(cpus))),
@@ -110,10 +114,19 @@ fn cores(config: &Config) -> Finding {
 }
 
 fn waiting(config: &Config) -> Finding {
+    let roles = RealtimeSection::ON_PATH.map(|role| config.realtime.wanted(role).cores);
+    if config.bus.waiting == Waiting::Adaptive
+        && roles[0].len() == 1
+        && roles.iter().all(|cores| *cores == roles[0])
+    {
+        return Hint(format!(
+            "waiting = \"adaptive\" gains nothing where bridge and logic share core {}: give each its own, such as `--core bridge=0 --core logic=1`",
+            roles[0]
+        ));
+    }
     if config.bus.waiting != Waiting::Spin {
         return Good("services sleep when nothing comes".into());
     }
-    let roles = RealtimeSection::ON_PATH.map(|role| config.realtime.wanted(role).cores);
     let allowed = match realtime::allowed_cores() {
         Ok(allowed) => allowed,
         Err(error) => return Bad(error.to_string()),
@@ -128,6 +141,33 @@ fn waiting(config: &Config) -> Finding {
             "waiting = \"spin\" keeps {} of the cores {allowed} busy for good",
             roles.len()
         )),
+    }
+}
+
+/// Where the kernel hands over what serial ports receive. A worker that comes to a core where
+/// somebody looks for samples starts at once, and one that is called from another core late.
+fn workers(mask: Option<String>, config: &Config) -> Finding {
+    let Some(mask) = mask else {
+        return Good("where they run is not shown by this kernel".into());
+    };
+    let digits = mask.chars().filter_map(|digit| digit.to_digit(16));
+    let cores: u32 = digits.map(u32::count_ones).sum();
+    let is_free = cores > 1;
+    // A bridge in real time would keep a worker from its core for as long as it looks.
+    if config.bus.waiting != Waiting::Adaptive || config.realtime.priority > 0 || !is_free {
+        return Good(format!("may run on cores {mask} (a bit each)"));
+    }
+    let bridge = config.realtime.wanted(Role::Bridge).cores;
+    match bridge.iter().next() {
+        Some(core) if bridge.len() == 1 => Hint(format!(
+            "the kernel hands over serial bytes on any core, so waiting = \"adaptive\" gains little; on the bridge's it gains most: as root, `echo {:x}{} > {WORKERS}`",
+            1_u32 << (core % 32),
+            ",00000000".repeat(core / 32)
+        )),
+        _ => Hint(
+            "the kernel hands over serial bytes on any core, so waiting = \"adaptive\" gains little; give bridge and logic a core each, `--core bridge=0 --core logic=1`, and ask again"
+                .into(),
+        ),
     }
 }
 
@@ -299,6 +339,46 @@ mod tests {
             assert_eq!(mark, expected.0, "{throttle:?}: {text}");
             assert!(text.contains(expected.1), "{throttle:?}: {text}");
         }
+    }
+
+    #[test]
+    fn who_waits_adaptively_hears_of_cores_that_are_in_the_way() {
+        let adaptive = "[bus]\nwaiting = \"adaptive\"\n";
+        let bound = "[realtime]\ncores = { bridge = [3], logic = [2] }";
+        let far = "[realtime]\ncores = { bridge = [33] }";
+        let together = "[realtime]\ncores = { bridge = [1], logic = [1] }";
+        let in_real_time = format!("{bound}\npriority = 20");
+        for (text, mask, expected) in [
+            ("".to_owned(), "f", ("good", "cores f")),
+            (adaptive.into(), "ffffffff,ffffffff", ("hint", "bridge=0")),
+            (format!("{adaptive}{bound}"), "f", ("hint", "`echo 8 > /")),
+            (format!("{adaptive}{far}"), "f", ("hint", "2,00000000 >")),
+            (
+                format!("{adaptive}{bound}"),
+                "00000000,00000008",
+                ("good", "8"),
+            ),
+            (
+                format!("{adaptive}{in_real_time}"),
+                "f",
+                ("good", "cores f"),
+            ),
+        ] {
+            let finding = workers(Some(mask.to_owned()), &config(&text));
+            let (mark, said) = said(&finding);
+            assert_eq!(mark, expected.0, "{text} {mask}: {said}");
+            assert!(said.contains(expected.1), "{text} {mask}: {said}");
+        }
+        assert_eq!(said(&workers(None, &config(adaptive))).0, "good");
+
+        let finding = waiting(&config(&format!("{adaptive}{together}")));
+        let (mark, text) = said(&finding);
+        assert_eq!(mark, "hint");
+        assert!(text.contains("share core 1"), "{text}");
+        assert_eq!(
+            said(&waiting(&config(&format!("{adaptive}{bound}")))).0,
+            "good"
+        );
     }
 
     #[test]
