@@ -346,6 +346,29 @@ fn the_documents_are_finished_and_name_files_that_exist() {
 }
 
 #[test]
+fn the_readme_shows_lines_of_the_examples() {
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
+    let examples: BTreeSet<String> = rust_files(&root().join("bus/ports/examples"))
+        .iter()
+        .flat_map(|file| {
+            let text = std::fs::read_to_string(file).expect("an example");
+            let lines: Vec<_> = text.lines().map(|line| line.trim().to_owned()).collect();
+            lines
+        })
+        .collect();
+    let mut shown = 0;
+    for block in readme.split("```rust\n").skip(1) {
+        let (block, _) = block.split_once("```").expect("the block's end");
+        for line in block.lines().map(str::trim) {
+            let says = line.starts_with("//") && !line.starts_with("///");
+            assert!(says || examples.contains(line), "README shows {line:?}");
+            shown += 1;
+        }
+    }
+    assert!(shown > 0, "the README shows no example");
+}
+
+#[test]
 fn the_lower_floors_forbid_unsafe_code() {
     for folder in [
         "bus/wire",
