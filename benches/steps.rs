@@ -5,7 +5,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, Bencher, Criterion, Throughput, criterion_group, criterion_main};
 use lager_benches::steps::{self, Ports, a_second_of_bytes, a_second_of_packets};
 
 /// Beside decoding stands copying the same bytes, which is the least any decoder can do.
@@ -31,21 +31,24 @@ fn codec(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// How long `step` takes so many times, each time after `before`.
+/// Times `step` on ports with so many subscribers, each time after `before`.
 fn timed(
-    samples: u64,
-    ports: &mut Ports,
+    bencher: &mut Bencher<'_>,
+    subscribers: usize,
     before: impl Fn(&mut Ports),
     step: impl Fn(&mut Ports),
-) -> Duration {
-    let mut total = Duration::ZERO;
-    for _ in 0..samples {
-        before(ports);
-        let start = Instant::now();
-        step(ports);
-        total += start.elapsed();
-    }
-    total
+) {
+    let mut ports = Ports::meet(subscribers);
+    bencher.iter_custom(|samples| {
+        let mut total = Duration::ZERO;
+        for _ in 0..samples {
+            before(&mut ports);
+            let start = Instant::now();
+            step(&mut ports);
+            total += start.elapsed();
+        }
+        total
+    });
 }
 
 /// Nobody's queue is ever full: what was published before is received first.
@@ -53,12 +56,8 @@ fn publish(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("publish");
     for subscribers in [1, 8, 64] {
         group.bench_function(format!("to-{subscribers}"), |bencher| {
-            let mut ports = Ports::meet(subscribers);
-            let drain = |ports: &mut Ports| {
-                ports.drain();
-            };
-            bencher
-                .iter_custom(|samples| timed(samples, &mut ports, drain, |ports| ports.publish()));
+            let drain = |ports: &mut Ports| assert!(ports.drain() <= subscribers);
+            timed(bencher, subscribers, drain, |ports| ports.publish());
         });
     }
     group.finish();
@@ -66,10 +65,8 @@ fn publish(criterion: &mut Criterion) {
 
 fn receive(criterion: &mut Criterion) {
     criterion.bench_function("receive", |bencher| {
-        let mut ports = Ports::meet(1);
-        let publish = |ports: &mut Ports| ports.publish();
         let receive = |ports: &mut Ports| assert!(ports.receive().is_some());
-        bencher.iter_custom(|samples| timed(samples, &mut ports, publish, receive));
+        timed(bencher, 1, |ports| ports.publish(), receive);
     });
 }
 

@@ -32,12 +32,8 @@ impl Programs {
     /// Those that `.ci/firmware` leaves in a source tree for a baud rate.
     #[must_use]
     pub fn in_tree(root: &Path, baud: u32) -> Self {
-        let images = root.join("firmware/avr/target/images");
-        let images = if baud == 9_600 {
-            images.join("9600")
-        } else {
-            images
-        };
+        let folder = if baud == 9_600 { "9600" } else { "" };
+        let images = root.join("firmware/avr/target/images").join(folder);
         Self {
             emulator: root.join("firmware/emulator/target/release/lager-emulator"),
             sensor_elf: images.join("sensor.elf"),
@@ -129,9 +125,7 @@ impl fmt::Display for ChipReport {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(formatter, "{}\n", self.machine)?;
         for figure in &self.figures {
-            let Figure {
-                name, value, unit, ..
-            } = figure;
+            let (name, value, unit) = (&figure.name, figure.value, &figure.unit);
             let digits = if value.fract() == 0.0 { 0 } else { 2 };
             let ms = figure.ms.map(|ms| format!(", {ms:.2} ms"));
             let ms = ms.unwrap_or_default();
@@ -165,23 +159,18 @@ pub fn measure(programs: [(u32, Programs); BAUDS.len()]) -> Result<ChipReport, B
 }
 
 fn trace(programs: &Programs, baud: u32) -> Result<Trace, BenchError> {
-    let Programs {
-        emulator,
-        sensor_elf,
-        steering_elf,
-    } = programs;
-    for file in [emulator, sensor_elf, steering_elf] {
-        if !file.exists() {
-            return Err(BenchError::NotBuilt(file.clone()));
-        }
+    let emulator = &programs.emulator;
+    let files = [emulator, &programs.sensor_elf, &programs.steering_elf];
+    if let Some(missing) = files.iter().find(|file| !file.exists()) {
+        return Err(BenchError::NotBuilt(missing.to_path_buf()));
     }
     let failed = |why| BenchError::Emulator(emulator.clone(), why);
     let output = Command::new(emulator)
         .arg("--trace")
         .arg("--sensor-elf")
-        .arg(sensor_elf)
+        .arg(&programs.sensor_elf)
         .arg("--steering-elf")
-        .arg(steering_elf)
+        .arg(&programs.steering_elf)
         .args(["--baud", &baud.to_string()])
         .output()
         .map_err(|error| failed(error.to_string()))?;

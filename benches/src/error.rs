@@ -93,7 +93,7 @@ pub(crate) fn no_bus(error: impl core::fmt::Display) -> BenchError {
     ))
 }
 
-/// A fault of a port of ours.
+/// A fault of what carries samples.
 pub(crate) fn broken(error: impl core::fmt::Display) -> Fault {
     Fault::Broken(error.to_string())
 }

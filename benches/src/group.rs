@@ -122,12 +122,7 @@ impl Group {
         options: &Options,
         session: &mut dyn Session,
     ) -> Result<Vec<Row>, BenchError> {
-        let Self {
-            what,
-            regime,
-            entries,
-            ..
-        } = self;
+        let (what, regime, entries) = (&self.what, self.regime, &self.entries);
         let thorough = usize::from(!options.quick);
         let mut runs: Vec<Vec<Quantiles>> = vec![Vec::new(); entries.len()];
         let count = options.runs.max(1);
@@ -151,7 +146,7 @@ impl Group {
             }
         }
         tell("");
-        Ok(rows(what, *regime, entries, &runs))
+        Ok(rows(what, regime, entries, &runs))
     }
 }
 
@@ -173,17 +168,13 @@ fn rows(what: &str, regime: Regime, entries: &[Entry], runs: &[Vec<Quantiles>]) 
 
 /// The median of the ratios of each run: what drifts from run to run cancels.
 fn ratio(to: &str, own: &[Quantiles], other: &[Quantiles]) -> Option<Ratio> {
+    let by = |own: u64, other: u64| own as f64 / other as f64;
     let runs: Vec<[f64; 2]> = own
         .iter()
         .zip(other)
         // A clock that cannot tell a sample from nothing cannot tell ratios either.
         .filter(|(_, other)| other.p50_ns > 0)
-        .map(|(own, other)| {
-            [
-                own.p50_ns as f64 / other.p50_ns as f64,
-                own.p99_ns as f64 / other.p99_ns as f64,
-            ]
-        })
+        .map(|(own, other)| [by(own.p50_ns, other.p50_ns), by(own.p99_ns, other.p99_ns)])
         .collect();
     Some(Ratio {
         to: to.to_owned(),

@@ -49,16 +49,12 @@ const PACE: Duration = Duration::from_micros(100);
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
     // The time from one sample to the next, where one way is timed; and the samples of a round, as
     // many as take a fraction of a second.
+    let [full_rate, paced] = [Duration::ZERO, PACE].map(Some);
     [
         ("hop", Mode::Spin, None, [5_000, 20_000]),
         ("hop", Mode::Block, None, [500, 2_500]),
-        (
-            "hop@full-rate",
-            Mode::Adaptive,
-            Some(Duration::ZERO),
-            [5_000, 20_000],
-        ),
-        ("hop@10kHz", Mode::Adaptive, Some(PACE), [500, 2_000]),
+        ("hop@full-rate", Mode::Adaptive, full_rate, [5_000, 20_000]),
+        ("hop@10kHz", Mode::Adaptive, paced, [500, 2_000]),
     ]
     .into_iter()
     .filter(|(_, mode, ..)| options.modes.contains(mode))

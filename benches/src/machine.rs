@@ -51,12 +51,11 @@ fn processor_of(cpuinfo: &str) -> Option<String> {
 /// Where the first and the second process of a scenario run: on one core for
 /// [`Regime::SameCore`], on one each otherwise.
 pub(crate) fn cores_for(regime: Regime) -> Result<(usize, usize), BenchError> {
-    let cores = usable_cores();
-    let needed = if regime == Regime::SameCore { 1 } else { 2 };
-    match (regime, cores.as_slice()) {
+    match (regime, usable_cores().as_slice()) {
         (Regime::SameCore, [.., last]) => Ok((*last, *last)),
-        (Regime::Plain | Regime::NoHalt, [first, second, ..]) => Ok((*first, *second)),
-        _ => Err(BenchError::TooFewCores(needed, cores.len())),
+        (Regime::SameCore, []) => Err(BenchError::TooFewCores(1, 0)),
+        (_, [first, second, ..]) => Ok((*first, *second)),
+        (_, few) => Err(BenchError::TooFewCores(2, few.len())),
     }
 }
 

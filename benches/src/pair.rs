@@ -86,12 +86,6 @@ impl<X> Round<X> {
         (1..=u64::from(self.warm_up) + u64::from(self.samples)).map(move |sample| base + sample)
     }
 
-    /// Of the times of all samples, those that count.
-    pub(crate) fn timed(&self, mut times: Vec<u64>) -> Vec<u64> {
-        times.drain(..self.warm_up as usize);
-        times
-    }
-
     /// What is wrong with sample `number`.
     pub(crate) fn failed(&self, number: u64, fault: Fault) -> BenchError {
         let in_round = |number: u64| number & u64::from(u32::MAX);
@@ -175,10 +169,8 @@ impl<X: Serialize> Session for Pair<X> {
         if received.is_empty() {
             return Ok(sent);
         }
-        let ways = sent.iter().zip(&received);
-        Ok(ways
-            .map(|(sent, received)| received.saturating_sub(*sent))
-            .collect())
+        let way = |(sent, received): (u64, u64)| received.saturating_sub(sent);
+        Ok(sent.into_iter().zip(received).map(way).collect())
     }
 }
 
@@ -198,7 +190,9 @@ pub(crate) fn measure<X: DeserializeOwned>(
     parent.say(&())?;
     while let Some(told) = parent.hear::<Round<X>>()? {
         slow::spins_for(told.spin_ns);
-        parent.say(&round(&side, &told)?)?;
+        let times = round(&side, &told)?;
+        // Those of the first samples do not count.
+        parent.say(&times.get(told.warm_up as usize..).unwrap_or_default())?;
     }
     Ok(())
 }
@@ -214,10 +208,8 @@ pub(crate) struct Side {
 impl Side {
     /// Waits until `counter` is at sample `number`.
     pub(crate) fn wait(&self, counter: &Counter, number: u64) -> Result<(), Fault> {
-        match counter.becomes(number, LIMIT) {
-            true => Ok(()),
-            false => Err(Fault::Silent(LIMIT)),
-        }
+        let comes = counter.becomes(number, LIMIT);
+        comes.then_some(()).ok_or(Fault::Silent(LIMIT))
     }
 
     pub(crate) fn bus(&self, role: Role) -> Result<Bus, BenchError> {
@@ -231,9 +223,9 @@ impl Side {
         work: impl FnOnce() -> Result<T, BenchError>,
     ) -> Result<T, BenchError> {
         const LIMIT: Duration = Duration::from_secs(15);
-        let meet = |count| match self.shared.barrier.pass(2, count, LIMIT) {
-            true => Ok(()),
-            false => Err(BenchError::Alone(LIMIT)),
+        let meet = |count| {
+            let met = self.shared.barrier.pass(2, count, LIMIT);
+            met.then_some(()).ok_or(BenchError::Alone(LIMIT))
         };
         meet(2 * round.number - 1)?;
         let done = work()?;

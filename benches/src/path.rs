@@ -50,42 +50,30 @@ const TURNS: [usize; 2] = [2, 8];
 const SERVICES: u8 = 40;
 const BOARDS: u8 = 50;
 
-/// What is measured with nobody watching, and the number of observers: 0.
-const ALONE: [(Entry, usize); 3] = [
-    (Entry::new("lager/block", Mode::Block, &["floor"]), 0),
-    (Entry::new("floor", Mode::Block, &[]), 0),
-    (
-        Entry::new("lager/adaptive", Mode::Adaptive, &["lager/block", "floor"]),
-        0,
-    ),
+/// What is measured with nobody watching.
+static ALONE: [Entry; 3] = [
+    Entry::new("lager/block", Mode::Block, &["floor"]),
+    Entry::new("floor", Mode::Block, &[]),
+    Entry::new("lager/adaptive", Mode::Adaptive, &["lager/block", "floor"]),
 ];
 
-/// The same with so many observers.
-const OBSERVED: [(Entry, usize); 3] = [
-    (Entry::new("lager/alone", Mode::Block, &[]), 0),
-    (
-        Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
-        8,
-    ),
-    (
-        Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
-        64,
-    ),
+/// The same with observers.
+static OBSERVED: [Entry; 3] = [
+    Entry::new("lager/alone", Mode::Block, &[]),
+    Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
+    Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
 ];
 
 /// The groups of one regime. A spinning path is not measured: bridge and logic would keep two
 /// cores, and the boards need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let group = |what: &str, rows: &[(Entry, usize)], is_real_time: bool| {
-        let rows = rows.to_vec();
-        Group {
-            what: what.to_owned(),
-            regime,
-            entries: rows.iter().map(|(entry, _)| *entry).collect(),
-            rounds: TURNS,
-            samples: [TURN; 2],
-            open: Box::new(move || Ok(Box::new(Chains::start(regime, &rows, is_real_time)?))),
-        }
+    let group = |what: &str, entries: &'static [Entry], observed: bool| Group {
+        what: what.to_owned(),
+        regime,
+        entries: entries.to_vec(),
+        rounds: TURNS,
+        samples: [TURN; 2],
+        open: Box::new(move || Ok(Box::new(Chains::start(regime, entries, observed)?))),
     };
     let wants = |mode| options.modes.contains(&mode);
     // Nobody spins on the only core that the others have.
@@ -104,33 +92,31 @@ pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
 struct Chains {
     chains: Vec<Box<dyn Chain>>,
     regime: Regime,
-    is_real_time: bool,
+    observed: bool,
     _bound: Bound,
 }
 
 impl Chains {
-    /// Robots, each with so many observers, and the floor; services and boards in real time, if
-    /// that is wanted.
-    fn start(
-        regime: Regime,
-        rows: &[(Entry, usize)],
-        is_real_time: bool,
-    ) -> Result<Self, BenchError> {
+    /// Robots and the floor; or robots that are observed, with services and boards in real time.
+    fn start(regime: Regime, entries: &[Entry], observed: bool) -> Result<Self, BenchError> {
         let (first, second) = cores_for(regime)?;
         let [ends, logic] = [first, second].map(|core| Place {
             core: Some(core),
-            priority: is_real_time.then_some(SERVICES),
+            priority: observed.then_some(SERVICES),
         });
         let places = Places {
             bridge: ends,
             logic,
-            boards: is_real_time.then_some(BOARDS),
+            boards: observed.then_some(BOARDS),
         };
         let mut chains: Vec<Box<dyn Chain>> = Vec::new();
-        for (entry, observers) in rows {
+        for entry in entries {
+            let robot = |observers| Robot::start(entry.label, entry.mode, places, observers);
             let mut chain: Box<dyn Chain> = match entry.label {
                 "floor" => Box::new(Floor::start(ends, logic)?),
-                label => Box::new(Robot::start(label, entry.mode, places, *observers)?),
+                "lager/8 observers" => Box::new(robot(8)?),
+                "lager/64 observers" => Box::new(robot(64)?),
+                _ => Box::new(robot(0)?),
             };
             chain.processes().rest();
             chains.push(chain);
@@ -138,7 +124,7 @@ impl Chains {
         Ok(Self {
             chains,
             regime,
-            is_real_time,
+            observed,
             // Last of all: what a thread starts inherits its core.
             _bound: Bound::to(first)?,
         })
@@ -155,7 +141,7 @@ impl Session for Chains {
     fn finish(&mut self, rows: &mut Vec<Row>) -> Result<(), BenchError> {
         let mut more = Vec::new();
         for (row, chain) in rows.iter_mut().zip(&mut self.chains) {
-            if !self.is_real_time {
+            if !self.observed {
                 row.cpu_percent = chain.processes().cpu_percent();
             }
             if let Some(overtaken) = chain.overtaken() {

@@ -22,20 +22,18 @@
 //! publishing anything: a listener for each reader (`notify`), or, as the typed ports do it, one
 //! listener for the actor while 64 readers poll (`notify-1`).
 
-mod readers;
-mod writer;
+mod ends;
 
 use std::error::Error;
 
 use lager_rig::Parent;
 use lager_rig::process::Main;
-use lager_topics::{OBSERVERS, Qos, SensorLine, Topic};
-use serde::{Deserialize, Serialize};
+use lager_topics::OBSERVERS;
 
 use crate::group::{Entry, Group};
 use crate::pair;
 use crate::report::{Mode, Options, Regime};
-use crate::sample::Block;
+use ends::{Job, KIB_64, MIB_1, SMALL};
 
 const WRITER: &str = "writer";
 const READERS: &str = "readers";
@@ -43,71 +41,8 @@ const READERS: &str = "readers";
 pub(crate) const PROCESSES: &[(&str, Main)] = &[(WRITER, take_turns), (READERS, take_turns)];
 
 fn take_turns(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
-    pair::measure(parent, |side, round| match side.is_first {
-        true => writer::round(side, round),
-        false => readers::round(side, round),
-    })
+    pair::measure(parent, ends::round)
 }
-
-/// Sizes of a block, in words of eight bytes.
-const SMALL: usize = 8;
-const KIB_64: usize = 1 << 13;
-const MIB_1: usize = 1 << 17;
-
-/// The topic of blocks of that size. Small ones have `sensor/line`'s depth; large ones the least
-/// there is, since a publisher keeps memory for every place that a subscriber could fill.
-struct Fan<const WORDS: usize>;
-
-impl<const WORDS: usize> Topic for Fan<WORDS> {
-    const NAME: &'static str = "bench/fan";
-    type Payload = Block<WORDS>;
-    const QOS: Qos = Qos {
-        buffer: if WORDS > 512 {
-            1
-        } else {
-            SensorLine::QOS.buffer
-        },
-        actors: &[],
-        ..SensorLine::QOS
-    };
-    const SUMMARY: &'static str = "From the publisher of a measurement to all that read.";
-}
-
-/// What is measured in a round.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-enum Job {
-    /// Our ports publish blocks of so many words to so many readers.
-    Lager { words: usize, readers: usize },
-    /// The same with bare iceoryx2 and the same user header.
-    Iceoryx2 { words: usize, readers: usize },
-    /// Our ports ring an actor: what it takes longer to publish where it waits for that.
-    Ring,
-    /// Bare iceoryx2 notifies so many listeners.
-    Notify { listeners: usize },
-}
-
-type Round = pair::Round<Job>;
-
-/// The samples of a round; those of [`Job::Ring`] come in pairs.
-fn numbers(round: &Round) -> impl Iterator<Item = u64> + use<> {
-    let each = if round.what == Job::Ring { 2 } else { 1 };
-    round
-        .all()
-        .flat_map(move |sample| (0..each).map(move |part| each * sample + part))
-}
-
-/// Whether the actor of [`Job::Ring`] waits for the ring of this sample.
-fn rings(number: u64) -> bool {
-    !number.is_multiple_of(2)
-}
-
-/// The event of bare iceoryx2; a service keeps its number of listeners.
-fn event(listeners: usize) -> String {
-    format!("bench/bare-ring-{listeners}")
-}
-
-/// Bare iceoryx2's topic, which has the limits of ours.
-const BARE_FAN: &str = "bench/bare-fan";
 
 /// `publish-N` in one regime. The readers look without pause, so the only mode there is is `spin`.
 pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
@@ -121,16 +56,11 @@ pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
             ("@1MiB", MIB_1, [12, 50]),
         ]
         .map(|(size, words, samples)| {
-            let header = "iceoryx2/header";
+            let ours = Entry::new("lager", Mode::Spin, &["iceoryx2/header"]);
+            let bare = Entry::new("iceoryx2/header", Mode::Spin, &[]);
             let rows = vec![
-                (
-                    Entry::new("lager", Mode::Spin, &["iceoryx2/header"]),
-                    Job::Lager { words, readers },
-                ),
-                (
-                    Entry::new(header, Mode::Spin, &[]),
-                    Job::Iceoryx2 { words, readers },
-                ),
+                (ours, Job::Lager { words, readers }),
+                (bare, Job::Iceoryx2 { words, readers }),
             ];
             group(format!("publish-{readers}{size}"), regime, rows, samples)
         })
@@ -142,11 +72,9 @@ pub(crate) fn fan_out(regime: Regime, options: &Options) -> Vec<Group> {
 pub(crate) fn ring(regime: Regime, options: &Options) -> Option<Group> {
     let entry = |label, against| Entry::new(label, Mode::Block, against);
     let notify = |listeners| Job::Notify { listeners };
+    let ours = entry("lager/ring", &["iceoryx2/notify", "iceoryx2/notify-1"]);
     let rows = vec![
-        (
-            entry("lager/ring", &["iceoryx2/notify", "iceoryx2/notify-1"]),
-            Job::Ring,
-        ),
+        (ours, Job::Ring),
         (entry("iceoryx2/notify", &[]), notify(OBSERVERS + 1)),
         (entry("iceoryx2/notify-1", &[]), notify(1)),
     ];

@@ -172,24 +172,12 @@ pub struct Report {
 impl fmt::Display for Report {
     /// A table of at most 100 columns; times in ns below 10 µs, in ms above 10 ms.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const HEAD: &str = "mode           n       p50       p99     p99.9  ratios p50 (p99)";
         writeln!(formatter, "{}", self.machine)?;
-        let mut last = None;
-        for row in &self.rows {
-            let group = (row.what.as_str(), row.regime);
-            if last != Some(group) {
-                last = Some(group);
-                writeln!(
-                    formatter,
-                    "\n{:<22} {:<8} {:>7} {:>9} {:>9} {:>9}  ratios p50 (p99)",
-                    format!("{}, {}", row.what, row.regime),
-                    "mode",
-                    "n",
-                    "p50",
-                    "p99",
-                    "p99.9"
-                )?;
-            }
-            row.fmt_line(formatter)?;
+        let group = |row: &Row| format!("{}, {}", row.what, row.regime);
+        for rows in self.rows.chunk_by(|one, next| group(one) == group(next)) {
+            writeln!(formatter, "\n{:<22} {HEAD}", group(&rows[0]))?;
+            rows.iter().try_for_each(|row| row.fmt_line(formatter))?;
         }
         Ok(())
     }
@@ -197,16 +185,11 @@ impl fmt::Display for Report {
 
 impl Row {
     fn fmt_line(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            formatter,
-            "  {:<20} {:<8} {:>7} {:>9} {:>9} {:>9}",
-            self.label(),
-            self.mode,
-            self.times.n,
-            time(self.times.p50_ns),
-            time(self.times.p99_ns),
-            time(self.times.p999_ns)
-        )?;
+        let (label, mode, n) = (self.label(), self.mode, self.times.n);
+        write!(formatter, "  {label:<20} {mode:<8} {n:>7}")?;
+        for ns in [self.times.p50_ns, self.times.p99_ns, self.times.p999_ns] {
+            write!(formatter, " {:>9}", time(ns))?;
+        }
         let ratios = self.ratios.iter().map(|ratio| {
             let (p50, p99) = (times(ratio.p50), times(ratio.p99));
             format!("{p50} ({p99}) {}", ratio.to)
@@ -235,12 +218,10 @@ fn times(ratio: f64) -> String {
 }
 
 fn time(ns: u64) -> String {
-    if ns < 10_000 {
-        format!("{ns} ns")
-    } else if ns < 10_000_000 {
-        format!("{:.1} us", ns as f64 / 1e3)
-    } else {
-        format!("{:.1} ms", ns as f64 / 1e6)
+    match ns {
+        ..10_000 => format!("{ns} ns"),
+        10_000..10_000_000 => format!("{:.1} us", ns as f64 / 1e3),
+        _ => format!("{:.1} ms", ns as f64 / 1e6),
     }
 }
 

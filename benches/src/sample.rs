@@ -2,14 +2,18 @@
 //! the typed ports for them.
 
 use iceoryx2::prelude::ZeroCopySend;
+use lager_ports::Subscriber;
 use lager_topics::{
     Field, FieldInfo, Make, Payload, Qos, Role, Schema, SensorLine, StructInfo, Topic,
 };
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Fault, broken};
+
 /// A payload of `WORDS` words of eight bytes.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ZeroCopySend)]
+#[type_name("lager::bench::Block")]
 pub(crate) struct Block<const WORDS: usize> {
     /// The first one is the number of the block.
     #[serde(with = "lager_topics::list")]
@@ -47,14 +51,6 @@ impl<const WORDS: usize> Block<WORDS> {
             *word = u64::from_ne_bytes(bytes.try_into().expect("chunks of eight"));
         }
         block
-    }
-}
-
-// SAFETY: `repr(C)`, words without padding, no pointer inside.
-#[allow(unsafe_code)]
-unsafe impl<const WORDS: usize> ZeroCopySend for Block<WORDS> {
-    unsafe fn type_name() -> &'static str {
-        <Self as Schema>::TYPE_NAME
     }
 }
 
@@ -118,6 +114,12 @@ pub(crate) const SENDER: Role = Role::Bridge;
 
 /// What the receiver is on the bus.
 pub(crate) const RECEIVER: Role = Role::Logic;
+
+/// Receives all that there is.
+pub(crate) fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), Fault> {
+    while subscriber.receive().map_err(broken)?.is_some() {}
+    Ok(())
+}
 
 #[cfg(test)]
 mod tests {

@@ -27,9 +27,11 @@ impl Scenario {
     pub fn groups(self, options: &Options) -> Vec<Group> {
         let of_regime = |regime: &_| match self {
             Self::Hop => {
-                let mut groups = hop::groups(*regime, options);
-                groups.extend(publish::ring(*regime, options));
-                groups
+                let ring = publish::ring(*regime, options);
+                hop::groups(*regime, options)
+                    .into_iter()
+                    .chain(ring)
+                    .collect()
             }
             Self::Path => path::groups(*regime, options),
             Self::Fanout => publish::fan_out(*regime, options),

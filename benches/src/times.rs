@@ -45,16 +45,9 @@ pub fn table(
 ) -> fmt::Result {
     writeln!(formatter, "{head:26}     p50      p95      p99      max")?;
     for (name, times) in rows {
-        let Times {
-            p50_ms,
-            p95_ms,
-            p99_ms,
-            max_ms,
-        } = times;
-        writeln!(
-            formatter,
-            "{name:26} {p50_ms:7.1}  {p95_ms:7.1}  {p99_ms:7.1}  {max_ms:7.1}"
-        )?;
+        let cells = [times.p50_ms, times.p95_ms, times.p99_ms, times.max_ms];
+        let cells = cells.map(|ms| format!("{ms:7.1}")).join("  ");
+        writeln!(formatter, "{name:26} {cells}")?;
     }
     Ok(())
 }

@@ -55,20 +55,24 @@ fn row(name: &str, mode: Mode, p50_ns: u64) -> Row {
     }
 }
 
-#[test]
-fn a_report_becomes_a_well_formed_drawing() {
-    let report = Report {
-        machine: "a machine with <brackets> & more".to_owned(),
-        rows: vec![
-            row("lager", Mode::Block, 2_300),
-            row("iceoryx2", Mode::Block, 5_400),
-            row("lager", Mode::Spin, 300),
-        ],
-    };
+/// The well-formed drawing of these rows.
+fn drawn(rows: Vec<Row>) -> String {
+    let machine = "a machine with <brackets> & more".to_owned();
+    let report = Report { machine, rows };
     let drawn = plot(&serde_json::to_string(&report).expect("JSON"));
     let svg = String::from_utf8(drawn.stdout).expect("UTF-8");
     assert!(drawn.status.success(), "{:?}", drawn.stderr);
     assert!(is_well_formed(&svg), "{svg}");
+    svg
+}
+
+#[test]
+fn a_report_becomes_a_well_formed_drawing() {
+    let svg = drawn(vec![
+        row("lager", Mode::Block, 2_300),
+        row("iceoryx2", Mode::Block, 5_400),
+        row("lager", Mode::Spin, 300),
+    ]);
     assert!(!is_well_formed(&svg.replacen("</text>", "", 1)));
     // One bar for each row, ours highlighted, with its ratio and its processor time.
     assert_eq!(svg.matches("<rect class=\"ours\"").count(), 2);
@@ -82,14 +86,10 @@ fn a_report_becomes_a_well_formed_drawing() {
 
 #[test]
 fn less_than_the_clocks_tick_is_drawn_too() {
-    let report = Report {
-        machine: "a machine".to_owned(),
-        rows: vec![row("lager", Mode::Spin, 0), row("iceoryx2", Mode::Spin, 50)],
-    };
-    let drawn = plot(&serde_json::to_string(&report).expect("JSON"));
-    let svg = String::from_utf8(drawn.stdout).expect("UTF-8");
-    assert!(drawn.status.success(), "{:?}", drawn.stderr);
-    assert!(is_well_formed(&svg), "{svg}");
+    let svg = drawn(vec![
+        row("lager", Mode::Spin, 0),
+        row("iceoryx2", Mode::Spin, 50),
+    ]);
     assert_eq!(svg.matches("<rect class=\"ours\"").count(), 1);
     assert!(svg.contains("p50 0 ns"), "{svg}");
 }

@@ -24,7 +24,7 @@ use lager_ports::{BusConfig, Clock};
 use lager_topics::{Qos, Stamp};
 
 use super::{End, Slept, TIME_OUT, sleep_until, spin};
-use crate::error::{BenchError, Fault};
+use crate::error::{BenchError, Fault, broken};
 use crate::sample::Sample;
 
 /// Samples a subscriber may hold, as the typed ports allow.
@@ -68,55 +68,46 @@ impl Header for () {}
 /// A process's membership.
 pub(crate) struct Member {
     node: Node<ipc::Service>,
+    limits: Option<Qos>,
 }
 
 impl Member {
     /// Joins the transport of that bus, configured as the typed ports are: among others with as
-    /// many places for what writers that have ended left unread.
-    pub(crate) fn join(bus: &BusConfig) -> Result<Self, BenchError> {
-        Self::configured(&config(bus)?)
-    }
-
-    /// Joins it with iceoryx2's own defaults for all that is no matter of the place.
-    pub(crate) fn join_with_defaults(bus: &BusConfig) -> Result<Self, BenchError> {
-        let mut config = config(bus)?;
-        config.defaults = Config::default().defaults;
-        Self::configured(&config)
-    }
-
-    fn configured(config: &Config) -> Result<Self, BenchError> {
+    /// many places for what writers that have ended left unread. Its topics get these limits;
+    /// `None` = iceoryx2's own defaults for all that is no matter of the place.
+    pub(crate) fn join(bus: &BusConfig, limits: Option<Qos>) -> Result<Self, BenchError> {
         set_log_level(LogLevel::Fatal);
+        let mut config = config(bus)?;
+        if limits.is_none() {
+            config.defaults = Config::default().defaults;
+        }
         let node = NodeBuilder::new()
-            .config(config)
+            .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create()
             .map_err(|error| failed("a node", error))?;
-        Ok(Self { node })
+        Ok(Self { node, limits })
     }
 
-    /// A publisher of any payload; `None` leaves iceoryx2's limits as they are.
+    /// A publisher of any payload.
     pub(crate) fn sender<P: Debug + ZeroCopySend + 'static, H: Header>(
         &self,
         name: &str,
-        limits: Option<&Qos>,
     ) -> Result<Sender<P, H>, BenchError> {
         let publisher = patiently("a publisher", || {
-            Ok(self.topic(name, limits)?.publisher_builder().create()?)
+            Ok(self.topic(name)?.publisher_builder().create()?)
         })?;
-        Ok(Sender {
-            publisher,
-            header: H::first(),
-        })
+        let header = H::first();
+        Ok(Sender { publisher, header })
     }
 
-    /// A subscriber; limits as for the publisher.
+    /// A subscriber to any payload.
     pub(crate) fn subscriber<P: Debug + ZeroCopySend, H: Header>(
         &self,
         name: &str,
-        limits: Option<&Qos>,
     ) -> Result<Subscriber<ipc::Service, P, H>, BenchError> {
         patiently("a subscriber", || {
-            Ok(self.topic(name, limits)?.subscriber_builder().create()?)
+            Ok(self.topic(name)?.subscriber_builder().create()?)
         })
     }
 
@@ -145,14 +136,13 @@ impl Member {
     fn topic<P: Debug + ZeroCopySend, H: Header>(
         &self,
         name: &str,
-        limits: Option<&Qos>,
     ) -> Result<publish_subscribe::PortFactory<ipc::Service, P, H>, Box<dyn Error>> {
         let builder = self
             .node
             .service_builder(&ServiceName::new(name)?)
             .publish_subscribe::<P>()
             .user_header::<H>();
-        let builder = match limits {
+        let builder = match &self.limits {
             None => builder,
             Some(qos) => builder
                 .max_publishers(qos.max_publishers())
@@ -234,11 +224,10 @@ impl<P: Copy + Debug + ZeroCopySend + 'static, H: Header> Sender<P, H> {
 /// Publishes to `out` and subscribes to `back`, with a receiver that looks without pause.
 pub(crate) fn polling<H: Header>(
     member: &Member,
-    (out, back): (&str, &str),
-    limits: Option<&Qos>,
+    [out, back]: [&str; 2],
 ) -> Result<impl End + use<H>, BenchError> {
-    let subscriber = member.subscriber::<Sample, H>(back, limits)?;
-    let mut sender = member.sender::<Sample, H>(out, limits)?;
+    let subscriber = member.subscriber::<Sample, H>(back)?;
+    let mut sender = member.sender::<Sample, H>(out)?;
     let send = move |sample: &Sample| sender.send(sample);
     Ok((send, move || spin(|| receive(&subscriber))))
 }
@@ -246,15 +235,14 @@ pub(crate) fn polling<H: Header>(
 /// The same with a receiver that sleeps on an event.
 pub(crate) fn listening(
     member: &Member,
-    (out, back): (&str, &str),
-    limits: &Qos,
+    [out, back]: [&str; 2],
 ) -> Result<impl End + use<>, BenchError> {
     // As many as iceoryx2 allows by default.
     const LISTENERS: usize = 16;
     let listener = member.listener(back, LISTENERS)?;
     let notifier = member.notifier(out, LISTENERS)?;
-    let subscriber = member.subscriber::<Sample, Stamp>(back, Some(limits))?;
-    let mut sender = member.sender::<Sample, Stamp>(out, Some(limits))?;
+    let subscriber = member.subscriber::<Sample, Stamp>(back)?;
+    let mut sender = member.sender::<Sample, Stamp>(out)?;
     let send = move |sample: &Sample| {
         sender.send(sample)?;
         notifier.notify().map_err(broken)?;
@@ -274,11 +262,6 @@ fn receive<H: Header>(
 ) -> Result<Option<Sample>, Fault> {
     let received = subscriber.receive().map_err(broken)?;
     Ok(received.map(|received| *received.payload()))
-}
-
-/// A fault of a port.
-pub(crate) fn broken(error: impl Debug) -> Fault {
-    Fault::Broken(format!("{error:?}"))
 }
 
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! A slot in shared memory: watched without pause (`cacheline`), or with a `futex` or an `eventfd`
-//! to sleep on.
+//! to sleep on. The path's floor is made of the one with a futex, too.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::os::fd::OwnedFd;
 
+use lager_rig::Shareable;
 use rustix::thread::futex;
 use rustix::time::Timespec;
 
 use super::{End, Slept, TIME_OUT, sleep_until, spin};
+use crate::error::Fault;
 use crate::sample::{Block, Sample};
 
 /// A cache line that holds a block; the number is written last.
@@ -73,9 +75,37 @@ impl Word {
 #[derive(Debug)]
 #[repr(C)]
 pub(crate) struct Lane<const WORDS: usize> {
-    pub(crate) slot: Slot<WORDS>,
+    slot: Slot<WORDS>,
     pub(crate) word: Word,
 }
+
+impl<const WORDS: usize> Lane<WORDS> {
+    /// Writes the block and wakes who sleeps for it.
+    pub(crate) fn put(&self, block: &Block<WORDS>) -> Result<(), Fault> {
+        self.slot.write(block);
+        Ok(self.word.wake()?)
+    }
+
+    /// Sleeps until the count is no longer `seen`, and reads the block.
+    pub(crate) fn take(&self, seen: &mut u32) -> Result<Block<WORDS>, Fault> {
+        let before = *seen;
+        let look = || {
+            let count = self.word.count();
+            Ok((count != before).then_some(count))
+        };
+        *seen = sleep_until(look, || Ok(self.word.sleep(before)?))?;
+        Ok(self.slot.read())
+    }
+}
+
+/// A direction each way, for two processes.
+#[derive(Debug)]
+#[repr(C)]
+pub(crate) struct Lanes<const WORDS: usize>(pub(crate) [Lane<WORDS>; 2]);
+
+// SAFETY: atomics only, and zeros are valid.
+#[allow(unsafe_code)]
+unsafe impl<const WORDS: usize> Shareable for Lanes<WORDS> {}
 
 /// A cache line each way, watched without pause.
 pub(crate) fn cache_line(out: &Lane<8>, back: &Lane<8>) -> impl End {
@@ -97,19 +127,8 @@ pub(crate) fn cache_line(out: &Lane<8>, back: &Lane<8>) -> impl End {
 /// A cache line each way, and a futex to sleep on.
 pub(crate) fn a_futex(out: &Lane<8>, back: &Lane<8>) -> impl End {
     let mut seen = back.word.count();
-    let send = move |sample: &Sample| {
-        out.slot.write(sample);
-        Ok(out.word.wake()?)
-    };
-    let receive = move || {
-        let look = || {
-            let count = back.word.count();
-            Ok((count != seen).then_some(count))
-        };
-        seen = sleep_until(look, || Ok(back.word.sleep(seen)?))?;
-        Ok(back.slot.read())
-    };
-    (send, receive)
+    let send = move |sample: &Sample| out.put(sample);
+    (send, move || back.take(&mut seen))
 }
 
 /// A cache line each way, and an eventfd to sleep on, without a time-out.
@@ -134,19 +153,12 @@ pub(crate) fn an_eventfd(
 mod tests {
     use super::*;
     use crate::baseline::tests::pass;
-    use lager_rig::{Shareable, Shared};
-
-    #[repr(C)]
-    struct Lanes([Lane<8>; 2]);
-
-    // SAFETY: atomics only.
-    #[allow(unsafe_code)]
-    unsafe impl Shareable for Lanes {}
+    use lager_rig::Shared;
 
     #[test]
     fn samples_come_back_over_each_of_them() {
         use rustix::event::{EventfdFlags, eventfd};
-        let memory = Shared::<Lanes>::new().unwrap();
+        let memory = Shared::<Lanes<8>>::new().unwrap();
         let [there, back] = &memory.0;
         pass(cache_line(there, back), cache_line(back, there));
         pass(a_futex(there, back), a_futex(back, there));

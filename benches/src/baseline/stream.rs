@@ -23,18 +23,23 @@ pub(crate) fn end(out: &OwnedFd, back: &OwnedFd) -> impl End {
     };
     let receive = move || {
         let mut bytes = [0; SIZE];
-        let mut filled = 0;
-        while filled < SIZE {
-            match read(back, &mut bytes[filled..]) {
-                Ok(0) => return Err(Fault::Broken("the other end is closed".to_owned())),
-                Ok(some) => filled += some,
-                Err(Errno::INTR) => {}
-                Err(other) => return Err(other.into()),
-            }
-        }
+        read_whole(back, &mut bytes)?;
         Ok(Sample::from_bytes(&bytes))
     };
     (send, receive)
+}
+
+/// Sleeps until all of `bytes` has come.
+pub(crate) fn read_whole(from: &OwnedFd, mut bytes: &mut [u8]) -> Result<(), Fault> {
+    while !bytes.is_empty() {
+        match read(from, &mut *bytes) {
+            Ok(0) => return Err(Fault::Broken("the other end is closed".to_owned())),
+            Ok(some) => bytes = &mut bytes[some..],
+            Err(Errno::INTR) => {}
+            Err(other) => return Err(other.into()),
+        }
+    }
+    Ok(())
 }
 
 /// Both ends of a Unix datagram socket. Children inherit them.

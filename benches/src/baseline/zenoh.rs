@@ -33,7 +33,7 @@ use crate::sample::{SIZE, Sample};
 pub(crate) fn meet(
     socket: &Path,
     is_first: bool,
-    (out, back): (&'static str, &'static str),
+    [out, back]: [&'static str; 2],
 ) -> Result<impl End + use<>, BenchError> {
     let session = zenoh::open(config(socket, is_first)?)
         .wait()
@@ -116,8 +116,8 @@ mod tests {
         std::fs::create_dir(&folder).unwrap();
         let socket = folder.join("socket");
         let there = socket.clone();
-        let second = std::thread::spawn(move || meet(&there, false, ("back", "there")).unwrap());
-        let first = meet(&socket, true, ("there", "back")).unwrap();
+        let second = std::thread::spawn(move || meet(&there, false, ["back", "there"]).unwrap());
+        let first = meet(&socket, true, ["there", "back"]).unwrap();
         pass(first, second.join().unwrap());
         assert!(!socket.exists());
         std::fs::remove_dir_all(&folder).unwrap();
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn a_socket_that_cannot_be_made_is_said() {
         let socket = Path::new("/nowhere/at/all");
-        let refused = meet(socket, true, ("there", "back"));
+        let refused = meet(socket, true, ["there", "back"]);
         assert!(matches!(refused, Err(BenchError::Failed { .. })));
     }
 }

@@ -1,5 +1,5 @@
 //! Named figures and where they come from: a report of ratios, callgrind's counts by way of
-//! gungraun, the emulator, or a plain file of counts (`--counts`). Nothing is judged here.
+//! gungraun, or the emulator. Nothing is judged here.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,10 +7,13 @@ use std::path::Path;
 use clap::ValueEnum;
 use lager_benches::chip::ChipReport;
 use lager_benches::{Mode, Regime, Report, median};
-use serde::Deserialize;
 use serde_json::Value;
 
 use crate::error::GuardError;
+
+/// The sources that are counted: by callgrind, and by the emulator in chips.
+pub(crate) const INSTRUCTIONS: &str = "instructions";
+pub(crate) const CYCLES: &str = "cycles";
 
 /// The figures of one source.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,8 +31,7 @@ pub(crate) struct Figures {
 }
 
 /// Which compiler built a program, and for what.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Built {
     /// The compiler's version, `1.95.0`.
     pub(crate) rustc: String,
@@ -40,6 +42,8 @@ pub(crate) struct Built {
 /// The name of a ratio in its parts: `hop block same-core: lager / iceoryx2/event p50`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RatioName<'a> {
+    /// What precedes ` / `: the name of the row.
+    pub(crate) row: &'a str,
     pub(crate) what: &'a str,
     pub(crate) mode: Mode,
     pub(crate) regime: Regime,
@@ -51,15 +55,16 @@ pub(crate) struct RatioName<'a> {
 impl<'a> RatioName<'a> {
     /// `None` if it is not the name of a ratio.
     pub(crate) fn parse(text: &'a str) -> Option<Self> {
-        let (row, compared) = text.split_once(": ")?;
-        let (label, rest) = compared.split_once(" / ")?;
+        let (row, compared) = text.split_once(" / ")?;
+        let (group, label) = row.split_once(": ")?;
         // A label may have a space in it.
-        let (to, quantile) = rest.rsplit_once(' ')?;
-        let [what, mode, regime] = row.split(' ').collect::<Vec<_>>()[..] else {
+        let (to, quantile) = compared.rsplit_once(' ')?;
+        let [what, mode, regime] = group.split(' ').collect::<Vec<_>>()[..] else {
             return None;
         };
         ["p50", "p99"].contains(&quantile).then_some(())?;
         Some(Self {
+            row,
             what,
             mode: Mode::from_str(mode, false).ok()?,
             regime: Regime::from_str(regime, false).ok()?,
@@ -97,7 +102,7 @@ impl Figures {
 
     /// The instruction counts that gungraun writes, one line of JSON for each bench.
     pub(crate) fn of_callgrind(file: &Path, text: &str, built: Built) -> Result<Self, GuardError> {
-        let mut figures = Self::from_source("instructions");
+        let mut figures = Self::from_source(INSTRUCTIONS);
         figures.built = Some(built);
         for line in text.lines().filter(|line| !line.trim().is_empty()) {
             let bench: Value =
@@ -112,39 +117,19 @@ impl Figures {
                 .ok_or_else(|| not_counts(file, &format!("`{name}` has no instructions")))?;
             figures.add(name, vec![count])?;
         }
-        figures.not_empty(file)
-    }
-
-    /// Counts from a program of another workspace:
-    /// `{"source":…,"built":{"rustc":…,"target":…},"figures":{NAME:N,…}}`.
-    pub(crate) fn of_counts(file: &Path, text: &str) -> Result<Self, GuardError> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Counts {
-            source: String,
-            built: Built,
-            figures: BTreeMap<String, f64>,
+        match figures.runs.is_empty() {
+            true => Err(not_counts(file, &"it holds no figure")),
+            false => Ok(figures),
         }
-        let counts: Counts =
-            serde_json::from_str(text).map_err(|error| not_counts(file, &error))?;
-        let runs = counts.figures.into_iter();
-        Self {
-            source: counts.source,
-            built: Some(counts.built),
-            runs: runs.map(|(name, count)| (name, vec![count])).collect(),
-            ..Self::default()
-        }
-        .not_empty(file)
     }
 
     /// The cycles of the boards' images, of those figures that have a limit: the others are for the
     /// report of `lager bench chip`.
     pub(crate) fn of_chips(
-        source: &str,
         report: ChipReport,
         limited: impl Fn(&str) -> bool,
     ) -> Result<Self, GuardError> {
-        let mut figures = Self::from_source(source);
+        let mut figures = Self::from_source(CYCLES);
         figures.built = Some(Built {
             rustc: report.rustc,
             target: "avr-none".to_owned(),
@@ -182,13 +167,6 @@ impl Figures {
         match self.runs.insert(name.clone(), runs) {
             None => Ok(()),
             Some(_) => Err(GuardError::Twice(self.source.clone(), name)),
-        }
-    }
-
-    fn not_empty(self, file: &Path) -> Result<Self, GuardError> {
-        match self.runs.is_empty() {
-            true => Err(not_counts(file, &"it holds no figure")),
-            false => Ok(self),
         }
     }
 }
@@ -248,6 +226,7 @@ mod tests {
     fn a_ratio_is_named_as_it_is_read() {
         let name = RatioName::parse("path@observed block plain: lager/64 observers / floor p99");
         let expected = RatioName {
+            row: "path@observed block plain: lager/64 observers",
             what: "path@observed",
             mode: Mode::Block,
             regime: Regime::Plain,
@@ -289,18 +268,6 @@ mod tests {
         for wrong in ["", &line("x", "null"), "{}", "panic"] {
             assert!(read(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn another_programs_counts_say_what_built_them() {
-        let read = |text: &str| Figures::of_counts(Path::new("f"), text);
-        let text = r#"{"source":"cycles","built":{"rustc":"1.96.0","target":"avr-none"},"figures":{"line":640}}"#;
-        let figures = read(text).unwrap();
-        assert_eq!(
-            (figures.source.as_str(), figures.get("line")),
-            ("cycles", Some(640.0))
-        );
-        assert!(read(r#"{"source":"cycles","figures":{"line":640}}"#).is_err());
     }
 
     #[test]

@@ -163,7 +163,8 @@ fn notes_on_counts(limits: &Limits, figures: &Figures) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::Built;
+    use crate::figures::{Built, CYCLES};
+    use std::path::Path;
 
     const RATIO: &str = "hop spin plain: lager / futex p50";
 
@@ -271,6 +272,40 @@ mod tests {
         }
         assert!([Broken, Missing].iter().all(|verdict| verdict.fails()));
         assert!(![Kept, NotJudged].iter().any(|verdict| verdict.fails()));
+    }
+
+    /// Each figure of the images gets worse, alone, by 6 % of what its limit was made of.
+    #[test]
+    fn six_percent_more_cycles_are_noticed() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("limits.toml");
+        let limits = Limits::load(&file).unwrap();
+        let counted = &limits.counted[CYCLES];
+        let (rustc, target) = (counted.rustc.clone(), counted.target.clone());
+        let mut figures = Figures {
+            source: CYCLES.to_owned(),
+            built: Some(Built { rustc, target }),
+            ..Figures::default()
+        };
+        let base = |limit: &Limit| limit.measured.or(limit.at_least).unwrap();
+        for limit in limits.of(CYCLES) {
+            figures.runs.insert(limit.figure.clone(), vec![base(limit)]);
+        }
+        let failing = |figures: &Figures| {
+            let (judgements, _) = judge(&limits, figures);
+            let failing = judgements.into_iter().filter(|one| one.verdict.fails());
+            failing.map(|one| one.figure).collect::<Vec<_>>()
+        };
+        assert!(figures.runs.len() >= 11, "{figures:?}");
+        assert_eq!(failing(&figures), Vec::<String>::new());
+        for limit in limits.of(CYCLES) {
+            let worse = match limit.at_least {
+                Some(reached) => reached * 0.94,
+                None => (base(limit) * 1.06).ceil(),
+            };
+            let mut changed = figures.clone();
+            changed.runs.insert(limit.figure.clone(), vec![worse]);
+            assert_eq!(failing(&changed), [limit.figure.as_str()]);
+        }
     }
 
     #[test]

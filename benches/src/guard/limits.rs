@@ -93,7 +93,7 @@ impl Limits {
     }
 
     /// The limits of one source.
-    pub(crate) fn of<'a>(&'a self, source: &'a str) -> impl Iterator<Item = &'a Limit> {
+    pub(crate) fn of(&self, source: &str) -> impl Iterator<Item = &Limit> {
         self.limits
             .iter()
             .filter(move |limit| limit.source == source)

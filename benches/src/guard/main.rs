@@ -18,12 +18,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
-use lager_benches::chip::{self, Programs};
+use lager_benches::chip::{self, ChipReport, Programs};
 use lager_benches::{Scenario, machine, median};
 use serde::Serialize;
 
 use crate::error::{GuardError, read};
-use crate::figures::{Built, Figures};
+use crate::figures::{Built, CYCLES, Figures, INSTRUCTIONS};
 use crate::judge::{Judgement, Verdict, judge};
 use crate::limits::Limits;
 use crate::measure::measure;
@@ -64,9 +64,6 @@ struct Arguments {
     /// Instruction counts as gungraun writes them (the script gives this)
     #[arg(long, value_name = "FILE", hide = true)]
     callgrind: Option<PathBuf>,
-    /// Counts of another program: {"source":…,"built":{"rustc":…,"target":…},"figures":{NAME:N,…}}
-    #[arg(long, value_name = "FILE")]
-    counts: Vec<PathBuf>,
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {
@@ -75,9 +72,6 @@ fn at_least_one(text: &str) -> Result<usize, String> {
         Ok(number) => Ok(number),
     }
 }
-
-/// The source that is counted by the emulator, in chips.
-const CYCLES: &str = "cycles";
 
 /// What the guard has found.
 #[derive(Debug, Serialize)]
@@ -91,21 +85,7 @@ struct Findings {
 fn main() -> ExitCode {
     lager_benches::run_if_asked();
     lager_benches::slow::refuse_in_vain();
-    let arguments = Arguments::parse();
-    let kept = if let Some(times) = arguments.spread {
-        spread(&arguments, times).map(|()| true)
-    } else if arguments.trial {
-        try_limits(&arguments)
-    } else {
-        guard(&arguments).map(|findings| {
-            match arguments.json {
-                true => println!("{}", json(&findings)),
-                false => print(&findings),
-            }
-            findings.kept
-        })
-    };
-    match kept {
+    match Guard::new(Arguments::parse()).and_then(|guard| guard.run()) {
         Ok(kept) => ExitCode::from(u8::from(!kept)),
         Err(error) => {
             eprintln!("benches/guard: {error}");
@@ -114,125 +94,144 @@ fn main() -> ExitCode {
     }
 }
 
-fn guard(arguments: &Arguments) -> Result<Findings, GuardError> {
-    let limits = Limits::load(&arguments.limits)?;
-    let sources = sources(&limits, &arguments.only)?;
-    let counts = counts(arguments)?;
-    let mut findings = Findings {
-        machine: machine::describe(),
-        kept: true,
-        limits: Vec::new(),
-        notes: Vec::new(),
-    };
-    for source in sources {
-        let counted = counts.iter().find(|figures| figures.source == source);
-        let figures = match (counted, Scenario::from_str(&source, false)) {
-            (Some(figures), _) => figures.clone(),
-            (None, Ok(scenario)) => {
-                let (runs, attempts) = (arguments.runs, arguments.attempts);
-                let (figures, times) = measure(&limits, scenario, runs, attempts)?;
-                if times > 1 {
-                    findings.notes.push(format!(
-                        "{source}: measured {times} times because a limit was broken; the medians of all runs count"
-                    ));
-                }
-                figures
+/// What is to be done.
+struct Guard {
+    arguments: Arguments,
+    limits: Limits,
+    /// The sources that have limits, in the file's order, or those of them that were asked for.
+    sources: Vec<String>,
+}
+
+impl Guard {
+    fn new(arguments: Arguments) -> Result<Self, GuardError> {
+        let limits = Limits::load(&arguments.limits)?;
+        let mut sources: Vec<String> = Vec::new();
+        for limit in &limits.limits {
+            if !sources.contains(&limit.source) {
+                sources.push(limit.source.clone());
             }
-            (None, Err(_)) if source == CYCLES => {
-                // `benches/guard` runs this in the source tree.
-                let programs = chip::BAUDS.map(|baud| (baud, Programs::in_tree("".as_ref(), baud)));
-                let report = chip::measure(programs).map_err(GuardError::Chip)?;
-                let limited = |name: &str| limits.of(CYCLES).any(|limit| limit.figure == name);
-                Figures::of_chips(CYCLES, report, limited)?
-            }
-            (None, Err(_)) => return Err(GuardError::NoCounts(source)),
+        }
+        let only = &arguments.only;
+        if let Some(unknown) = only.iter().find(|name| !sources.contains(name)) {
+            let known = sources.join(", ");
+            return Err(GuardError::NoSuchSource(unknown.clone(), known));
+        }
+        sources.retain(|source| only.is_empty() || only.contains(source));
+        Ok(Self {
+            arguments,
+            limits,
+            sources,
+        })
+    }
+
+    /// Whether all is as it should be.
+    fn run(&self) -> Result<bool, GuardError> {
+        if let Some(times) = self.arguments.spread {
+            return self.spread(times).map(|()| true);
+        }
+        if self.arguments.trial {
+            return self.try_limits();
+        }
+        let findings = self.judge()?;
+        match self.arguments.json {
+            true => println!("{}", json(&findings)),
+            false => print(&findings),
+        }
+        Ok(findings.kept)
+    }
+
+    fn judge(&self) -> Result<Findings, GuardError> {
+        let limits = &self.limits;
+        let mut findings = Findings {
+            machine: machine::describe(),
+            kept: true,
+            limits: Vec::new(),
+            notes: Vec::new(),
         };
-        let (judgements, notes) = judge(&limits, &figures);
-        findings.kept &= !judgements.iter().any(|one| one.verdict.fails());
-        findings.limits.extend(judgements);
-        findings.notes.extend(notes);
-    }
-    Ok(findings)
-}
-
-/// Shows how far the ratios that have limits spread from one measurement to the next.
-fn spread(arguments: &Arguments, times: usize) -> Result<(), GuardError> {
-    let limits = Limits::load(&arguments.limits)?;
-    let scenarios = scenarios(&limits, arguments)?;
-    head(["lowest", "median", "highest", "limit", "goal"], "");
-    for scenario in scenarios {
-        let once = |_| measure::once(&limits, scenario, arguments.runs);
-        let measured = (0..times).map(once).collect::<Result<Vec<_>, _>>()?;
-        for limit in limits.of(&scenario.to_string()) {
-            let values = measured.iter().filter_map(|one| one.get(&limit.figure));
-            let mut values: Vec<f64> = values.collect();
-            values.sort_unstable_by(f64::total_cmp);
-            let (lowest, highest) = (values.first().copied(), values.last().copied());
-            let cells = [lowest, median(values), highest, limit.at_most, limit.goal];
-            line(&limit.figure, cells.map(number), "");
-        }
-    }
-    Ok(())
-}
-
-/// Plants a slow-down just above each limit on a ratio; whether the guard has noticed each.
-fn try_limits(arguments: &Arguments) -> Result<bool, GuardError> {
-    let limits = Limits::load(&arguments.limits)?;
-    let scenarios = scenarios(&limits, arguments)?;
-    let mut all_noticed = true;
-    if !arguments.json {
-        head(["limit", "before", "slower ns", "with it"], "noticed");
-    }
-    for scenario in scenarios {
-        let (figures, _) = measure(&limits, scenario, arguments.runs, 1)?;
-        for mut trial in trial::trials(&limits, &figures) {
-            let source = scenario.to_string();
-            trial::run(&mut trial, &arguments.limits, &source, arguments.runs)?;
-            for planted in trial {
-                all_noticed &= planted.noticed;
-                if arguments.json {
-                    println!("{}", json(&planted));
-                    continue;
+        for source in &self.sources {
+            let figures = match (Scenario::from_str(source, false), &self.arguments.callgrind) {
+                (Ok(scenario), _) => {
+                    let (runs, attempts) = (self.arguments.runs, self.arguments.attempts);
+                    let (figures, times) = measure(limits, scenario, runs, attempts)?;
+                    if times > 1 {
+                        findings.notes.push(format!(
+                            "{source}: measured {times} times because a limit was broken; the medians of all runs count"
+                        ));
+                    }
+                    figures
                 }
-                let (limit, before) = (Some(planted.limit), Some(planted.before));
-                let cells = [limit, before, Some(planted.spin_ns as f64), planted.with];
-                let noticed = if planted.noticed { "yes" } else { "NO" };
-                line(&planted.figure, cells.map(number), noticed);
+                (Err(_), _) if source == CYCLES => Figures::of_chips(chips()?, |name| {
+                    limits.of(CYCLES).any(|limit| limit.figure == name)
+                })?,
+                (Err(_), Some(file)) if source == INSTRUCTIONS => {
+                    Figures::of_callgrind(file, &read(file)?, Built::by_rustc()?)?
+                }
+                (Err(_), _) => return Err(GuardError::NoCounts(source.clone())),
+            };
+            let (judgements, notes) = judge(limits, &figures);
+            findings.kept &= !judgements.iter().any(|one| one.verdict.fails());
+            findings.limits.extend(judgements);
+            findings.notes.extend(notes);
+        }
+        Ok(findings)
+    }
+
+    /// Shows how far the ratios that have limits spread from one measurement to the next.
+    fn spread(&self, times: usize) -> Result<(), GuardError> {
+        head(["lowest", "median", "highest", "limit", "goal"], "");
+        for scenario in self.scenarios() {
+            let once = |_| measure::once(&self.limits, scenario, self.arguments.runs);
+            let measured = (0..times).map(once).collect::<Result<Vec<_>, _>>()?;
+            for limit in self.limits.of(&scenario.to_string()) {
+                let values = measured.iter().filter_map(|one| one.get(&limit.figure));
+                let mut values: Vec<f64> = values.collect();
+                values.sort_unstable_by(f64::total_cmp);
+                let (lowest, highest) = (values.first().copied(), values.last().copied());
+                let cells = [lowest, median(values), highest, limit.at_most, limit.goal];
+                line(&limit.figure, cells.map(number), "");
             }
         }
+        Ok(())
     }
-    Ok(all_noticed)
-}
 
-/// The sources that have limits, in the file's order, or those of them that were asked for.
-fn sources(limits: &Limits, only: &[String]) -> Result<Vec<String>, GuardError> {
-    let mut all: Vec<String> = Vec::new();
-    for limit in &limits.limits {
-        if !all.contains(&limit.source) {
-            all.push(limit.source.clone());
+    /// Plants a slow-down just above each limit on a ratio; whether the guard has noticed each.
+    fn try_limits(&self) -> Result<bool, GuardError> {
+        let Arguments { limits, runs, .. } = &self.arguments;
+        let mut all_noticed = true;
+        if !self.arguments.json {
+            head(["limit", "before", "slower ns", "with it"], "noticed");
         }
+        for scenario in self.scenarios() {
+            let (figures, _) = measure(&self.limits, scenario, *runs, 1)?;
+            for mut trial in trial::trials(&self.limits, &figures) {
+                trial::run(&mut trial, limits, &figures.source, *runs)?;
+                for planted in trial {
+                    all_noticed &= planted.noticed;
+                    if self.arguments.json {
+                        println!("{}", json(&planted));
+                        continue;
+                    }
+                    let (limit, before) = (Some(planted.limit), Some(planted.before));
+                    let cells = [limit, before, Some(planted.spin_ns as f64), planted.with];
+                    let noticed = if planted.noticed { "yes" } else { "NO" };
+                    line(planted.figure, cells.map(number), noticed);
+                }
+            }
+        }
+        Ok(all_noticed)
     }
-    if let Some(unknown) = only.iter().find(|name| !all.contains(name)) {
-        return Err(GuardError::NoSuchSource(unknown.clone(), all.join(", ")));
+
+    /// Those of the sources that are timed.
+    fn scenarios(&self) -> impl Iterator<Item = Scenario> {
+        let scenario = |source: &String| Scenario::from_str(source, false).ok();
+        self.sources.iter().filter_map(scenario)
     }
-    all.retain(|source| only.is_empty() || only.contains(source));
-    Ok(all)
 }
 
-/// Those of the sources that are timed.
-fn scenarios(limits: &Limits, arguments: &Arguments) -> Result<Vec<Scenario>, GuardError> {
-    let sources = sources(limits, &arguments.only)?;
-    let scenario = |source: &String| Scenario::from_str(source, false).ok();
-    Ok(sources.iter().filter_map(scenario).collect())
-}
-
-fn counts(arguments: &Arguments) -> Result<Vec<Figures>, GuardError> {
-    let callgrind = arguments.callgrind.iter();
-    let instructions =
-        callgrind.map(|file| Figures::of_callgrind(file, &read(file)?, Built::by_rustc()?));
-    let others = arguments.counts.iter();
-    let others = others.map(|file| Figures::of_counts(file, &read(file)?));
-    instructions.chain(others).collect()
+/// What the boards' images do; `benches/guard` runs this in the source tree.
+fn chips() -> Result<ChipReport, GuardError> {
+    let programs = chip::BAUDS.map(|baud| (baud, Programs::in_tree("".as_ref(), baud)));
+    chip::measure(programs).map_err(GuardError::Chip)
 }
 
 fn print(findings: &Findings) {

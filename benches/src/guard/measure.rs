@@ -4,8 +4,7 @@
 //! is measured again is put together with what was measured before, and the median of all runs
 //! counts. So a single lucky run does not hide code that is slower than its limit.
 
-use clap::ValueEnum;
-use lager_benches::{Mode, Options, Regime, Scenario, may_have_real_time};
+use lager_benches::{Options, Scenario, may_have_real_time};
 
 use crate::error::GuardError;
 use crate::figures::{Figures, RatioName};
@@ -54,18 +53,13 @@ pub(crate) fn once(
 fn options(limits: &Limits, scenario: Scenario, runs: usize) -> Options {
     let source = scenario.to_string();
     let names: Vec<RatioName> = limits.of(&source).filter_map(|one| one.ratio()).collect();
-    let named = |mode: &Mode| names.iter().any(|name| name.mode == *mode);
-    let regimes = Regime::value_variants().iter().copied();
-    Options {
+    let mut options = Options {
         runs,
         quick: true,
-        modes: Mode::value_variants()
-            .iter()
-            .copied()
-            .filter(named)
-            .collect(),
-        regimes: regimes
-            .filter(|regime| names.iter().any(|name| name.regime == *regime))
-            .collect(),
-    }
+        ..Options::default()
+    };
+    let (modes, regimes) = (&mut options.modes, &mut options.regimes);
+    modes.retain(|mode| names.iter().any(|name| name.mode == *mode));
+    regimes.retain(|regime| names.iter().any(|name| name.regime == *regime));
+    options
 }

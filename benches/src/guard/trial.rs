@@ -21,8 +21,10 @@ const ABOVE: f64 = 1.25;
 
 /// A limit and the slow-down that should break it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Planted {
-    pub(crate) figure: String,
+pub(crate) struct Planted<'a> {
+    #[serde(skip)]
+    name: RatioName<'a>,
+    pub(crate) figure: &'a str,
     pub(crate) limit: f64,
     /// The ratio without the slow-down.
     pub(crate) before: f64,
@@ -35,43 +37,40 @@ pub(crate) struct Planted {
 }
 
 /// Slow-downs that are tried at once.
-pub(crate) type Trial = Vec<Planted>;
+pub(crate) type Trial<'a> = Vec<Planted<'a>>;
 
 /// The trials of a source, whose ratios without any slow-down are `figures`.
-pub(crate) fn trials(limits: &Limits, figures: &Figures) -> Vec<Trial> {
-    let mut trials: Vec<(Trial, Vec<RatioName>)> = Vec::new();
+pub(crate) fn trials<'a>(limits: &'a Limits, figures: &Figures) -> Vec<Trial<'a>> {
+    let mut trials: Vec<Trial> = Vec::new();
     for limit in limits.of(&figures.source) {
-        let (Some(planted), Some(name)) = (planted(limit, figures), limit.ratio()) else {
+        let Some(planted) = planted(limit, figures) else {
             continue;
         };
-        let fits = |names: &[RatioName]| names.iter().all(|other| are_apart(other, &name));
-        match trials.iter_mut().find(|(_, names)| fits(names)) {
-            Some((trial, names)) => {
-                trial.push(planted);
-                names.push(name);
-            }
-            None => trials.push((vec![planted], vec![name])),
+        let fits = |trial: &Trial| trial.iter().all(|one| are_apart(&one.name, &planted.name));
+        match trials.iter_mut().find(|trial| fits(trial)) {
+            Some(trial) => trial.push(planted),
+            None => trials.push(vec![planted]),
         }
     }
-    trials.into_iter().map(|(trial, _)| trial).collect()
+    trials
 }
 
 /// Whether one of the two rows can be slowed down without touching the other one's ratio.
 fn are_apart(one: &RatioName, other: &RatioName) -> bool {
-    let is_same_row = one.label == other.label && one.mode == other.mode;
     (one.what, one.regime) != (other.what, other.regime)
-        || (!is_same_row && one.to != other.label && other.to != one.label)
+        || (one.row != other.row && one.to != other.label && other.to != one.label)
 }
 
 /// The slow-down that brings a ratio above its limit; `None` without such a ratio.
-fn planted(limit: &Limit, figures: &Figures) -> Option<Planted> {
+fn planted<'a>(limit: &'a Limit, figures: &Figures) -> Option<Planted<'a>> {
     let at_most = limit.at_most?;
     let before = figures.get(&limit.figure)?;
     let own_ns = *figures.times_ns.get(&limit.figure)?;
     let baseline_ns = own_ns / before;
     let spin_ns = (ABOVE * at_most - before).max(0.0) * baseline_ns;
     Some(Planted {
-        figure: limit.figure.clone(),
+        name: limit.ratio()?,
+        figure: &limit.figure,
         limit: at_most,
         before,
         spin_ns: spin_ns.ceil() as u64,
@@ -87,10 +86,7 @@ pub(crate) fn run(
     source: &str,
     runs: usize,
 ) -> Result<(), GuardError> {
-    let row = |planted: &Planted| {
-        let (row, _) = planted.figure.split_once(" / ").unwrap_or_default();
-        format!("{row}={}", planted.spin_ns)
-    };
+    let row = |planted: &Planted| format!("{}={}", planted.name.row, planted.spin_ns);
     let rows: Vec<String> = trial.iter().map(row).collect();
     let guard = std::env::current_exe().map_err(GuardError::Trial)?;
     let output = Command::new(guard)
@@ -110,7 +106,7 @@ pub(crate) fn run(
             .as_array()
             .into_iter()
             .flatten()
-            .find(|limit| limit["figure"] == planted.figure.as_str());
+            .find(|limit| limit["figure"] == planted.figure);
         if let Some(found) = found {
             planted.with = found["measured"].as_f64();
             planted.noticed = found["verdict"] == "broken" && output.status.code() == Some(1);
@@ -151,7 +147,8 @@ mod tests {
     #[test]
     fn a_slow_down_is_as_long_as_its_limit_wants() {
         let figures = figures(&[BLOCK], 1.2, 60_000.0);
-        let trials = trials(&limits(&[BLOCK], 1.6), &figures);
+        let limits = limits(&[BLOCK], 1.6);
+        let trials = trials(&limits, &figures);
         // From 60 us to 1.25 times 1.6 baselines of 50 us.
         assert_eq!(trials[0][0].spin_ns.abs_diff(40_000), 0, "{trials:?}");
     }
@@ -159,10 +156,11 @@ mod tests {
     #[test]
     fn rows_that_are_compared_with_each_other_are_slowed_down_one_after_the_other() {
         let all = [BLOCK, BLOCK_P99, ADAPTIVE, OBSERVED];
-        let trials = trials(&limits(&all, 1.3), &figures(&all, 1.0, 1_000.0));
+        let limits = limits(&all, 1.3);
+        let trials = trials(&limits, &figures(&all, 1.0, 1_000.0));
         let names: Vec<Vec<&str>> = trials
             .iter()
-            .map(|trial| trial.iter().map(|one| one.figure.as_str()).collect())
+            .map(|trial| trial.iter().map(|one| one.figure).collect())
             .collect();
         assert_eq!(
             names,

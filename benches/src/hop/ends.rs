@@ -2,7 +2,6 @@
 //! receives. A row and what carries its samples stand in one table ([`ROWS`]).
 
 use core::time::Duration;
-use std::os::fd::OwnedFd;
 use std::time::Instant;
 
 use lager_ports::{Bus, Clock, Policy};
@@ -69,15 +68,15 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
     ),
     // Bare iceoryx2, polled without pause, with the typed ports' header and limits.
     (spins(HEADER, &[]), |one| {
-        one.polling::<Stamp>(Member::join(&one.side.config)?, Some(&SensorLine::QOS))
+        one.polling::<Stamp>(Some(SensorLine::QOS))
     }),
     // With their limits, but without header and clock.
     (spins("iceoryx2/bare", TO_HEADER), |one| {
-        one.polling::<()>(Member::join(&one.side.config)?, Some(&SensorLine::QOS))
+        one.polling::<()>(Some(SensorLine::QOS))
     }),
     // With its own default limits, without header and clock.
     (spins("iceoryx2/defaults", TO_HEADER), |one| {
-        one.polling::<()>(Member::join_with_defaults(&one.side.config)?, None)
+        one.polling::<()>(None)
     }),
     // A cache line, watched without pause.
     (spins("cacheline", TO_HEADER), |one| {
@@ -96,8 +95,8 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
     }),
     // Bare iceoryx2 with the typed ports' header and limits, and an event to sleep on.
     (sleeps("iceoryx2/event", &[]), |one| {
-        let member = Member::join(&one.side.config)?;
-        one.exchange(iceoryx::listening(&member, one.names(), &SensorLine::QOS)?)
+        let member = Member::join(&one.side.config, Some(SensorLine::QOS))?;
+        one.exchange(iceoryx::listening(&member, one.names())?)
     }),
     // A cache line and a futex to sleep on, and the same with an eventfd.
     (sleeps("futex", TO_EVENT), |one| {
@@ -105,16 +104,14 @@ pub(super) const ROWS: &[(Entry, Exchange)] = &[
         one.exchange(memory::a_futex(out, back))
     }),
     (sleeps("eventfd", TO_EVENT), |one| {
-        let ([out, back], [own, other]) = (one.lanes(), one.places());
-        let bells = &one.side.lines[EVENTFDS];
-        one.exchange(memory::an_eventfd(
-            (out, &bells[own]),
-            (back, &bells[other]),
-        ))
+        let [out, back] = one.lanes();
+        let [ring, bell] = one.own_first(one.side.lines[EVENTFDS].each_ref());
+        one.exchange(memory::an_eventfd((out, ring), (back, bell)))
     }),
     (sleeps("pipe", TO_EVENT), |one| {
-        let [own, other] = one.places().map(|place| &one.side.lines[PIPES + place]);
-        one.exchange(stream::end(&own[1], &other[0]))
+        let [own, other] = one.own_first([PIPES, PIPES + 1]);
+        let lines = &one.side.lines;
+        one.exchange(stream::end(&lines[own][1], &lines[other][0]))
     }),
     (sleeps("uds", TO_EVENT), |one| one.socket(UDS)),
     (sleeps("tcp", TO_EVENT), |one| one.socket(TCP)),
@@ -142,24 +139,21 @@ pub(super) struct One<'a> {
 }
 
 impl One<'_> {
-    /// Its own place in an array of two, and the other's.
-    fn places(&self) -> [usize; 2] {
+    /// What there is of each of the two processes: its own, and the other's.
+    fn own_first<T>(&self, [first, second]: [T; 2]) -> [T; 2] {
         match self.side.is_first {
-            true => [0, 1],
-            false => [1, 0],
+            true => [first, second],
+            false => [second, first],
         }
     }
 
     fn lanes(&self) -> [&memory::Lane<8>; 2] {
-        self.places().map(|place| &self.side.shared.lanes[place])
+        self.own_first(self.side.shared.lanes.each_ref())
     }
 
     /// What bare iceoryx2 and Zenoh publish to, and what they subscribe to.
-    fn names(&self) -> (&'static str, &'static str) {
-        match self.side.is_first {
-            true => ("bench/bare-ping", "bench/bare-pong"),
-            false => ("bench/bare-pong", "bench/bare-ping"),
-        }
+    fn names(&self) -> [&'static str; 2] {
+        self.own_first(["bench/bare-ping", "bench/bare-pong"])
     }
 
     fn ours(&self, policy: Policy) -> Result<Vec<u64>, BenchError> {
@@ -172,17 +166,13 @@ impl One<'_> {
         }
     }
 
-    fn polling<H: Header>(
-        &self,
-        member: Member,
-        limits: Option<&Qos>,
-    ) -> Result<Vec<u64>, BenchError> {
-        self.exchange(iceoryx::polling::<H>(&member, self.names(), limits)?)
+    fn polling<H: Header>(&self, limits: Option<Qos>) -> Result<Vec<u64>, BenchError> {
+        let member = Member::join(&self.side.config, limits)?;
+        self.exchange(iceoryx::polling::<H>(&member, self.names())?)
     }
 
     fn socket(&self, line: usize) -> Result<Vec<u64>, BenchError> {
-        let [own, _] = self.places();
-        let socket: &OwnedFd = &self.side.lines[line][own];
+        let [socket, _] = self.own_first(self.side.lines[line].each_ref());
         self.exchange(stream::end(socket, socket))
     }
 
@@ -216,7 +206,7 @@ impl One<'_> {
                 Some(_) => sent,
             });
         }
-        Ok(round.timed(times))
+        Ok(times)
     }
 
     fn send_back(&self, end: &mut impl End) -> Result<Vec<u64>, BenchError> {
@@ -232,7 +222,7 @@ impl One<'_> {
             end.send(&sample).map_err(failed)?;
             self.check(number, &sample)?;
         }
-        Ok(if one_way { round.timed(times) } else { times })
+        Ok(times)
     }
 
     fn check(&self, expected: u64, sample: &Sample) -> Result<(), BenchError> {

@@ -9,15 +9,16 @@ use std::path::PathBuf;
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, Shutdown, Subscriber};
+use lager_ports::{Bus, Shutdown};
 use lager_rig::process::Main;
 use lager_rig::schedule::Place;
 use lager_rig::{Parent, bus_at};
-use lager_topics::{Role, SensorLine, SteeringCommand, Topic};
+use lager_topics::{Role, SensorLine, SteeringCommand};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{BenchError, no_bus};
 use crate::report::Mode;
+use crate::sample::drain;
 
 /// The names of the processes.
 pub(super) const BRIDGE: &str = "path, bridge";
@@ -93,9 +94,4 @@ fn observer(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
         drain(&mut commands)?;
         std::thread::sleep(LOOK_EVERY);
     }
-}
-
-fn drain<T: Topic>(subscriber: &mut Subscriber<T>) -> Result<(), Box<dyn Error>> {
-    while subscriber.receive()?.is_some() {}
-    Ok(())
 }
