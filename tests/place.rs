@@ -1,16 +1,16 @@
 //! One robot, one place: who is refused, whose files are named, and what is left when nothing
 //! answers any more.
 
-use std::fs::{self, File};
+use std::fs;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use lager_ports::Place;
+use lager_rig::Cable;
 use lager_tests::{Domain, Running, WATCHDOG, children, has_ended, lager, pid, wait_for};
 use rustix::process::{Signal, kill_process};
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
@@ -34,15 +34,6 @@ fn to_its_end(mut command: Command) -> Output {
     child.wait_with_output().expect("its output")
 }
 
-/// A serial port with nobody at the other end.
-fn port() -> (File, PathBuf) {
-    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo terminal");
-    grantpt(&master).expect("ours");
-    unlockpt(&master).expect("ours");
-    let name = ptsname(&master, Vec::new()).expect("its name");
-    (master.into(), name.to_str().expect("UTF-8").into())
-}
-
 fn place(domain: &Domain) -> Place {
     domain.bus("r1", 1.0).place().expect("the bus's folder")
 }
@@ -60,16 +51,19 @@ fn robot(domain: &Domain) -> Running {
 #[test]
 fn a_second_robot_of_a_name_is_refused_whatever_its_session() {
     let domain = Domain::new();
-    let ports = [port(), port()];
-    let path = |at: usize| ports[at].1.to_str().expect("UTF-8");
+    // Serial ports with nobody at the other end.
+    let ports = [(); 2].map(|()| Cable::new().expect("a pseudo terminal"));
+    let [sensor, steering] = ports
+        .each_ref()
+        .map(|port| port.path().to_str().expect("UTF-8"));
     let up = domain.start(&[
         "up",
         "--name",
         "x",
         "--sensor",
-        path(0),
+        sensor,
         "--steering",
-        path(1),
+        steering,
     ]);
     wait_for("the waiting robot", || up.service("logic"));
     let session = domain.folder().join("session");

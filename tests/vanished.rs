@@ -7,8 +7,9 @@
 //!                                            its end is taken down
 //! ```
 //!
-//! Both networks are in a user namespace in which the test runs itself again, so nothing of the
-//! machine's own is touched. Where that is not allowed each test says that it is ignored and why.
+//! Both networks are in a user namespace in which each test runs itself again, so nothing of the
+//! machine's own is touched. Not every machine allows that, so they are ignored unless they are
+//! asked for, as `tests/run` does where it is allowed; then they fail where it is not.
 
 #[path = "comm/scene.rs"]
 #[allow(dead_code, reason = "what other tests with a played station need")]
@@ -26,7 +27,7 @@ use std::time::{Duration, Instant};
 use lager_lines::Name;
 use lager_ports::Clock;
 use lager_station::{Doing, Listen, Server, ServerConfig};
-use lager_tests::wait_for;
+use lager_tests::{alone, wait_for};
 use lager_topics::TruthPose;
 use rustix::thread::{LinkNameSpaceType, move_into_link_name_space};
 
@@ -45,24 +46,6 @@ const SHOWN_AFTER: Duration = Duration::from_millis(20);
 
 /// A thread that sleeps 2 ms and gets no core for so long is held up.
 const HELD_UP: Duration = Duration::from_millis(20);
-
-/// A test and its name.
-type Test = (&'static str, fn(&Network));
-
-const TESTS: [Test; 3] = [
-    (
-        "a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes",
-        a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes,
-    ),
-    (
-        "a_robot_stands_when_the_machine_of_a_plain_station_vanishes",
-        a_robot_stands_when_the_machine_of_a_plain_station_vanishes,
-    ),
-    (
-        "robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places",
-        robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places,
-    ),
-];
 
 /// A network that is connected to this one, and can be cut off.
 struct Network {
@@ -148,6 +131,32 @@ fn runs(words: &[&str]) {
     assert!(status.is_ok_and(|status| status.success()), "{words:?}");
 }
 
+/// The network for this test, which runs itself again as root of it; `None` when it has passed
+/// there.
+fn apart(test: &str) -> Option<Network> {
+    if std::env::var_os(INSIDE).is_some() {
+        return Some(Network::new());
+    }
+    // Each is a process of its own, and a small machine drives one robot in time.
+    let _until_it_ends = alone();
+    let again = Command::new("unshare")
+        .args(APART)
+        .arg(std::env::current_exe().expect("this program"))
+        .args([test, "--exact", "--ignored", "--nocapture"])
+        .env(INSIDE, "1")
+        .stderr(Stdio::inherit())
+        .output()
+        .expect("`unshare` is there");
+    let said = String::from_utf8_lossy(&again.stdout);
+    println!("{said}");
+    assert!(
+        again.status.success() && said.contains("1 passed"),
+        "{}",
+        again.status
+    );
+    None
+}
+
 /// A robot that drives by a station's word, in the other network.
 fn driven(network: &Network, is_extended: bool) -> (Scene, Peer<TcpStream>) {
     let listener = network.inside(|| TcpListener::bind((THEIRS, 0)).expect("a port"));
@@ -156,8 +165,15 @@ fn driven(network: &Network, is_extended: bool) -> (Scene, Peer<TcpStream>) {
     (scene, robot)
 }
 
-fn a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes(network: &Network) {
-    let (mut scene, mut robot) = driven(network, true);
+#[test]
+#[ignore = "needs networks of its own; `tests/run` runs it where they can be had"]
+fn a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes() {
+    let Some(network) =
+        apart("a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes")
+    else {
+        return;
+    };
+    let (mut scene, mut robot) = driven(&network, true);
     let bus = scene.domain.observe("r1", 1.0);
     let mut truth = bus.subscriber::<TruthPose>().expect("a topic");
     let mut good = 0;
@@ -193,8 +209,13 @@ fn a_robot_stands_within_200_ms_when_the_machine_of_its_station_vanishes(network
 }
 
 /// The document's language has no sign of life, so here the kernel has to find out.
-fn a_robot_stands_when_the_machine_of_a_plain_station_vanishes(network: &Network) {
-    let (mut scene, robot) = driven(network, false);
+#[test]
+#[ignore = "needs networks of its own; `tests/run` runs it where they can be had"]
+fn a_robot_stands_when_the_machine_of_a_plain_station_vanishes() {
+    let Some(network) = apart("a_robot_stands_when_the_machine_of_a_plain_station_vanishes") else {
+        return;
+    };
+    let (mut scene, robot) = driven(&network, false);
     let start = Instant::now();
     network.vanishes();
     scene.wait_until_it_stands();
@@ -220,7 +241,14 @@ fn is_answered(robot: &mut BufReader<TcpStream>) -> bool {
     robot.read_line(&mut line).is_ok_and(|count| count > 0)
 }
 
-fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places(network: &Network) {
+#[test]
+#[ignore = "needs networks of its own; `tests/run` runs it where they can be had"]
+fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
+    let Some(network) =
+        apart("robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places")
+    else {
+        return;
+    };
     let server = Server::open(ServerConfig {
         name: Name::new("tester").expect("a name"),
         listen: Listen::At(format!("{OURS}:0").parse().expect("an address")),
@@ -258,46 +286,4 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places(networ
     ends.store(true, Ordering::SeqCst);
     serves.join().expect("it has ended");
     network.comes_back();
-}
-
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let filters: Vec<_> = arguments
-        .iter()
-        .filter(|word| !word.starts_with('-'))
-        .collect();
-    let wanted = TESTS.iter().filter(|(name, _)| {
-        filters.is_empty() || filters.iter().any(|filter| name.contains(filter.as_str()))
-    });
-    if std::env::var_os(INSIDE).is_some() {
-        let network = Network::new();
-        for (name, test) in wanted {
-            test(&network);
-            println!("test {name} ... ok");
-        }
-        return;
-    }
-    let link = [
-        "ip", "link", "add", "lager0", "type", "veth", "peer", "name", "lager1",
-    ];
-    let tried = Command::new("unshare").args(APART).args(link).output();
-    let why = match &tried {
-        Ok(tried) if tried.status.success() => None,
-        Ok(tried) => Some(String::from_utf8_lossy(&tried.stderr).trim().to_owned()),
-        Err(error) => Some(format!("unshare: {error}")),
-    };
-    if let Some(why) = why {
-        for (name, _) in wanted {
-            println!("test {name} ... ignored, no network of its own can be had: {why}");
-        }
-        return;
-    }
-    let again = Command::new("unshare")
-        .args(APART)
-        .arg(std::env::current_exe().expect("this program"))
-        .args(&arguments)
-        .env(INSIDE, "1")
-        .status()
-        .expect("`unshare` is there");
-    assert!(again.success(), "{again}");
 }

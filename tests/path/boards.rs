@@ -2,25 +2,18 @@
 //! they send is sent when the test says so, and nothing else wakes the services.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use lager_rig::{Board, wheels_in_the_air};
-use lager_wire::{
-    BoardStatus, Callsign, Payload, ResetCause, SettingReply, SettingStatus, SteerCommand,
-};
+use lager_ports::Clock;
+use lager_rig::{Board, answer_to, wheels_in_the_air};
+use lager_wire::{BoardStatus, Callsign, Payload, ResetCause, SettingStatus, SteerCommand};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-
-/// Boards speak at least this often: a link that is silent for a second is down, and nobody drives
-/// a board that has not reported for 200 ms.
-const SPEAK_EVERY: Duration = Duration::from_millis(100);
 
 /// A sensor board and a steering board that stands still.
 pub(crate) struct Boards {
     sensor: Board,
     steering: Board,
     pub(crate) ports: [PathBuf; 2],
-    /// When each board spoke last.
-    spoke: [Instant; 2],
     /// Every command given, repetitions left out; the last one is in force.
     pub(crate) commands: Vec<SteerCommand>,
     /// Packets the bridge has written to the steering board.
@@ -37,7 +30,6 @@ impl Boards {
             ports: [&sensor, &steering].map(|board| board.cable.path().clone()),
             sensor,
             steering,
-            spoke: [Instant::now(); 2],
             commands: Vec::new(),
             written: 0,
             reports: 0,
@@ -48,7 +40,7 @@ impl Boards {
     pub(crate) fn send(&mut self, payload: Payload) {
         assert!(self.sensor.link.is_up(), "the sensor board is up");
         say(&mut self.sensor, payload);
-        self.spoke[0] = Instant::now();
+        self.sensor.spoke_ns = Clock::monotonic_ns();
     }
 
     /// Waits at most `timeout` for bytes from the bridge and takes them; sends what is due.
@@ -57,18 +49,13 @@ impl Boards {
         let mut fds =
             [&self.sensor, &self.steering].map(|board| PollFd::new(&board.cable, PollFlags::IN));
         let _ = poll(&mut fds, Some(&timeout));
-        hear(&mut self.sensor, |_| ());
+        let _ = self.sensor.answer(|_| ());
         let (commands, written) = (&mut self.commands, &mut self.written);
         let mut answers = Vec::new();
-        hear(&mut self.steering, |payload| {
+        let _ = self.steering.answer(|payload| {
             *written += 1;
             if let Payload::Setting(setting) = payload {
-                answers.push(Payload::SettingReply(SettingReply {
-                    key: setting.key,
-                    seq: setting.seq,
-                    value: setting.value,
-                    status: SettingStatus::Accepted,
-                }));
+                answers.push(answer_to(&setting, SettingStatus::Accepted));
             }
             if let Payload::SteerCommand(command) = payload
                 && commands.last() != Some(&command)
@@ -79,32 +66,17 @@ impl Boards {
         for answer in answers {
             say(&mut self.steering, answer);
         }
-        let silent = self.spoke.map(|at| at.elapsed() >= SPEAK_EVERY);
-        if silent[0] {
-            self.spoke[0] = Instant::now();
-            // No frame: nothing of it goes onto the bus.
-            say(&mut self.sensor, STATUS);
-        }
-        if silent[1] {
-            self.spoke[1] = Instant::now();
-            if self.steering.link.is_up() {
-                let code = self.commands.last().map_or(0, |command| command.code);
-                say(&mut self.steering, wheels_in_the_air(code));
-                self.reports += 1;
-            }
-        }
+        // No frame: nothing of it goes onto the bus.
+        let _ = self.sensor.speak(STATUS);
+        let code = self.commands.last().map_or(0, |command| command.code);
+        let reported = self.steering.speak(wheels_in_the_air(code));
+        self.reports += u64::from(reported.unwrap_or(false));
     }
 }
 
 /// Says something, if the link is up. A line without a listener loses it.
 fn say(board: &mut Board, payload: Payload) {
     let _ = board.send(payload);
-}
-
-/// Takes what has come, and sends the handshake if it is due; without a listener it is repeated.
-fn hear(board: &mut Board, packet: impl FnMut(Payload)) {
-    let _ = board.take(packet);
-    let _ = board.shake_hands();
 }
 
 /// A board's counters, all in order.

@@ -9,33 +9,44 @@ mod boards;
 mod robot;
 mod strace;
 
-use std::io::Read;
+use std::error::Error;
+use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 use lager_bridge::BridgeConfig;
 use lager_logic::LogicConfig;
-use lager_ports::{Bus, BusConfig, Shutdown};
+use lager_ports::{Bus, Shutdown};
+use lager_rig::process::run_if_asked;
+use lager_rig::{Parent, bus_at};
 use lager_tests::Domain;
 use lager_topics::{Role, SensorDistance, SensorLine, Topic};
 
 use robot::Robot;
 use strace::{Calls, Part};
 
-const FOLDER: &str = "LAGER_PATH_TEST_FOLDER";
-const PORTS: &str = "LAGER_PATH_TEST_PORTS";
+const BRIDGE: &str = "bridge";
+const LOGIC: &str = "logic";
+
+/// What a part is told: the bus's folder and the serial ports.
+type Told = (PathBuf, [PathBuf; 2]);
 
 /// Commands to be seen.
 const COMMANDS: u64 = 400;
 
-/// Runs one service in a thread of its own until the standard input closes.
-fn play(name: &str, role: Role, service: impl FnOnce(&Bus, &Shutdown) + Send) {
-    let Ok(folder) = std::env::var(FOLDER) else {
-        return;
-    };
-    let config = BusConfig {
-        folder: Some(folder.into()),
-        ..BusConfig::default()
-    };
+#[test]
+#[ignore = "a process that the other tests start"]
+fn part() {
+    run_if_asked(&[&[(BRIDGE, bridge), (LOGIC, logic)]]);
+}
+
+/// Runs one service in a thread of its own until the parent has nothing more to say.
+fn play(
+    parent: &mut Parent,
+    (name, role): (&str, Role),
+    service: impl FnOnce(&Bus, [PathBuf; 2], &Shutdown) + Send,
+) -> Result<(), Box<dyn Error>> {
+    let (folder, ports): Told = parent.told()?;
+    let config = bus_at(folder);
     let shutdown = Shutdown::new();
     std::thread::scope(|scope| {
         std::thread::Builder::new()
@@ -45,38 +56,37 @@ fn play(name: &str, role: Role, service: impl FnOnce(&Bus, &Shutdown) + Send) {
                 // As `lager bridge` does: by its lock others know that it is up.
                 let _lock = place.lock(&config.robot, role).expect("its lock");
                 let bus = Bus::open(&config, role).expect("the bus opens");
-                service(&bus, &shutdown);
+                service(&bus, ports, &shutdown);
             })
             .expect("a thread");
-        let _ = std::io::stdin().read_to_end(&mut Vec::new());
+        while let Ok(Some(())) = parent.hear() {}
         shutdown.request();
     });
+    Ok(())
 }
 
-#[test]
-#[ignore = "a part that the other tests start"]
-fn bridge() {
-    play("bridge-loop", Role::Bridge, |bus, shutdown| {
-        let ports = std::env::var(PORTS).expect("two ports");
-        let (sensor, steering) = ports.split_once(':').expect("two ports");
-        let config = BridgeConfig {
-            ports: [sensor.into(), steering.into()],
-            ..BridgeConfig::default()
-        };
-        lager_bridge::run(bus, &config, shutdown).expect("the bridge");
-    });
+fn bridge(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    play(
+        parent,
+        ("bridge-loop", Role::Bridge),
+        |bus, ports, shutdown| {
+            let config = BridgeConfig {
+                ports,
+                ..BridgeConfig::default()
+            };
+            lager_bridge::run(bus, &config, shutdown).expect("the bridge");
+        },
+    )
 }
 
-#[test]
-#[ignore = "a part that the other tests start"]
-fn logic() {
-    play("logic-loop", Role::Logic, |bus, shutdown| {
+fn logic(parent: &mut Parent) -> Result<(), Box<dyn Error>> {
+    play(parent, ("logic-loop", Role::Logic), |bus, _, shutdown| {
         let config = LogicConfig {
             blind_after: Duration::ZERO,
             ..LogicConfig::default()
         };
         lager_logic::run(bus, &config, shutdown).expect("logic");
-    });
+    })
 }
 
 /// That something was done at most so often. A ring can end two sleeps: the ringer adds to the

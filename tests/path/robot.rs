@@ -14,7 +14,7 @@ use lager_wire::{Centimetres, Command, LineState, Payload, SteerCommand, WheelCo
 
 use crate::boards::Boards;
 use crate::strace::Part;
-use crate::{FOLDER, PORTS};
+use crate::{BRIDGE, LOGIC, Told};
 
 /// Between a command and the next frame: everybody sleeps again.
 const PAUSE: Duration = Duration::from_millis(3);
@@ -138,23 +138,15 @@ impl Robot {
     pub(crate) fn start(domain: &Domain, traced: bool) -> Self {
         let boards = Boards::new();
         let bus = domain.bus("r1", 1.0);
-        let ports = boards
-            .ports
-            .each_ref()
-            .map(|port| port.to_str().expect("UTF-8"));
-        let environment = [
-            (FOLDER, domain.bus_folder().display().to_string()),
-            (PORTS, ports.join(":")),
-        ];
+        let told: Told = (domain.bus_folder().to_owned(), boards.ports.clone());
         let part = |name: &str| {
             let log = traced.then(|| domain.folder().join(format!("{name}.strace")));
-            let arguments = [name, "--exact", "--ignored", "--nocapture"];
-            Part::start(log, &arguments, &environment)
+            Part::start(log, name, &told)
         };
         let bus = Bus::open(&bus, Role::Operator).expect("the bus opens");
         let mut robot = Self {
-            bridge: part("bridge"),
-            logic: part("logic"),
+            bridge: part(BRIDGE),
+            logic: part(LOGIC),
             boards,
             seen: Seen::new(&domain.observe("r1", 1.0)),
             operator: Outset::new(&bus).expect("topics"),

@@ -6,10 +6,13 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::SystemTime;
 
+use lager_rig::Process;
 use lager_tests::children;
+
+use crate::Told;
 
 /// What one thread asked of the kernel.
 #[derive(Debug, Default)]
@@ -28,49 +31,35 @@ pub(crate) struct Calls {
     pub(crate) others: Vec<String>,
 }
 
-/// This test program again, in another part; killed when dropped.
+/// A service in a process of its own.
 pub(crate) struct Part {
-    child: Child,
+    process: Process,
     /// Where `strace` writes, for a part that is traced.
     log: Option<PathBuf>,
 }
 
 impl Part {
-    /// Starts this test program with `arguments` and `environment`, under `strace` if there is a
-    /// `log` to write to. The part must end when its standard input closes.
-    pub(crate) fn start(
-        log: Option<PathBuf>,
-        arguments: &[&str],
-        environment: &[(&str, String)],
-    ) -> Self {
-        let program = std::env::current_exe().expect("this program");
-        let mut command = match &log {
-            None => Command::new(program),
+    /// Starts the service `name` under `strace` if there is a `log` to write to, and tells it what
+    /// it is to know.
+    pub(crate) fn start(log: Option<PathBuf>, name: &str, told: &Told) -> Self {
+        let process = match &log {
+            None => Process::start_in_test(name, "part"),
             Some(log) => {
                 let mut strace = Command::new("strace");
-                strace.args(["-f", "-ttt", "-s", "0", "-o"]);
-                strace.arg(log).arg(program);
-                strace
+                strace.args(["-f", "-ttt", "-s", "0", "-o"]).arg(log);
+                Process::start_in_test_under(&mut strace, name, "part")
             }
         };
-        let child = command
-            .args(arguments)
-            .envs(environment.iter().map(|(key, value)| (key, value)))
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap_or_else(|error| {
-                panic!(
-                    "a part cannot be started ({error}): this test counts system calls with \
-                     strace; install the package `strace`"
-                )
-            });
-        Self { child, log }
+        let mut process = process.unwrap_or_else(|error| {
+            panic!("{error}; this test counts system calls with strace: install that package")
+        });
+        process.tell(told);
+        Self { process, log }
     }
 
     /// The threads of the traced part by name.
     pub(crate) fn threads(&self) -> BTreeMap<String, String> {
-        let Some(process) = children(self.child.id()).first().copied() else {
+        let Some(process) = children(self.process.pid()).first().copied() else {
             return BTreeMap::new();
         };
         fs::read_dir(format!("/proc/{process}/task"))
@@ -86,9 +75,8 @@ impl Part {
     }
 
     /// Ends the process and waits for it.
-    pub(crate) fn end(mut self) {
-        drop(self.child.stdin.take());
-        assert!(self.child.wait().expect("a child").success());
+    pub(crate) fn end(self) {
+        assert!(self.process.end().success());
     }
 
     /// What the thread asked of the kernel from `from` to `to`.
@@ -116,14 +104,6 @@ impl Part {
             }
         }
         calls
-    }
-}
-
-impl Drop for Part {
-    fn drop(&mut self) {
-        drop(self.child.stdin.take());
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

@@ -21,7 +21,7 @@ use std::time::Instant;
 
 use lager_ports::{Bus, Clock};
 use lager_rig::schedule::{Place, RealTime};
-use lager_rig::{Board, Domain, Outset, Process, interrupted, wheels_in_the_air};
+use lager_rig::{Board, Domain, Outset, Process, SPEAK_EVERY_NS, interrupted, wheels_in_the_air};
 use lager_topics::Role;
 use lager_wire::{Callsign, Centimetres, Command, LineState, Payload, WheelCommand};
 
@@ -34,9 +34,6 @@ use crate::slow;
 
 /// How long the robot may take to come up, and to come back after it stood still.
 const UP_WITHIN: Duration = Duration::from_secs(10);
-
-/// Reports come this often, in ns: often enough for the link (1 s) and for the order in force.
-const REPORT_EVERY: u64 = 100_000_000;
 
 /// Frames that must be answered one after the other before a robot counts as awake.
 const IN_A_ROW: usize = 5;
@@ -66,7 +63,6 @@ pub(super) struct Robot {
     steering: Board,
     /// Code and seq of the last command that the steering board got.
     last: (u8, u8),
-    reported_ns: u64,
     frames: u64,
     /// Frames count.
     counts: bool,
@@ -122,7 +118,6 @@ impl Robot {
             sensor,
             steering,
             last: (0, 0),
-            reported_ns: 0,
             frames: 0,
             counts: false,
             overtaken: Vec::new(),
@@ -170,21 +165,18 @@ impl Robot {
 
     /// All that the boards do beside sending frames.
     fn play_boards(&mut self) -> Result<(), BenchError> {
-        self.sensor.take(|_| ())?;
-        self.sensor.shake_hands()?;
-        self.drain_commands()?;
-        self.steering.shake_hands()?;
+        self.sensor.answer(|_| ())?;
+        let last = &mut self.last;
+        self.steering.answer(|payload| {
+            note(last, payload);
+        })?;
         self.report()
     }
 
     /// Reports, if it is time: the wheels stand, and the board is one of ours.
     fn report(&mut self) -> Result<(), BenchError> {
-        let now = Clock::monotonic_ns();
-        if now.saturating_sub(self.reported_ns) < REPORT_EVERY || !self.steering.link.is_up() {
-            return Ok(());
-        }
-        self.reported_ns = now;
-        Ok(self.steering.send(wheels_in_the_air(self.last.0))?)
+        self.steering.speak(wheels_in_the_air(self.last.0))?;
+        Ok(())
     }
 
     /// Takes commands that nobody has asked for by a frame.
@@ -215,7 +207,7 @@ impl Robot {
         let give_up = start + limit.as_nanos() as u64;
         let mut buffer = [0; 256];
         loop {
-            let look = give_up.min(Clock::monotonic_ns() + REPORT_EVERY);
+            let look = give_up.min(Clock::monotonic_ns() + SPEAK_EVERY_NS);
             let count = self.steering.cable.read_until(look, &mut buffer)?;
             if count > 0 {
                 slow::answer();
@@ -265,7 +257,7 @@ impl Chain for Robot {
         let mut in_a_row = 0;
         // It may have stood still for longer than leases and links hold, and finds its way back by
         // itself; or for nearly as long, and then the next report must not be late.
-        self.reported_ns = 0;
+        self.steering.spoke_ns = 0;
         while in_a_row < IN_A_ROW {
             self.check(start)?;
             self.play_boards()?;

@@ -115,6 +115,9 @@ impl Files {
         }
     }
 
+    /// Needs no cleaner's lock: only the node's own process writes tags into this folder, a node is
+    /// listed as dead only when the kernel has taken that process's lock back or the process has
+    /// already removed the folder itself, and no other node ever has the same number.
     fn remove_half_written_tags(&self) {
         for tag in entries(&self.folder) {
             let mode = tag.metadata().map(|tag| tag.permissions().mode() & 0o777);

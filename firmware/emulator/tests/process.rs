@@ -1,17 +1,24 @@
 //! The emulator as a process: real ptys, the clock page, truth lines, an end and a restart.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Read, Write};
-use std::os::unix::fs::OpenOptionsExt;
+#[path = "../../../tests/rig/src/host.rs"]
+#[allow(
+    unreachable_pub,
+    reason = "it is a part of the other workspace's crate `lager-rig`"
+)]
+mod host;
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use lager_emulator::truth::TruthLine;
-use lager_wire::link::{HostEvent, HostLink, HostTransmitter};
 use lager_wire::{Callsign, Payload, ResetCause, SteerCommand, WheelCommand};
 use rustix::process::{Pid, Signal, kill_process};
+
+use host::Host;
 
 /// What must happen happens before this, or the test fails instead of hanging.
 const WATCHDOG: Duration = Duration::from_secs(120);
@@ -110,100 +117,45 @@ impl Drop for Emulator {
     }
 }
 
-/// The Pi's end of a port.
-struct Cable {
-    file: File,
-    link: HostLink,
-    transmitter: HostTransmitter,
-    start: Instant,
-    reset: Option<ResetCause>,
+/// Answers the board until `wanted` of a packet.
+fn until(board: &mut Host, wanted: impl Fn(&Payload) -> bool) {
+    let (start, mut came) = (Instant::now(), false);
+    while !came {
+        assert!(start.elapsed() < WATCHDOG, "it never comes");
+        let answered = board.answer(|payload| came |= wanted(&payload));
+        answered.expect("the port takes it");
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
-impl Cable {
-    fn open(path: &Path) -> Self {
-        let start = Instant::now();
-        let file = loop {
-            let nonblocking = rustix::fs::OFlags::NONBLOCK.bits() as i32;
-            match OpenOptions::new()
-                .read(true)
-                .write(true)
-                .custom_flags(nonblocking)
-                .open(path)
-            {
-                Ok(file) => break file,
-                Err(error) => assert!(start.elapsed() < WATCHDOG, "no port: {error}"),
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        };
-        Self {
-            file,
-            link: HostLink::new(),
-            transmitter: HostTransmitter::new(),
-            start,
-            reset: None,
-        }
-    }
-
-    /// Answers the board until `wanted` of a packet.
-    fn until(&mut self, mut wanted: impl FnMut(&Payload) -> bool) {
-        let mut bytes = [0; 256];
-        loop {
-            assert!(self.start.elapsed() < WATCHDOG, "it never comes");
-            let count = self.file.read(&mut bytes).unwrap_or(0);
-            let now = self.start.elapsed();
-            for &byte in &bytes[..count] {
-                let event = self.link.push(byte, now);
-                if let Some(HostEvent::Packet(packet)) = event
-                    && wanted(&packet.payload)
-                {
-                    return;
-                }
-                self.answer(event);
-            }
-            let due = self.link.poll(now);
-            self.answer(due);
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-
-    fn answer(&mut self, event: Option<HostEvent>) {
-        let bytes = match event {
-            Some(HostEvent::SendSyn) => self.transmitter.syn(),
-            Some(HostEvent::SendAck { up }) => {
-                self.reset = up.map(|up| up.reset).or(self.reset);
-                let version = self.link.version().expect("it asked");
-                self.transmitter.ack(version)
-            }
-            _ => return,
-        };
-        self.file.write_all(&bytes).expect("the port takes it");
-    }
+fn port(path: &Path) -> Host {
+    Host::open(path, WATCHDOG).expect("a port")
 }
 
 #[test]
 fn the_boards_answer_on_their_ports_and_drive_on_command() {
     let place = Place::new();
     let mut emulator = place.start(None);
-    let mut steering = Cable::open(&place.at("steering"));
-    steering.until(|payload| matches!(payload, Payload::SteerData(_)));
+    let mut steering = port(&place.at("steering"));
+    until(&mut steering, |payload| {
+        matches!(payload, Payload::SteerData(_))
+    });
     assert_eq!(steering.link.callsign(), Some(Callsign::Steering));
     assert_eq!(steering.reset, Some(ResetCause::PowerOn));
-    let mut sensor = Cable::open(&place.at("sensor"));
-    sensor.until(|payload| matches!(payload, Payload::Line(_)));
+    let mut sensor = port(&place.at("sensor"));
+    until(&mut sensor, |payload| matches!(payload, Payload::Line(_)));
 
     let before = emulator.truth();
     assert_eq!((before.left_duty, before.right_duty), (0, 0));
     let code = lager_wire::Command::Wheel(WheelCommand::ManualForward).code();
-    let command = SteerCommand { code, seq: 1 };
-    let mut ordered = Instant::now();
-    let order = |steering: &mut Cable| {
-        let bytes = steering.transmitter.encode(Payload::SteerCommand(command));
-        steering
-            .file
-            .write_all(&bytes.expect("it is up"))
-            .expect("the port takes it");
+    let command = Payload::SteerCommand(SteerCommand { code, seq: 1 });
+    let start = Instant::now();
+    let mut ordered = start;
+    let mut order = || {
+        assert!(steering.link.is_up());
+        steering.send(command).expect("the port takes it");
     };
-    order(&mut steering);
+    order();
     loop {
         let truth = emulator.truth();
         // The board allows for the battery: what the driver is given is not just the standard duty.
@@ -212,9 +164,9 @@ fn the_boards_answer_on_their_ports_and_drive_on_command() {
         }
         if ordered.elapsed() > Duration::from_millis(20) {
             ordered = Instant::now();
-            order(&mut steering);
+            order();
         }
-        assert!(steering.start.elapsed() < WATCHDOG, "it never moves");
+        assert!(start.elapsed() < WATCHDOG, "it never moves");
     }
     // Nobody renews: the steering board stops by itself, in chip time.
     while emulator.truth().left_duty != 0 {}
@@ -222,7 +174,7 @@ fn the_boards_answer_on_their_ports_and_drive_on_command() {
     let first = place.chip_ns();
     let truth = emulator.truth();
     while place.chip_ns() <= first {
-        assert!(steering.start.elapsed() < WATCHDOG, "the clock stands");
+        assert!(start.elapsed() < WATCHDOG, "the clock stands");
     }
     assert!(truth.time_ns > before.time_ns);
     assert_eq!(emulator.signal(Signal::TERM), Some(0));
@@ -250,13 +202,15 @@ fn a_killed_emulator_goes_on_where_it_was() {
     );
 
     let mut emulator = place.start(Some(&line));
-    let mut steering = Cable::open(&place.at("steering"));
+    let mut steering = port(&place.at("steering"));
     let first = emulator.truth();
     assert!(first.time_ns >= kept.time_ns);
     assert!((first.x_mm - kept.x_mm).abs() < 1.0);
     assert_eq!(first.goods, kept.goods);
     assert!(place.chip_ns() >= clock, "the clock never goes back");
-    steering.until(|payload| matches!(payload, Payload::SteerData(_)));
+    until(&mut steering, |payload| {
+        matches!(payload, Payload::SteerData(_))
+    });
     assert_eq!(emulator.signal(Signal::INT), Some(0));
 }
 

@@ -1,6 +1,5 @@
-//! The buttons on lines of a simulated chip of the kernel (gpio-sim). Where the kernel has none, or
-//! this is not root, the test says that it is ignored and why. From the lines on, the way through
-//! the whole bridge is tested in `bridge/pressed.rs`.
+//! The buttons on lines of a simulated chip of the kernel (gpio-sim). From the lines on, the way
+//! through the whole bridge is tested in `bridge/pressed.rs`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -59,8 +58,10 @@ impl Drop for Chip {
     }
 }
 
-/// A session at both buttons.
-fn people_touch(chip: &Chip) {
+#[test]
+#[ignore = "needs gpio-sim in the kernel, and root; `tests/run` runs it where it has them"]
+fn what_people_do_to_the_lines_of_a_chip_is_heard() {
+    let chip = Chip::new().expect("a simulated chip, which root can make where gpio-sim is loaded");
     chip.contact(RESET, false);
     chip.contact(SWITCH, true);
     let config = ButtonsConfig {
@@ -92,19 +93,4 @@ fn people_touch(chip: &Chip) {
         );
         end.store(true, Ordering::Release);
     });
-}
-
-fn main() {
-    let name = "test what_people_do_to_the_lines_of_a_chip_is_heard";
-    if !Path::new(SIMULATOR).is_dir() {
-        println!("{name} ... ignored, this kernel has no gpio-sim: {SIMULATOR} is not there");
-        return;
-    }
-    match Chip::new() {
-        Ok(chip) => {
-            people_touch(&chip);
-            println!("{name} ... ok");
-        }
-        Err(error) => println!("{name} ... ignored, no chip can be made in {SIMULATOR}: {error}"),
-    }
 }

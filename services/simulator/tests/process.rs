@@ -1,20 +1,15 @@
 //! The simulator as a process would run it: real ptys, a real bus, real time.
 
-use std::fs::{File, OpenOptions};
-use std::io::Write;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lager_plant::Warehouse;
 use lager_ports::{Bus, BusConfig, Shutdown};
-use lager_rig::Domain;
+use lager_rig::{Domain, Host};
 use lager_simulator::{RunError, SimulatorConfig};
 use lager_topics::{Role, TruthPose};
-use lager_wire::link::{HostEvent, HostLink, HostTransmitter};
 use lager_wire::{Callsign, Command, Payload, ResetCause, SteerCommand, WheelCommand};
-use rustix::fs::OFlags;
 
 /// What must happen happens before this, or the test fails instead of hanging.
 const WATCHDOG: Duration = Duration::from_secs(60);
@@ -81,66 +76,12 @@ impl Simulator {
     }
 }
 
-/// One serial port as the Pi has it open.
-struct Cable {
-    file: File,
-    link: HostLink,
-    transmitter: HostTransmitter,
-    start: Instant,
-    reset: Option<ResetCause>,
+fn port(path: &Path) -> Host {
+    Host::open(path, WATCHDOG).unwrap()
 }
 
-impl Cable {
-    fn open(path: &Path) -> Self {
-        let deadline = Instant::now() + WATCHDOG;
-        let file = loop {
-            let mut options = OpenOptions::new();
-            options.read(true).write(true);
-            options.custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32);
-            match options.open(path) {
-                Ok(file) => break file,
-                Err(error) => assert!(Instant::now() < deadline, "{}: {error}", path.display()),
-            }
-            std::thread::yield_now();
-        };
-        Self {
-            file,
-            link: HostLink::new(),
-            transmitter: HostTransmitter::new(),
-            start: Instant::now(),
-            reset: None,
-        }
-    }
-
-    fn poll(&mut self) {
-        let now = self.start.elapsed();
-        let mut chunk = [0; 512];
-        let count = rustix::io::read(&self.file, &mut chunk).unwrap_or(0);
-        let mut events: Vec<_> = chunk[..count]
-            .iter()
-            .filter_map(|byte| self.link.push(*byte, now))
-            .collect();
-        events.extend(self.link.poll(now));
-        for event in events {
-            match event {
-                HostEvent::SendSyn => self.file.write_all(&self.transmitter.syn()).unwrap(),
-                HostEvent::SendAck { up } => {
-                    let ack = self.transmitter.ack(self.link.version().unwrap());
-                    self.file.write_all(&ack).unwrap();
-                    self.reset = up.map(|up| up.reset).or(self.reset);
-                }
-                _ => {}
-            }
-        }
-    }
-
-    fn command(&mut self, command: WheelCommand) {
-        let code = Command::Wheel(command).code();
-        let order = Payload::SteerCommand(SteerCommand { code, seq: 1 });
-        if let Some(bytes) = self.transmitter.encode(order) {
-            self.file.write_all(&bytes).unwrap();
-        }
-    }
+fn answer(board: &mut Host) {
+    board.answer(|_| ()).unwrap();
 }
 
 /// Polls until `done`.
@@ -161,22 +102,24 @@ fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
     let config = place.config(false);
 
     let simulator = place.start(false);
-    let mut sensor = Cable::open(&config.sensor_link);
-    let mut steering = Cable::open(&config.steering_link);
+    let mut sensor = port(&config.sensor_link);
+    let mut steering = port(&config.steering_link);
     until("both boards", || {
-        sensor.poll();
-        steering.poll();
+        answer(&mut sensor);
+        answer(&mut steering);
         sensor.link.is_up() && steering.link.is_up()
     });
     assert_eq!(sensor.link.callsign(), Some(Callsign::Sensor));
     assert_eq!(steering.link.callsign(), Some(Callsign::Steering));
     assert_eq!(steering.reset, Some(ResetCause::PowerOn));
 
+    let code = Command::Wheel(WheelCommand::ManualForward).code();
+    let forward = Payload::SteerCommand(SteerCommand { code, seq: 1 });
     let mut x = 0.0;
     until("a hundred millimetres", || {
-        sensor.poll();
-        steering.poll();
-        steering.command(WheelCommand::ManualForward);
+        answer(&mut sensor);
+        answer(&mut steering);
+        steering.send(forward).unwrap();
         keeper.remember().unwrap();
         if let Some(sample) = truth.latest().unwrap() {
             x = sample.x_mm;
@@ -201,9 +144,9 @@ fn a_robot_is_driven_through_its_ports_and_goes_on_after_a_restart() {
         keeper.remember().unwrap();
         config.steering_link.exists()
     });
-    let mut steering = Cable::open(&config.steering_link);
+    let mut steering = port(&config.steering_link);
     until("the steering board", || {
-        steering.poll();
+        answer(&mut steering);
         steering.link.is_up()
     });
     assert_eq!(steering.reset, Some(ResetCause::External));

@@ -4,13 +4,19 @@
 
 use lager_ports::Clock;
 use lager_wire::link::{BoardEvent, BoardLink};
-use lager_wire::{Callsign, Payload, ResetCause, SteerData, SteerFlags};
+use lager_wire::{
+    Callsign, Payload, ResetCause, Setting, SettingReply, SettingStatus, SteerData, SteerFlags,
+};
 
 use crate::{Cable, Refused};
 
 /// How long a board waits for the next byte of a packet, in us. The bridge writes packets whole,
 /// but a process that is put to sleep may be cut off in one.
-const GAP_US: u32 = 50_000;
+pub const GAP_US: u32 = 50_000;
+
+/// Boards speak at least this often, in ns: a link that is silent for a second is down, and nobody
+/// drives a board that has not reported for 200 ms.
+pub const SPEAK_EVERY_NS: u64 = 100_000_000;
 
 /// One board: its end of the wire and its end of the link.
 #[derive(Debug)]
@@ -19,6 +25,8 @@ pub struct Board {
     pub cable: Cable,
     /// Its end of the link.
     pub link: BoardLink,
+    /// When it last spoke for [`Board::speak`], in ns of `CLOCK_MONOTONIC`; at 0 it is due to.
+    pub spoke_ns: u64,
 }
 
 impl Board {
@@ -30,18 +38,34 @@ impl Board {
         Ok(Self {
             cable: Cable::new()?,
             link: BoardLink::new(sign, ResetCause::PowerOn, GAP_US),
+            spoke_ns: 0,
         })
     }
 
-    /// Sends a handshake if one is due.
+    /// Takes what has come, hands over each packet's data, and sends a handshake if one is due.
     ///
     /// # Errors
-    /// As [`Cable::write`].
-    pub fn shake_hands(&mut self) -> Result<(), Refused> {
+    /// As [`Cable::read`] and [`Cable::write`].
+    pub fn answer(&mut self, packet: impl FnMut(Payload)) -> Result<(), Refused> {
+        self.take(packet)?;
         match self.link.poll(board_us()) {
             Some(syn) => self.cable.write(&syn),
             None => Ok(()),
         }
+    }
+
+    /// Sends data if the link is up and it has not spoken for [`SPEAK_EVERY_NS`]; whether it was.
+    ///
+    /// # Errors
+    /// As [`Cable::write`].
+    pub fn speak(&mut self, payload: Payload) -> Result<bool, Refused> {
+        let now = Clock::monotonic_ns();
+        if now.saturating_sub(self.spoke_ns) < SPEAK_EVERY_NS || !self.link.is_up() {
+            return Ok(false);
+        }
+        self.spoke_ns = now;
+        self.send(payload)?;
+        Ok(true)
     }
 
     /// Sends data, if the link is up.
@@ -93,6 +117,17 @@ pub fn wheels_in_the_air(code: u8) -> Payload {
         finished_seq: 0,
         servo_errors: 0,
         battery_decivolts: 111,
+    })
+}
+
+/// What a board answers to a setting.
+#[must_use]
+pub fn answer_to(setting: &Setting, status: SettingStatus) -> Payload {
+    Payload::SettingReply(SettingReply {
+        key: setting.key,
+        seq: setting.seq,
+        value: setting.value,
+        status,
     })
 }
 

@@ -50,9 +50,20 @@ impl Cable {
     /// # Errors
     /// Nobody reads at the other end, or the kernel says something else.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Refused> {
+        match self.write_some(bytes)? {
+            count if count == bytes.len() => Ok(()),
+            _ => Err(broken("it has no room for a packet, so nobody reads it")),
+        }
+    }
+
+    /// Sends as many of `bytes` as there is room for; how many that was.
+    ///
+    /// # Errors
+    /// The kernel says why.
+    pub fn write_some(&self, bytes: &[u8]) -> Result<usize, Refused> {
         match rustix::io::write(&self.master, bytes) {
-            Ok(count) if count == bytes.len() => Ok(()),
-            Ok(_) => Err(broken("it took a part of a packet, so nobody reads it")),
+            Ok(count) => Ok(count),
+            Err(Errno::AGAIN | Errno::IO) => Ok(0),
             Err(errno) => Err(broken(&errno.to_string())),
         }
     }

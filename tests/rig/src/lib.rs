@@ -1,5 +1,6 @@
 //! What tests and benches stand on: a bus of their own, this program again as another process,
-//! memory that processes share, boards behind pseudo terminals, and an allocator that counts.
+//! memory that processes share, boards and their Pi at the ends of pseudo terminals, and an
+//! allocator that counts.
 //!
 //! Apart from both, so that each of these exists once. Nothing here measures or asserts.
 
@@ -7,6 +8,7 @@ pub mod allocations;
 mod board;
 mod cable;
 mod domain;
+mod host;
 mod interrupts;
 mod map;
 mod outset;
@@ -15,9 +17,10 @@ pub mod schedule;
 mod shared;
 pub mod told;
 
-pub use board::{Board, wheels_in_the_air};
+pub use board::{Board, GAP_US, SPEAK_EVERY_NS, answer_to, wheels_in_the_air};
 pub use cable::{Cable, timespec};
 pub use domain::{Domain, NoPlace, bus_at};
+pub use host::Host;
 pub use interrupts::{heed_interrupts, interrupted};
 pub use map::one_square;
 pub use outset::Outset;

@@ -235,8 +235,20 @@ impl Process {
     /// # Errors
     /// The kernel refuses.
     pub fn start_in_test(name: &str, test: &str) -> Result<Self, ProcessError> {
-        let arguments = [test, "--exact", "--ignored", "--nocapture"];
-        Self::spawn(name, Command::new("/proc/self/exe").args(arguments))
+        Self::spawn(name, Command::new("/proc/self/exe").args(in_test(test)))
+    }
+
+    /// The same under a program that is given this one and its arguments, as `strace` is.
+    ///
+    /// # Errors
+    /// The kernel refuses.
+    pub fn start_in_test_under(
+        runner: &mut Command,
+        name: &str,
+        test: &str,
+    ) -> Result<Self, ProcessError> {
+        let this = format!("/proc/{}/exe", std::process::id());
+        Self::spawn(name, runner.arg(this).args(in_test(test)))
     }
 
     fn spawn(name: &str, command: &mut Command) -> Result<Self, ProcessError> {
@@ -414,6 +426,11 @@ impl Process {
             detail,
         }
     }
+}
+
+/// What the standard test harness is told to run an ignored test alone.
+fn in_test(test: &str) -> [&str; 4] {
+    [test, "--exact", "--ignored", "--nocapture"]
 }
 
 impl Drop for Process {

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
+use lager_rig::{GAP_US, answer_to};
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
     BoardStatus, Callsign, Centimetres, LineBits, LineReading, LineState, Packet, Payload,
@@ -13,10 +14,6 @@ use lager_wire::{
 };
 
 use super::pty::Pty;
-
-/// Longest silence within a packet. Real boards allow two byte times; a pseudo terminal hands
-/// bytes over when the scheduler lets it.
-pub(crate) const GAP_US: u32 = 50_000;
 
 /// What stands at the other end of a line.
 pub(crate) trait Peer: Send + 'static {
@@ -257,12 +254,7 @@ impl SensorBoard {
             }
             _ => SettingStatus::NotHere,
         };
-        self.answers.push(Payload::SettingReply(SettingReply {
-            key: setting.key,
-            seq: setting.seq,
-            value: setting.value,
-            status,
-        }));
+        self.answers.push(answer_to(&setting, status));
     }
 }
 

@@ -1,13 +1,14 @@
 //! A pseudo terminal whose slave end is found under a fixed path, as a serial port is.
 
 use std::fs::File;
-use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
+use lager_ports::Clock;
 use lager_rig::Cable;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::io::Errno;
+
+/// How long a read waits for bytes, in ns.
+const LOOK_NS: u64 = 1_000_000;
 
 /// The master end, and the link to the slave end. Dropped it is unplugged.
 pub(crate) struct Pty {
@@ -38,38 +39,13 @@ impl Pty {
 
     /// Waits at most a millisecond for bytes and reads what is there.
     pub(crate) fn read(&self, buffer: &mut [u8]) -> usize {
-        let timeout = Timespec {
-            tv_sec: 0,
-            tv_nsec: 1_000_000,
-        };
-        let mut fds = [PollFd::new(&self.cable, PollFlags::IN)];
-        let _ = poll(&mut fds, Some(&timeout));
-        let hung_up = fds[0].revents().contains(PollFlags::HUP);
-        match rustix::io::read(&self.cable, buffer) {
-            Ok(count) => count,
-            Err(_) => {
-                if hung_up {
-                    // Nobody has the slave open: `poll` does not wait then.
-                    std::thread::sleep(std::time::Duration::from_millis(1));
-                }
-                0
-            }
-        }
+        let end_ns = Clock::monotonic_ns() + LOOK_NS;
+        self.cable.read_until(end_ns, buffer).unwrap()
     }
 
     /// Writes as much as fits; how much that was.
     pub(crate) fn write(&self, bytes: &[u8]) -> usize {
-        match rustix::io::write(&self.cable, bytes) {
-            Ok(count) => count,
-            Err(Errno::AGAIN | Errno::IO) => 0,
-            Err(errno) => panic!("writing to the pseudo terminal: {errno}"),
-        }
-    }
-}
-
-impl AsFd for Pty {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.cable.as_fd()
+        self.cable.write_some(bytes).unwrap()
     }
 }
 

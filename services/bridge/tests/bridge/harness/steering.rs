@@ -1,13 +1,14 @@
 //! A steering board: command register, sequence bytes, age limit and reports as the bridge sees
 //! them. Turns take 300 ms and arm steps 100 ms, so that tests are quick.
 
+use lager_rig::{GAP_US, answer_to};
 use lager_wire::link::{BoardEvent, BoardLink};
 use lager_wire::{
     ArmData, ArmProfile, BoardStatus, Callsign, Command, Packet, Payload, ResetCause, Setting,
-    SettingKey, SettingReply, SettingStatus, SteerCommand, SteerData, SteerFlags, WheelCommand,
+    SettingKey, SettingStatus, SteerCommand, SteerData, SteerFlags, WheelCommand,
 };
 
-use super::board::{GAP_US, Peer};
+use super::board::Peer;
 
 const AGE_LIMIT_US: u32 = 150_000;
 
@@ -144,16 +145,12 @@ impl SteeringBoard {
             self.profile[index] = setting.value.cast_unsigned();
         }
         let last = setting.key == SettingKey::ArmProfile;
-        self.out.push(Payload::SettingReply(SettingReply {
-            key: setting.key,
-            seq: setting.seq,
-            value: setting.value,
-            status: if last && !self.profile_in_force {
-                SettingStatus::OutOfRange
-            } else {
-                SettingStatus::Accepted
-            },
-        }));
+        let status = if last && !self.profile_in_force {
+            SettingStatus::OutOfRange
+        } else {
+            SettingStatus::Accepted
+        };
+        self.out.push(answer_to(setting, status));
     }
 
     fn set(&mut self, setting: &Setting) {
@@ -169,12 +166,11 @@ impl SteeringBoard {
         } else {
             SettingStatus::OutOfRange
         };
-        self.out.push(Payload::SettingReply(SettingReply {
-            key: setting.key,
-            seq: setting.seq,
+        let in_force = Setting {
             value: self.gains[place],
-            status,
-        }));
+            ..*setting
+        };
+        self.out.push(answer_to(&in_force, status));
     }
 
     fn status(&self) -> BoardStatus {
