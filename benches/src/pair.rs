@@ -22,7 +22,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::baseline::LIMIT;
-use crate::baseline::memory::Lane;
+use crate::baseline::memory::Lanes;
 use crate::error::{BenchError, Fault, no_bus};
 use crate::group::{Entry, Opened, Session};
 use crate::machine;
@@ -38,7 +38,7 @@ pub(crate) const ROUNDS: [usize; 2] = [2, 4];
 pub(crate) struct Memory {
     barrier: Barrier,
     /// What each of the two writes into.
-    pub(crate) lanes: [Lane<8>; 2],
+    pub(crate) lanes: Lanes<8>,
     /// The sample that the readers are ready for: they have all that came before.
     pub(crate) ready: Counter,
     /// The last sample that the writer has published.
@@ -169,6 +169,7 @@ impl<X: Serialize> Session for Pair<X> {
         if received.is_empty() {
             return Ok(sent);
         }
+        assert_eq!(sent.len(), received.len(), "a time at each end for each");
         let way = |(sent, received): (u64, u64)| received.saturating_sub(sent);
         Ok(sent.into_iter().zip(received).map(way).collect())
     }
@@ -192,7 +193,11 @@ pub(crate) fn measure<X: DeserializeOwned>(
         slow::spins_for(told.spin_ns);
         let times = round(&side, &told)?;
         // Those of the first samples do not count.
-        parent.say(&times.get(told.warm_up as usize..).unwrap_or_default())?;
+        let counted: &[u64] = match &*times {
+            [] => &[],
+            times => &times[told.warm_up as usize..],
+        };
+        parent.say(&counted)?;
     }
     Ok(())
 }

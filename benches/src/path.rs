@@ -50,30 +50,42 @@ const TURNS: [usize; 2] = [2, 8];
 const SERVICES: u8 = 40;
 const BOARDS: u8 = 50;
 
-/// What is measured with nobody watching.
-static ALONE: [Entry; 3] = [
-    Entry::new("lager/block", Mode::Block, &["floor"]),
-    Entry::new("floor", Mode::Block, &[]),
-    Entry::new("lager/adaptive", Mode::Adaptive, &["lager/block", "floor"]),
+/// What is measured, and the number of observers.
+type Rows = [(Entry, usize); 3];
+
+/// With nobody watching.
+static ALONE: Rows = [
+    (Entry::new("lager/block", Mode::Block, &["floor"]), 0),
+    (Entry::new("floor", Mode::Block, &[]), 0),
+    (
+        Entry::new("lager/adaptive", Mode::Adaptive, &["lager/block", "floor"]),
+        0,
+    ),
 ];
 
-/// The same with observers.
-static OBSERVED: [Entry; 3] = [
-    Entry::new("lager/alone", Mode::Block, &[]),
-    Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
-    Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
+/// With and without observers.
+static OBSERVED: Rows = [
+    (Entry::new("lager/alone", Mode::Block, &[]), 0),
+    (
+        Entry::new("lager/8 observers", Mode::Block, &["lager/alone"]),
+        8,
+    ),
+    (
+        Entry::new("lager/64 observers", Mode::Block, &["lager/alone"]),
+        64,
+    ),
 ];
 
 /// The groups of one regime. A spinning path is not measured: bridge and logic would keep two
 /// cores, and the boards need one.
 pub(crate) fn groups(regime: Regime, options: &Options) -> Vec<Group> {
-    let group = |what: &str, entries: &'static [Entry], observed: bool| Group {
+    let group = |what: &str, rows: &'static [(Entry, usize)], observed: bool| Group {
         what: what.to_owned(),
         regime,
-        entries: entries.to_vec(),
+        entries: rows.iter().map(|(entry, _)| *entry).collect(),
         rounds: TURNS,
         samples: [TURN; 2],
-        open: Box::new(move || Ok(Box::new(Chains::start(regime, entries, observed)?))),
+        open: Box::new(move || Ok(Box::new(Chains::start(regime, rows, observed)?))),
     };
     let wants = |mode| options.modes.contains(&mode);
     // Nobody spins on the only core that the others have.
@@ -98,7 +110,7 @@ struct Chains {
 
 impl Chains {
     /// Robots and the floor; or robots that are observed, with services and boards in real time.
-    fn start(regime: Regime, entries: &[Entry], observed: bool) -> Result<Self, BenchError> {
+    fn start(regime: Regime, rows: &[(Entry, usize)], observed: bool) -> Result<Self, BenchError> {
         let (first, second) = cores_for(regime)?;
         let [ends, logic] = [first, second].map(|core| Place {
             core: Some(core),
@@ -110,13 +122,10 @@ impl Chains {
             boards: observed.then_some(BOARDS),
         };
         let mut chains: Vec<Box<dyn Chain>> = Vec::new();
-        for entry in entries {
-            let robot = |observers| Robot::start(entry.label, entry.mode, places, observers);
+        for (entry, observers) in rows {
             let mut chain: Box<dyn Chain> = match entry.label {
                 "floor" => Box::new(Floor::start(ends, logic)?),
-                "lager/8 observers" => Box::new(robot(8)?),
-                "lager/64 observers" => Box::new(robot(64)?),
-                _ => Box::new(robot(0)?),
+                label => Box::new(Robot::start(label, entry.mode, places, *observers)?),
             };
             chain.processes().rest();
             chains.push(chain);

@@ -135,4 +135,12 @@ mod tests {
         sample.words[5] ^= 1 << 40;
         assert!(!sample.is_whole());
     }
+
+    #[test]
+    #[allow(unsafe_code)]
+    fn bare_iceoryx2_knows_it_by_the_name_that_the_ports_use() {
+        // SAFETY: it returns a name.
+        let bare = unsafe { <Sample as ZeroCopySend>::type_name() };
+        assert_eq!(bare, Sample::TYPE_NAME);
+    }
 }

@@ -86,7 +86,8 @@ impl<const WORDS: usize> Lane<WORDS> {
         Ok(self.word.wake()?)
     }
 
-    /// Sleeps until the count is no longer `seen`, and reads the block.
+    /// Sleeps until the count is no longer `seen`, and reads the block. Gives up after
+    /// [`super::LIMIT`]; a process that is stopped meanwhile counts one time-out.
     pub(crate) fn take(&self, seen: &mut u32) -> Result<Block<WORDS>, Fault> {
         let before = *seen;
         let look = || {

@@ -148,7 +148,7 @@ impl One<'_> {
     }
 
     fn lanes(&self) -> [&memory::Lane<8>; 2] {
-        self.own_first(self.side.shared.lanes.each_ref())
+        self.own_first(self.side.shared.lanes.0.each_ref())
     }
 
     /// What bare iceoryx2 and Zenoh publish to, and what they subscribe to.

@@ -1,5 +1,5 @@
-//! Both processes: the writer publishes or rings when all readers are ready, and is timed meanwhile;
-//! the readers wait for each sample or ring, and drain their queues.
+//! Both processes: the writer publishes or rings when all readers are ready, and is timed
+//! meanwhile; the readers wait for each sample or ring, and drain their queues.
 
 use core::time::Duration;
 use std::time::Instant;
@@ -139,7 +139,7 @@ fn each_receives<R>(
 
 fn ring(side: &Side, round: &Round) -> Times {
     // Where the actor sleeps while it does not wait for a ring.
-    let elsewhere = &side.shared.lanes[0].word;
+    let elsewhere = &side.shared.lanes.0[0].word;
     if side.is_first {
         let bus = side.bus(SENDER)?;
         let publisher = bus.publisher::<Ping>().map_err(no_bus)?;

@@ -13,10 +13,10 @@
 //! wait until the look ends.
 //!
 //! Where that kernel thread runs decides what looking gains. Called from another core, it starts
-//! after an interrupt of that core, which took 8 to 18 us in a virtual machine, twice for each frame
-//! of the path. With the kernel's workers bound to the bridge's core (`lager doctor` says how) the
-//! path took 0.39 to 0.41 of what it takes when all sleep, with workers on any core 0.77 to 0.82, in
-//! runs that took turns, with 36 % of a core both ways (two cores, 2026-11-27).
+//! after an interrupt of that core, which took 8 to 18 us in a virtual machine, twice for each
+//! frame of the path. With the kernel's workers bound to the bridge's core (`lager doctor` says
+//! how) the path took 0.39 to 0.41 of what it takes when all sleep, and 0.77 to 0.82 with workers
+//! on any core. The runs took turns and took 36 % of a core both ways (two cores, 2026-11-27).
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
@@ -348,10 +348,9 @@ fn is_actor(role: Role) -> bool {
 }
 
 /// How many waiters may look at a time. Whoever looks gives way to who wants its core, so there may
-/// be as many as cores; with one less, of bridge and logic on two cores one always slept, and the
-/// path took 0.8 times as long as with both asleep instead of 0.7. Under a real-time scheduler
-/// nobody of a lower priority is given way to, so one core is left to the others. On a single core
-/// a look would only pass the core to and fro.
+/// be as many as cores; with one less, of bridge and logic on two cores one always slept. Under a
+/// real-time scheduler nobody of a lower priority is given way to, so one core is left to the
+/// others. On a single core a look would only pass the core to and fro.
 fn who_may_look() -> usize {
     match cores() {
         1 => 0,

@@ -1,6 +1,6 @@
 //! A board as tests and measurements play it: one end of a cable and one end of a link.
 //!
-//! It decides nothing: what is sent and when, its player says.
+//! It answers handshakes, and knows when it is time to report. All else is the player's.
 
 use lager_ports::Clock;
 use lager_wire::link::{BoardEvent, BoardLink};
@@ -25,7 +25,8 @@ pub struct Board {
     pub cable: Cable,
     /// Its end of the link.
     pub link: BoardLink,
-    /// When it last spoke for [`Board::speak`], in ns of `CLOCK_MONOTONIC`; at 0 it is due to.
+    /// When it last spoke for [`Board::speak`], in ns of `CLOCK_MONOTONIC`; 0 = it never
+    /// has, and speaks next time.
     pub spoke_ns: u64,
 }
 

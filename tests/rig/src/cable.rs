@@ -52,11 +52,14 @@ impl Cable {
     pub fn write(&self, bytes: &[u8]) -> Result<(), Refused> {
         match self.write_some(bytes)? {
             count if count == bytes.len() => Ok(()),
-            _ => Err(broken("it has no room for a packet, so nobody reads it")),
+            _ => Err(broken(
+                "it took a part of a packet or nothing, so nobody reads at the other end",
+            )),
         }
     }
 
-    /// Sends as many of `bytes` as there is room for; how many that was.
+    /// Sends as many of `bytes` as there is room for; how many that was: 0 also where nobody has
+    /// the other end open.
     ///
     /// # Errors
     /// The kernel says why.

@@ -11,7 +11,7 @@ use lager_topics::Role;
 
 use super::Finding::{self, Bad, Good, Hint};
 use crate::config::{Config, RealtimeSection, Waiting};
-use crate::realtime::{self, RealtimeError, Wanted};
+use crate::realtime::{self, CoreSet, RealtimeError, Wanted};
 
 /// The priority that is tried where none is configured.
 const SUGGESTED_PRIORITY: u8 = 20;
@@ -33,7 +33,10 @@ pub fn findings(config: &Config) -> Vec<(&'static str, Finding)> {
         ("locked memory", memory(config.realtime.lock_memory)),
         ("cores", cores(config)),
         ("waiting", waiting(config)),
-        ("serial workers", workers(line(Path::new(WORKERS)), config)),
+        (
+            "serial workers",
+            workers(&worker_cores(Path::new(WORKERS)), config),
+        ),
         ("real-time share", share(realtime::throttle(), config)),
         ("core speed", governor(&governors(cpus))),
         ("core idling", idling(&idle_states(cpus))),
@@ -144,30 +147,45 @@ fn waiting(config: &Config) -> Finding {
     }
 }
 
+/// The cores on which the kernel's workers may run; none where the kernel does not show them.
+fn worker_cores(mask: &Path) -> CoreSet {
+    let mask = line(mask).unwrap_or_default();
+    let digits = mask.chars().rev().filter_map(|digit| digit.to_digit(16));
+    digits
+        .enumerate()
+        .flat_map(|(place, digit)| {
+            let cores = (0..4).filter(move |bit| digit >> bit & 1 == 1);
+            cores.map(move |bit| 4 * place + bit)
+        })
+        .collect()
+}
+
 /// Where the kernel hands over what serial ports receive. A worker that comes to a core where
 /// somebody looks for samples starts at once, and one that is called from another core late.
-fn workers(mask: Option<String>, config: &Config) -> Finding {
-    let Some(mask) = mask else {
+fn workers(may_run_on: &CoreSet, config: &Config) -> Finding {
+    if may_run_on.is_empty() {
         return Good("where they run is not shown by this kernel".into());
-    };
-    let digits = mask.chars().filter_map(|digit| digit.to_digit(16));
-    let cores: u32 = digits.map(u32::count_ones).sum();
-    let is_free = cores > 1;
-    // A bridge in real time would keep a worker from its core for as long as it looks.
-    if config.bus.waiting != Waiting::Adaptive || config.realtime.priority > 0 || !is_free {
-        return Good(format!("may run on cores {mask} (a bit each)"));
     }
     let bridge = config.realtime.wanted(Role::Bridge).cores;
+    // A bridge in real time would keep a worker from its core for as long as it looks.
+    let matters = config.bus.waiting == Waiting::Adaptive && config.realtime.priority == 0;
+    if !matters || (bridge.len() == 1 && *may_run_on == bridge) {
+        return Good(format!(
+            "the kernel's workers may run on cores {may_run_on}"
+        ));
+    }
+    let gains_little = format!(
+        "the kernel hands over serial bytes on cores {may_run_on}, so waiting = \"adaptive\" gains little; it gains most if that happens on the bridge's core"
+    );
     match bridge.iter().next() {
         Some(core) if bridge.len() == 1 => Hint(format!(
-            "the kernel hands over serial bytes on any core, so waiting = \"adaptive\" gains little; on the bridge's it gains most: as root, `echo {:x}{} > {WORKERS}`",
+            "{gains_little}: `echo {:x}{} > {WORKERS}` as root takes all workers that are bound to no core there, until the next start of the machine",
             1_u32 << (core % 32),
             ",00000000".repeat(core / 32)
         )),
-        _ => Hint(
-            "the kernel hands over serial bytes on any core, so waiting = \"adaptive\" gains little; give bridge and logic a core each, `--core bridge=0 --core logic=1`, and ask again"
-                .into(),
-        ),
+        _ => Hint(format!(
+            "{gains_little}: give bridge and logic a core each, `--core bridge=0 --core logic=1`, and ask again"
+        )),
     }
 }
 
@@ -348,28 +366,23 @@ mod tests {
         let far = "[realtime]\ncores = { bridge = [33] }";
         let together = "[realtime]\ncores = { bridge = [1], logic = [1] }";
         let in_real_time = format!("{bound}\npriority = 20");
-        for (text, mask, expected) in [
-            ("".to_owned(), "f", ("good", "cores f")),
-            (adaptive.into(), "ffffffff,ffffffff", ("hint", "bridge=0")),
-            (format!("{adaptive}{bound}"), "f", ("hint", "`echo 8 > /")),
-            (format!("{adaptive}{far}"), "f", ("hint", "2,00000000 >")),
-            (
-                format!("{adaptive}{bound}"),
-                "00000000,00000008",
-                ("good", "8"),
-            ),
-            (
-                format!("{adaptive}{in_real_time}"),
-                "f",
-                ("good", "cores f"),
-            ),
+        for (text, workers_on, expected) in [
+            (String::new(), "0-3", ("good", "cores 0-3")),
+            (adaptive.into(), "0-63", ("hint", "bridge=0")),
+            (format!("{adaptive}{bound}"), "0-3", ("hint", "`echo 8 > /")),
+            (format!("{adaptive}{bound}"), "2", ("hint", "`echo 8 > /")),
+            (format!("{adaptive}{far}"), "0-3", ("hint", "2,00000000 >")),
+            (format!("{adaptive}{bound}"), "3", ("good", "cores 3")),
+            (format!("{adaptive}{in_real_time}"), "0-3", ("good", "0-3")),
         ] {
-            let finding = workers(Some(mask.to_owned()), &config(&text));
+            let cores = workers_on.parse().expect("cores");
+            let finding = workers(&cores, &config(&text));
             let (mark, said) = said(&finding);
-            assert_eq!(mark, expected.0, "{text} {mask}: {said}");
-            assert!(said.contains(expected.1), "{text} {mask}: {said}");
+            assert_eq!(mark, expected.0, "{text} {workers_on}: {said}");
+            assert!(said.contains(expected.1), "{text} {workers_on}: {said}");
         }
-        assert_eq!(said(&workers(None, &config(adaptive))).0, "good");
+        let unknown = workers(&CoreSet::default(), &config(adaptive));
+        assert_eq!(said(&unknown).0, "good");
 
         let finding = waiting(&config(&format!("{adaptive}{together}")));
         let (mark, text) = said(&finding);
@@ -379,6 +392,21 @@ mod tests {
             said(&waiting(&config(&format!("{adaptive}{bound}")))).0,
             "good"
         );
+    }
+
+    #[test]
+    fn the_kernels_mask_of_workers_is_read_group_by_group() {
+        let file = std::env::temp_dir().join(format!("lager-mask-{}", std::process::id()));
+        for (mask, cores) in [
+            ("3\n", "0-1"),
+            ("00000002,0000000c\n", "2-3,33"),
+            ("0\n", ""),
+        ] {
+            fs::write(&file, mask).expect("a temporary file");
+            assert_eq!(worker_cores(&file).to_string(), cores, "{mask}");
+        }
+        fs::remove_file(&file).expect("a temporary file");
+        assert!(worker_cores(&file).is_empty());
     }
 
     #[test]
