@@ -25,8 +25,8 @@ pub struct Board {
     pub cable: Cable,
     /// Its end of the link.
     pub link: BoardLink,
-    /// When it last spoke for [`Board::speak`], in ns of `CLOCK_MONOTONIC`; 0 = it never
-    /// has, and speaks next time.
+    /// When it last spoke for [`Board::speak`], in ns of `CLOCK_MONOTONIC`; 0 = never, so
+    /// it speaks next time.
     pub spoke_ns: u64,
 }
 
