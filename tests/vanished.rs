@@ -25,6 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
+use lager_lines::command::read_wheels;
 use lager_ports::Clock;
 use lager_station::{Doing, Listen, Server, ServerConfig};
 use lager_tests::{alone, wait_for};
@@ -223,6 +224,52 @@ fn a_robot_stands_when_the_machine_of_a_plain_station_vanishes() {
     network.comes_back();
     drop(robot);
     scene.robot().waits_for(&["styrcomm"]);
+}
+
+#[test]
+#[ignore = "needs networks of its own; `tests/run` runs it where they can be had"]
+fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
+    let Some(network) =
+        apart("what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back")
+    else {
+        return;
+    };
+    let listener = network.inside(|| TcpListener::bind((THEIRS, 0)).expect("a port"));
+    let mut scene = Scene::with(listener);
+    let server = Server::open(ServerConfig {
+        name: Name::new("tester").expect("a name"),
+        listen: Listen::On(scene.listener()),
+        gag: None,
+        warehouse: None,
+        fetch: Vec::new(),
+    });
+    let server = server.expect("a station");
+    let handle = server.handle();
+    let ends = Arc::new(AtomicBool::new(false));
+    let until = Arc::clone(&ends);
+    let serves = std::thread::spawn(move || server.run(&until).expect("it serves"));
+    let robot = Name::new("r1").expect("a name");
+    let shows = || {
+        let view = handle.robots().pop()?;
+        let is_new = view.shown.state?.age(view.now) < Duration::from_millis(200);
+        is_new.then_some(())
+    };
+    for cut in [600, 1_000, 2_000] {
+        wait_for("the robot to show itself", shows);
+        let anna = handle.take_wheel(&robot, "anna").expect("the seat is free");
+        network.vanishes();
+        // Nothing of what the cut held up is under way any more.
+        std::thread::sleep(Duration::from_millis(100));
+        let asked = anna.drive(read_wheels("8").expect("a code"));
+        std::thread::sleep(Duration::from_millis(cut));
+        network.comes_back();
+        scene.assert_it_stays(Duration::from_millis(cut + 1_000));
+        let reply = asked.ok().and_then(|asked| asked.wait(scene::WATCHDOG));
+        println!("a turn that was cut off for {cut} ms: {reply:?}");
+        assert_ne!(reply, Some(lager_station::Reply::Done));
+    }
+    ends.store(true, Ordering::SeqCst);
+    serves.join().expect("it has ended");
 }
 
 /// A robot as its station sees it, which says one line and then waits.

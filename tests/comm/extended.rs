@@ -13,7 +13,7 @@ use lager_lines::extension::{Action, State};
 use lager_station::{Handle, Listen, Reply, Server, ServerConfig};
 use lager_tests::wait_for;
 
-use crate::scene::{Peer, Scene, WATCHDOG};
+use crate::scene::{Peer, Scene, WATCHDOG, answer_to_sign};
 
 /// A station that speaks the extension from its grammar alone, and knows the robot's warehouse.
 struct Station {
@@ -38,8 +38,10 @@ impl Station {
     /// The next line, `None` where the connection has ended. What has an answer is answered.
     fn hears(&mut self) -> Option<String> {
         let line = self.robot.hears()?;
+        if let Some(answer) = answer_to_sign(&line) {
+            self.robot.says(&answer);
+        }
         match line.as_str() {
-            "lager 1 r1" => self.robot.says("lager 1 tester"),
             "sidelength" => self.robot.says("sidelength 50"),
             "karta" => self.robot.says("karta 2 2 0 0"),
             "prodlis" => self.robot.says("prodlis 3 1 1 0 down 2 0 1 up 3 1 1 left"),
@@ -184,14 +186,14 @@ fn a_drive_that_nobody_renews_ends_while_the_link_lasts() {
 }
 
 /// A station of this project, in this process.
-struct Served {
-    handle: Handle,
+pub(crate) struct Served {
+    pub(crate) handle: Handle,
     ends: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Served {
-    fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let server = Server::open(ServerConfig {
             name: Name::new("tester").expect("a name"),
             listen: Listen::On(scene.listener()),
@@ -212,7 +214,7 @@ impl Served {
     }
 
     /// The robot's last state, if it has come just now.
-    fn state(&self) -> Option<State> {
+    pub(crate) fn state(&self) -> Option<State> {
         let view = self.handle.robots().pop()?;
         let state = view.shown.state?;
         (state.age(view.now) < Duration::from_millis(500)).then_some(state.value)
@@ -264,7 +266,8 @@ fn one_drives_a_second_is_refused_and_anybody_stops() {
     };
     assert!(why.as_str().contains("resume"), "{why}");
     wait_for("the stop to be released", || {
-        let resumed = handle.act(&robot, Action::Resume).ok()?;
+        let stop = station.state()?.stop?;
+        let resumed = handle.act(&robot, Action::Resume { stop }).ok()?;
         (resumed.wait(WATCHDOG) == Some(Reply::Done)).then_some(())
     });
     wait_for("the wheels to turn again", || {

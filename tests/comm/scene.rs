@@ -57,11 +57,17 @@ impl Peer<TcpStream> {
             if words.iter().any(|word| line.starts_with(word)) {
                 return Some(line);
             }
-            if line == "lager 1 r1" {
-                self.says("lager 1 tester");
+            if let Some(answer) = answer_to_sign(&line) {
+                self.says(&answer);
             }
         }
     }
+}
+
+/// What a station answers to the sign of life of r1, if this is one: it repeats the robot's clock.
+pub(crate) fn answer_to_sign(line: &str) -> Option<String> {
+    let clock = line.strip_prefix("lager 1 r1")?;
+    Some(format!("lager 1 tester{clock}"))
 }
 
 /// An external computer that the test plays, for a robot that is up and stands in manual mode.
@@ -146,6 +152,18 @@ impl Scene {
         Some((truth.left_duty, truth.right_duty))
     }
 
+    /// Looks for so long whether it moves, which it must not.
+    pub(crate) fn assert_it_stays(&mut self, time: Duration) {
+        let start = Instant::now();
+        while start.elapsed() < time {
+            while let Some(truth) = self.truth.receive().expect("readable") {
+                let duties = (truth.left_duty, truth.right_duty);
+                assert_eq!(duties, (0, 0), "after {:?}", start.elapsed());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
     pub(crate) fn wait_until_it_stands(&mut self) {
         wait_for("the robot to stand", || {
             self.duties().filter(|duties| *duties == (0, 0))
@@ -161,10 +179,10 @@ impl Scene {
                 let Some(line) = robot.hears() else {
                     continue 'connected;
                 };
-                match line.as_str() {
-                    "styrcomm" => robot.says("styrcomm 2"),
-                    "lager 1 r1" if is_extended => robot.says("lager 1 tester"),
-                    _ => {}
+                match answer_to_sign(&line).filter(|_| is_extended) {
+                    Some(answer) => robot.says(&answer),
+                    None if line == "styrcomm" => robot.says("styrcomm 2"),
+                    None => {}
                 }
                 if self
                     .duties()

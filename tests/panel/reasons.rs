@@ -2,8 +2,9 @@
 //! say of it the page knows in Swedish.
 
 use std::fmt::Display;
+use std::time::Duration;
 
-use lager_lines::{Coord, Map, MapError, Name, Products, ProductsError, check_names};
+use lager_lines::{Coord, Map, MapError, Name, Products, ProductsError, TooLate, check_names};
 use lager_station::{ActRefused, CommandRefused, SaveError, WarehouseError, WishRefused};
 use lager_topics::{
     Calibration, Coded, Failure, FailureKind, Finish, Health, OrderQueue, Outcome, Refusal,
@@ -15,11 +16,12 @@ use crate::browser::Page;
 use crate::played::Stage;
 
 /// Where reasons are written down as sentences.
-const SOURCES: [&str; 8] = [
+const SOURCES: [&str; 9] = [
     include_str!("../../services/comm/src/conversation.rs"),
     include_str!("../../services/comm/src/conversation/orders.rs"),
     include_str!("../../services/comm/src/conversation/samples.rs"),
     include_str!("../../services/comm/src/driving.rs"),
+    include_str!("../../services/comm/src/known.rs"),
     include_str!("../../services/comm/src/map.rs"),
     include_str!("../../services/comm/src/tasks.rs"),
     include_str!("../../services/panel/src/socket.rs"),
@@ -114,11 +116,12 @@ fn typed() -> Vec<String> {
         path: "warehouse.toml".into(),
         error: std::io::ErrorKind::StorageFull.into(),
     };
-    let refused: [&dyn Display; 16] = [
+    let refused: [&dyn Display; 17] = [
         &ActRefused::Plain,
         &ActRefused::Full,
         &ActRefused::Driven { by },
         &ActRefused::NotDriver,
+        &ActRefused::Late(TooLate(Duration::from_millis(7))),
         &CommandRefused::NotAsked,
         &CommandRefused::Full,
         &CommandRefused::NotPicking,

@@ -10,8 +10,18 @@
 //! peer answers to the first line.
 //!
 //! A robot may repeat its first line at any time, and a station answers it each time, so each side
-//! knows that the other is there. A robot that is driven by hand repeats it every 50 ms, and stops
-//! when nothing at all has come from the station for 150 ms.
+//! knows that the other is there. A robot repeats it every 50 ms, and stops when nothing at all has
+//! come from the station for 150 ms while it carries something out that the station gave.
+//!
+//! # Nothing moves late
+//!
+//! Behind the line that it repeats the robot puts its clock in ms: `lager 1 r1 81250`. The station's
+//! answer repeats that number: `lager 1 station 81250`. Lines arrive in the order in which they were
+//! said, so the station said whatever comes behind that answer after the robot's clock showed this
+//! number, and it cannot be older. That holds however long a link, a socket or a process held it up.
+//! A station puts into a `do` besides for how long it was given already, as by a page. What moves
+//! the robot or lets it move, the answers of the document among it, is refused when the two together
+//! exceed 200 ms, and everything else but a stop when they exceed 2 s.
 //!
 //! The document's questions and answers go on between the lines below. These are asynchronous in
 //! both directions: neither side waits for a line before it sends its own. The first word tells the
@@ -21,16 +31,18 @@
 //!
 //! ```text
 //! stop [<number>]                      stand at once; has a lane of its own, see below
-//! do <number> <action>                 answered by `done` or `refused` with that number, once
+//! do <number> [late <ms>] <action>     answered by `done` or `refused` with that number, once
 //!
 //! <number> ::= <int>                   0 to 4294967295, one not used before on this connection
+//! <ms>     ::= <int>                   for how long it was given when this was said
 //! <action> ::= order <order> <prodid>  fetch a product after those that wait
 //!            | cancel <order>          fetch it no more; refused once its goods are held
 //!            | first <order>           fetch it before those that wait
 //!            | up <order>              fetch it before the one that is now before it
 //!            | clear                   fetch none of those that wait
 //!            | mode <mode>             who drives
-//!            | resume                  end a stop
+//!            | resume <stop>           end this stop, as `stop=` of the state tells it; refused
+//!                                      where another one was set meanwhile
 //!            | reset                   the robot stands on the delivery corner, looking inwards
 //!            | place <edge>            it stands on that node and looks that way; a simulated one
 //!                                      is put there
@@ -106,7 +118,7 @@
 //! use lager_lines::to_line;
 //!
 //! let asked = StationLine::read("do 17 order 4 7").unwrap();
-//! let StationLine::Order(Order::Do { number, action }) = asked else { panic!() };
+//! let StationLine::Order(Order::Do { number, action, .. }) = asked else { panic!() };
 //! assert!(matches!(action, Action::Add { order: 4, .. }));
 //! assert_eq!(to_line(&RobotLine::Report(Report::Done { number })).unwrap(), "done 17\n");
 //!

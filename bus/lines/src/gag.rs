@@ -72,11 +72,13 @@
 //! [`MAX_LINE`]: crate::MAX_LINE
 
 use core::fmt;
+use core::time::Duration;
 
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
 use crate::command::{Code, CommandError, read_arm, read_wheels};
+use crate::late::{LATEST, LATEST_MOVE};
 use crate::misread::Misread;
 use crate::reader::{Reader, Word};
 use crate::text::Text;
@@ -274,6 +276,19 @@ pub enum AnswerError {
 impl Answer {
     const WANTED: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, armcomm, \
                           styrcomm and pickup_done";
+
+    /// How late it may come. What is said of the warehouse, and a command to stand, are never too
+    /// late.
+    pub const fn latest(&self) -> Duration {
+        match self {
+            Self::SideLength(_)
+            | Self::Map(_)
+            | Self::Products(_, _)
+            | Self::Command(OperatorCommand::Stop) => Duration::MAX,
+            Self::Command(_) | Self::PickupDone => LATEST_MOVE,
+            Self::Fetch(_) => LATEST,
+        }
+    }
 
     /// Reads a line without its end.
     ///

@@ -12,6 +12,7 @@
 //! - [`extension`]: what a robot and a station of this project say besides, asynchronously.
 //! - [`strings`]: map and goods as one string each (M1-M3).
 //! - [`command`]: the codes of commands as text (AMB-4).
+//! - [`LATEST_MOVE`]: how late something may come that moves a robot.
 //! - [`Called`]: a product by its number or its name, as people call it.
 //!
 //! Every module specifies its language with examples, so that a peer can be written from it.
@@ -39,6 +40,7 @@ pub mod command;
 pub mod conversation;
 pub mod extension;
 pub mod gag;
+mod late;
 mod misread;
 mod reader;
 pub mod splitter;
@@ -48,6 +50,7 @@ mod warehouse;
 mod writer;
 
 pub use called::{Called, CalledError, NamesError, UnknownProduct, check_names};
+pub use late::{LATEST, LATEST_MOVE, TooLate};
 pub use misread::{Found, Misread};
 pub use text::{Name, NameError, Text, TextError};
 pub use warehouse::{

@@ -160,15 +160,19 @@ impl StopWord {
     /// Stops the robot whose file is at `path`; makes the file and its folder if they are missing,
     /// and mends a file that was cut short.
     ///
-    /// A stop that is set already is replaced: the newest one must be resumed.
+    /// A stop that is set already is replaced: the newest one must be resumed. It has a word of its
+    /// own even if both come within one microsecond, since a resume names the word that it ends.
     ///
     /// # Errors
     /// The word cannot be written. Then the robot may go on.
     pub fn set(path: &Path, origin: Role, cause: StopCause) -> Result<Stop, StopError> {
         let fail = |error: Error| StopError::new(path, &error);
-        let stop = Stop::new(origin, cause, Clock::monotonic_ns());
+        let now_ns = Clock::monotonic_ns();
         loop {
             let (file, _) = open(path).map_err(fail)?;
+            let stop = unlike(&file, |later_ns| {
+                Stop::new(origin, cause, now_ns + later_ns)
+            });
             put(&file, at::WORD, stop.word()).map_err(fail)?;
             // The word counts, and it is written. The bridge mends what this process cannot.
             let _ = mend(&file);
@@ -330,6 +334,21 @@ fn is_whole(file: &File) -> Result<bool, Error> {
     Ok(file.metadata()?.len() >= SIZE && read == 8 && layout == LAYOUT.to_ne_bytes())
 }
 
+/// A stop with another word than the one that is set and the one that the bridge has obeyed last;
+/// `stop` makes one with so many ns added to its time. What cannot be read keeps nobody from
+/// stopping.
+fn unlike(file: &File, stop: impl Fn(u64) -> Stop) -> Stop {
+    let known = [at::WORD, at::OBEYED].map(|place| {
+        let mut word = [0; 8];
+        let read = file.read_at(&mut word, place as u64 * 8);
+        read.map_or(0, |_| u64::from_ne_bytes(word))
+    });
+    let mut later_us = 0..;
+    later_us
+        .find_map(|us| Some(stop(us * 1_000)).filter(|stop| !known.contains(&stop.word())))
+        .expect("only two words are known")
+}
+
 /// Gives the file its length and layout.
 fn mend(file: &File) -> Result<(), Error> {
     if !is_whole(file)? {
@@ -424,6 +443,21 @@ mod tests {
             assert!(left == Some(one) || left == Some(other), "{left:?}");
             std::fs::remove_file(&path).unwrap();
         }
+    }
+
+    #[test]
+    fn two_stops_of_one_microsecond_have_two_words() {
+        let folder = Folder::new();
+        let path = folder.path().join("stop");
+        let at = |later_ns| Stop::new(Role::Operator, StopCause::Ordered, 5_000 + later_ns);
+        let (file, _) = open(&path).unwrap();
+        let first = unlike(&file, at);
+        put(&file, at::WORD, first.word()).unwrap();
+        let second = unlike(&file, at);
+        put(&file, at::WORD, second.word()).unwrap();
+        put(&file, at::OBEYED, first.word()).unwrap();
+        let third = unlike(&file, at);
+        assert_eq!([first, second, third], [at(0), at(1_000), at(2_000)]);
     }
 
     #[test]

@@ -169,7 +169,8 @@ pub trait Request: 'static {
     const SUMMARY: &'static str;
 
     /// Writes into a request when it is asked, in ns of `CLOCK_MONOTONIC`, and for how long its
-    /// asker waits. Whoever answers refuses one whose time is over.
+    /// asker waits, each unless it stands there: whoever asks for somebody else says when that one
+    /// has asked. Whoever answers refuses one whose time is over.
     fn date(request: &mut Self::Request, issued_ns: u64, lifetime_ms: u32);
 }
 
@@ -369,8 +370,10 @@ impl Request for BridgeRequest {
     const SUMMARY: &'static str = "Changes of the mode and of settings.";
 
     fn date(request: &mut Ask, issued_ns: u64, lifetime_ms: u32) {
-        request.issued_ns = issued_ns;
-        request.lifetime_ms = lifetime_ms;
+        date(
+            (&mut request.issued_ns, &mut request.lifetime_ms),
+            (issued_ns, lifetime_ms),
+        );
     }
 }
 
@@ -387,8 +390,19 @@ impl Request for WorldRequest {
     const SUMMARY: &'static str = "What a person's hands do in the simulated world.";
 
     fn date(request: &mut WorldAsk, issued_ns: u64, lifetime_ms: u32) {
-        request.issued_ns = issued_ns;
-        request.lifetime_ms = lifetime_ms;
+        date(
+            (&mut request.issued_ns, &mut request.lifetime_ms),
+            (issued_ns, lifetime_ms),
+        );
+    }
+}
+
+fn date((issued_ns, lifetime_ms): (&mut u64, &mut u32), (now_ns, most_ms): (u64, u32)) {
+    if *issued_ns == 0 {
+        *issued_ns = now_ns;
+    }
+    if *lifetime_ms == 0 {
+        *lifetime_ms = most_ms;
     }
 }
 

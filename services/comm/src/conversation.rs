@@ -6,10 +6,11 @@
 //!
 //! ```text
 //!   mode        what the robot does                     asked
-//!   manual      no warehouse is known, and the peer     sidelength, karta, prodlis, for a second
-//!               speaks the extension
-//!               anything but a one-shot, which is       styrcomm
+//!   manual      anything but a one-shot, which is       styrcomm
 //!               awaited
+//!               for a second nobody has driven it, no   sidelength, karta, prodlis, for a second
+//!               warehouse is known, and the peer
+//!               speaks the extension
 //!   autonomous  side, floor or goods are not known      sidelength, karta, prodlis
 //!               it stands at the goods                  armcomm
 //!               no order is under way or waits, and     fetchprod
@@ -20,14 +21,17 @@
 //! - Nothing is asked before the bridge has told the mode. When it becomes manual the robot asks at
 //!   once (L436); an answer to what was held before is passed over.
 //! - The floor is asked for once; side and goods by each connection.
-//! - A command is carried out while its answer is fresh. An answer that was read after this process
-//!   was held up for [`Conversation::LONGEST_PAUSE`] may be old, so in manual mode comm closes the
-//!   connection instead. `styrcomm 1` makes the robot stand even when nothing was asked.
-//! - **A link that is lost makes the robot stand in manual mode.** A peer that speaks the extension
-//!   repeats its `lager` line whenever the robot repeats its own, every 50 ms in manual mode; 150
-//!   ms without a word while something is carried out are a lost link. A peer that speaks only the
-//!   document's language may be silent as long as it likes, so there only the end of its connection
-//!   counts, which the kernel finds some 3 s after the last sign of the peer's machine.
+//! - **Nothing moves late.** What moves the robot or lets it move is refused with a sentence when it
+//!   comes more than 200 ms after it was given, and `fetchprod` after 2 s. How old a line may be at
+//!   most, a peer that speaks the extension shows by repeating the clock that the robot puts into
+//!   its sign (`freshness.rs`). Any other peer's lines have no age: where this process was held up
+//!   and one of them may be waited for, comm closes the connection instead.
+//!   `styrcomm 1` makes the robot stand whenever it comes.
+//! - **A link that is lost makes the robot stand where it is driven through it.** A peer that speaks
+//!   the extension repeats its `lager` line whenever the robot repeats its own; 150 ms without a
+//!   word while something is carried out are a lost link. A peer that speaks only the document's
+//!   language may be silent as long as it likes, so there only the end of its connection counts,
+//!   which the kernel finds some 3 s after the last sign of the peer's machine.
 //! - In autonomous mode the document leaves open what a lost link means (AMB-49), so it is
 //!   configured ([`LinkLost`]): the order is carried out all the same, or logic is told to stand at
 //!   the next node until the link is there again.
@@ -44,13 +48,14 @@
 //! (`conversation/orders.rs`): what is waited for stands in `tasks.rs`, what moves the robot in
 //! `driving.rs`. No other peer hears anything of that.
 
+use core::ops::Range;
 use core::time::Duration;
 
 use lager_lines::conversation::{Held, RobotLine, StationLine, StationLineError};
 use lager_lines::extension::{self, Hello};
 use lager_lines::gag::{Answer, Query, Request};
 use lager_lines::splitter::LineError;
-use lager_lines::{Name, ProductId};
+use lager_lines::{LATEST, LATEST_MOVE, Name, ProductId, TooLate};
 use lager_topics::{Mode, Order, Phase, WarehouseMap};
 use lager_wire::OperatorCommand;
 
@@ -65,15 +70,19 @@ use crate::speech::Told;
 use crate::tasks::{Asker, Tasks};
 use crate::telling::Telling;
 
+mod freshness;
 mod orders;
 mod samples;
 mod saying;
 
-/// In ns of real time: how often the extension's first line is repeated in manual mode, and else.
-const SIGN_BY_HAND: u64 = 50_000_000;
-const SIGN: u64 = 1_000_000_000;
+use freshness::Freshness;
+
+/// In ns of real time: how often the extension's first line is repeated while something is carried
+/// out, and else. What comes counts as older by up to as much.
+const SIGN_MOVING: u64 = 25_000_000;
+const SIGN: u64 = 50_000_000;
 /// How long a peer that answers it may be silent while something is carried out, and else.
-const SILENT_BY_HAND: u64 = 150_000_000;
+const SILENT_MOVING: u64 = 150_000_000;
 const SILENT: u64 = 5_000_000_000;
 /// When a question is asked again after an impossible answer, and at the earliest at all.
 const AGAIN: u64 = 200_000_000;
@@ -84,9 +93,9 @@ const AGAIN: u64 = 200_000_000;
 /// second. With this pace it takes 5.6 %, with one of 2 ms 3.8 %, and while nothing is answered
 /// 0.7 % (2026-11-24).
 const PACE: u64 = 1_000_000;
-/// How long after the connection is there a robot in manual mode asks for the warehouse rather than
-/// for commands.
-const DESCRIBED: u64 = 1_000_000_000;
+/// In ns since the connection is there: from when to when a robot in manual mode that nobody has
+/// driven asks for the warehouse rather than for commands.
+const DESCRIBED: Range<u64> = 1_000_000_000..2_000_000_000;
 /// What is said to actions that a stop has ended.
 const STOPPED: &str = "the robot has been stopped";
 /// Stops whose confirmation is owed, at most.
@@ -109,6 +118,9 @@ pub struct Conversation {
     up_ns: u64,
     heard_ns: u64,
     signed_ns: u64,
+    freshness: Freshness,
+    /// Somebody has driven the robot by answers of the document.
+    is_driven: bool,
     held: Held,
     /// Nothing is asked before.
     ask_from_ns: u64,
@@ -128,15 +140,10 @@ pub struct Conversation {
     stops: Vec<(u32, u64)>,
     /// What a lost link means in autonomous mode.
     standing: Standing,
-    /// A stop has come while its release was asked for: it is set again after that.
-    stops_again: bool,
 }
 
 /// What happens to the connection.
 impl Conversation {
-    /// How long its thread may be held up before the lines that have come meanwhile count as old.
-    pub const LONGEST_PAUSE: Duration = Duration::from_millis(200);
-
     /// A conversation of the robot `name`; `kept` is the map that an earlier one has published.
     pub fn new(name: Name, kept: Option<WarehouseMap>, link_lost: LinkLost) -> Self {
         let warehouse = kept.as_ref().map(Described::floor_of);
@@ -151,6 +158,8 @@ impl Conversation {
             up_ns: 0,
             heard_ns: 0,
             signed_ns: 0,
+            freshness: Freshness::default(),
+            is_driven: false,
             held: Held::default(),
             ask_from_ns: 0,
             asked: None,
@@ -166,7 +175,6 @@ impl Conversation {
             driving: Driving::default(),
             stops: Vec::new(),
             standing: Standing::new(link_lost),
-            stops_again: false,
         }
     }
 
@@ -193,13 +201,15 @@ impl Conversation {
         self.is_fresh = true;
         self.up_ns = now.ns;
         self.heard_ns = now.ns;
+        self.freshness = Freshness::default();
         self.held.clear();
         self.ask_from_ns = 0;
         self.asked = None;
         self.told = Told::default();
         self.warehouse.side = None;
         self.warehouse.products = None;
-        self.sign(now);
+        // Whether the peer reads more than a name behind it is not known yet.
+        self.sign(now, None);
     }
 
     /// The connection has ended.
@@ -216,7 +226,7 @@ impl Conversation {
     pub fn turn(&mut self, now: Moment) {
         let pause = Duration::from_nanos(now.ns.saturating_sub(self.turned_ns));
         self.turned_ns = now.ns;
-        if pause > Self::LONGEST_PAUSE && self.is_up && self.known.mode() == Some(Mode::Manual) {
+        if self.is_up && self.waits_for_what_is_old_after(pause) {
             self.hang_up(
                 now,
                 "the robot was held up, so what it has not read may be old",
@@ -242,6 +252,8 @@ impl Conversation {
     /// Lines have come, all that had arrived. Of those that are read after the link was given up
     /// only a stop counts.
     pub fn heard(&mut self, now: Moment, lines: &[Result<String, LineError>]) {
+        let silent = Duration::from_nanos(now.ns.saturating_sub(self.heard_ns));
+        self.freshness.after_silence(silent, self.is_extended);
         self.heard_ns = now.ns;
         let read = |line: &Result<String, LineError>| match line {
             Ok(line) => Ok(StationLine::read(line)),
@@ -273,16 +285,24 @@ impl Conversation {
 
     fn take(&mut self, now: Moment, line: StationLine, is_stopped: bool) {
         match line {
-            StationLine::Hello(_) => {
+            StationLine::Hello(hello) => {
+                self.freshness.echoed(now, hello.clock_ms);
                 if !self.is_extended {
                     self.is_extended = true;
                     self.telling.begin();
+                    self.sign(now, Some(now.clock_ms()));
                 }
             }
             StationLine::Order(extension::Order::Stop { .. }) => {}
-            StationLine::Order(extension::Order::Do { number, action }) => {
+            StationLine::Order(extension::Order::Do {
+                number,
+                late_ms,
+                action,
+            }) => {
                 if self.is_extended {
-                    self.carry_out(now, number, action, is_stopped);
+                    let given = Duration::from_millis(late_ms.into());
+                    let late = self.freshness.late(now) + given;
+                    self.carry_out(now, late, number, action, is_stopped);
                 } else {
                     self.correct(
                         now,
@@ -314,6 +334,10 @@ impl Conversation {
             }
             return;
         }
+        let late = self.freshness.late(now);
+        if let Err(why) = TooLate::check(late, answer.latest()) {
+            return self.correct(now, &format!("{answer}: {why}"));
+        }
         match answer {
             Answer::SideLength(side) => self.warehouse.side = Some(side),
             Answer::Map(map) => self.warehouse.map = Some(map),
@@ -325,7 +349,8 @@ impl Conversation {
             Answer::PickupDone => self.press_picked(now),
             Answer::Command(_) if is_stopped => {}
             Answer::Command(command) => {
-                if let Err(why) = self.command(now, command, For::Question) {
+                self.is_driven = true;
+                if let Err(why) = self.command(now, late, command, For::Question) {
                     self.correct(now, &why);
                 }
             }
@@ -376,8 +401,8 @@ impl Conversation {
     fn wanted(&self, now: Moment) -> Option<Query> {
         let unknown = self.warehouse.unknown();
         if self.known.mode()? == Mode::Manual {
-            let is_new = now.ns.saturating_sub(self.up_ns) < DESCRIBED;
-            let is_blind = self.known.map.is_none() && self.is_extended && is_new;
+            let is_idle = DESCRIBED.contains(&now.ns.saturating_sub(self.up_ns)) && !self.is_driven;
+            let is_blind = self.known.map.is_none() && self.is_extended && is_idle;
             let wheels = (!self.driving.is_awaited()).then_some(Query::Wheels);
             return unknown.filter(|_| is_blind).or(wheels);
         }
@@ -441,25 +466,39 @@ impl Conversation {
             return;
         }
         let silent = now.ns.saturating_sub(self.heard_ns);
-        if silent >= SILENT || (self.driving.is_running() && silent >= SILENT_BY_HAND) {
+        let (most, period) = match self.driving.is_running() {
+            true => (SILENT_MOVING, SIGN_MOVING),
+            false => (SILENT, SIGN),
+        };
+        if silent >= most {
             return self.hang_up(now, "the external computer has fallen silent");
         }
-        let period = match self.known.mode() {
-            Some(Mode::Manual) => SIGN_BY_HAND,
-            _ => SIGN,
-        };
         if now.ns.saturating_sub(self.signed_ns) >= period {
-            self.sign(now);
+            self.sign(now, Some(now.clock_ms()));
         }
     }
 
     /// Says the extension's first line, which a peer that knows it answers.
-    fn sign(&mut self, now: Moment) {
+    fn sign(&mut self, now: Moment, clock_ms: Option<u64>) {
         self.signed_ns = now.ns;
         self.say(RobotLine::Hello(Hello {
             version: Hello::VERSION,
             name: self.name.clone(),
+            clock_ms,
         }));
+    }
+
+    /// Whether an answer may have come meanwhile that moves the robot and whose age nobody knows.
+    fn waits_for_what_is_old_after(&self, pause: Duration) -> bool {
+        let is_by_hand = self.known.mode() == Some(Mode::Manual);
+        let most = match self.held.get() {
+            _ if self.freshness.is_told() => return false,
+            Some(Query::Arm) => LATEST_MOVE,
+            _ if is_by_hand => LATEST_MOVE,
+            Some(Query::Fetch) => LATEST,
+            _ => return false,
+        };
+        pause > most
     }
 
     fn hang_up(&mut self, now: Moment, why: &'static str) {
@@ -473,7 +512,9 @@ impl Conversation {
         if self.driving.let_go(why) {
             let id = self.ids.fresh(now);
             let stop = OperatorCommand::Stop;
-            let order = self.driving.begin(now, id, stop, For::Question);
+            let order = self
+                .driving
+                .begin(now, Duration::ZERO, id, stop, For::Question);
             self.actions.push(Action::Steer(order));
         }
     }

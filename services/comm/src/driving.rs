@@ -77,17 +77,19 @@ impl Driving {
     /// Actions for one command that may wait for their answer; who sends more is not answered.
     const MOST_UNANSWERED: usize = 16;
 
-    /// Begins `command` under a new `id`, in place of whatever was carried out.
+    /// Begins `command`, which comes so `late`, under a new `id`, in place of whatever was carried
+    /// out.
     pub(crate) fn begin(
         &mut self,
         now: Moment,
+        late: Duration,
         id: u32,
         command: OperatorCommand,
         whose: For,
     ) -> SteeringOrder {
         self.let_go("another command has taken its place");
         let order = SteeringOrder {
-            given_ns: now.ns,
+            given_ns: now.given_ns(late),
             id,
             origin: Origin::Operator.into(),
             code: command.firmware().code(),

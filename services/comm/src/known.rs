@@ -1,5 +1,6 @@
 //! What the robot's other services have said last.
 
+use lager_ports::Stop;
 use lager_topics::{
     BlockedWays, DistanceFrame, Durations, Health, LineFrame, Mode, NavigatorStatus, OrderQueue,
     Refusal, Route, SteeringReport, Truth, WarehouseMap,
@@ -45,6 +46,22 @@ impl Known {
     /// Whether a stop is in force.
     pub(crate) fn is_stopped(&self) -> bool {
         self.health.is_some_and(|health| health.stopped != 0)
+    }
+
+    /// Which stop that is; 0 = none.
+    pub(crate) fn stop_word(&self) -> u64 {
+        self.health.map_or(0, |health| health.stop_word)
+    }
+
+    /// Why this stop is not released where another one is in force, as a sentence.
+    pub(crate) fn newer_stop(&self, named: u64) -> String {
+        match Stop::of_word(self.stop_word()).filter(|stop| stop.word() != named) {
+            Some(stop) => {
+                format!("a newer stop is set, {stop}; look at the robot and release that one")
+            }
+            // The bridge has seen it, and has not told it yet.
+            None => "a newer stop is set; look at the robot and release that one".to_owned(),
+        }
     }
 
     /// Whether the steering board tells what it does with its motors: an original one does not, and

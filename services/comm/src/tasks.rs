@@ -14,11 +14,12 @@
 use lager_lines::extension::Edge;
 use lager_topics::{
     Answer, Ask, AskKind, Event, EventKind, Health, Input, InputKind, NavigatorStatus, Order,
-    OrderQueue, Outcome, Phase, Pick, Tag, WorldAnswer, WorldAsk, WorldRefusal,
+    OrderQueue, Outcome, Phase, Pick, WorldAnswer, WorldAsk, WorldRefusal,
 };
 
 use crate::action::Action;
 use crate::ids::Ids;
+use crate::known::Known;
 use crate::map::heading;
 use crate::moment::Moment;
 
@@ -70,8 +71,8 @@ enum Task {
     PutDown,
     /// Logic takes it that it stands there.
     Placed,
-    /// The bridge has answered.
-    Ask(Tag<AskKind>),
+    /// The bridge has answered this.
+    Ask(Ask),
     /// A calibration has ended besides those that had ended before.
     Calibration { ended_before: u8 },
     /// The simulated world has answered.
@@ -180,7 +181,7 @@ impl Tasks {
 
     pub(crate) fn ask(&mut self, now: Moment, asker: Asker, id: u32, ask: Ask) {
         self.actions.push(Action::Ask { id, ask });
-        self.wait(now, asker, Task::Ask(ask.kind), request(id));
+        self.wait(now, asker, Task::Ask(ask), request(id));
     }
 
     pub(crate) fn ask_world(&mut self, now: Moment, asker: Asker, id: u32, ask: WorldAsk) {
@@ -229,20 +230,9 @@ impl Tasks {
         self.list.iter().any(|one| matches!(one.task, Task::Picked))
     }
 
-    /// Whether a release of the stop has been asked for and may still come into force.
-    pub(crate) fn resumes(&self) -> bool {
-        let is_it = |one: &Waiting| matches!(one.task, Task::Ask(kind) if kind == AskKind::Resume);
-        self.list.iter().any(is_it)
-    }
-
-    /// Nobody is left who wants to hear of actions. What was given stays given, and a request is
-    /// known until it is answered.
+    /// Nobody is left who wants to hear of actions. What was given stays given.
     pub(crate) fn forget_actions(&mut self) {
-        self.list.retain_mut(|one| {
-            let is_kept = one.asker == Asker::Question || matches!(one.task, Task::Ask(_));
-            one.asker = Asker::Question;
-            is_kept
-        });
+        self.list.retain(|one| one.asker == Asker::Question);
     }
 }
 
@@ -284,10 +274,8 @@ impl Tasks {
                 match one.task {
                     Task::Order(order) => actions.push(Action::Order(order)),
                     // The same press twice is one.
-                    Task::Picked | Task::Pick(_) | Task::Reset | Task::Placed => {
-                        actions.push(Action::Press(one.input));
-                    }
-                    // Two of these would be two.
+                    Task::Pick(_) => actions.push(Action::Press(one.input)),
+                    // Two of these would be two, or would let the robot move late.
                     _ => {}
                 }
             }
@@ -378,11 +366,11 @@ impl Tasks {
         });
     }
 
-    /// The bridge has answered, or has not in time. `calibrated` is how many calibrations have
-    /// ended.
-    pub(crate) fn answered(&mut self, id: u32, answer: Result<Answer, String>, calibrated: u8) {
+    /// The bridge has answered, or has not in time.
+    pub(crate) fn answered(&mut self, id: u32, answer: Result<Answer, String>, known: &Known) {
+        let calibrated = known.health.map_or(0, |health| health.calibrations_ended);
         self.end(|one| {
-            let Task::Ask(kind) = one.task else {
+            let Task::Ask(ask) = one.task else {
                 return None;
             };
             if one.input.id != id {
@@ -392,7 +380,7 @@ impl Tasks {
                 Ok(answer) => answer.outcome.get(),
                 Err(why) => return Some(Err(why.clone())),
             };
-            match (outcome, kind.get()) {
+            match (outcome, ask.kind.get()) {
                 // The end is still to come.
                 (Some(Outcome::Done), Some(AskKind::Calibrate)) => {
                     one.task = Task::Calibration {
@@ -402,7 +390,7 @@ impl Tasks {
                 }
                 (Some(Outcome::Done), _) => Some(Ok(())),
                 (Some(Outcome::Refused), Some(AskKind::Resume)) => {
-                    Some(Err("it was stopped again meanwhile".into()))
+                    Some(Err(known.newer_stop(ask.stop_word)))
                 }
                 (Some(outcome), _) => Some(Err(outcome.to_string())),
                 (None, _) => Some(Err("the bridge answers what nobody here understands".into())),

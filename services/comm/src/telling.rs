@@ -197,6 +197,7 @@ fn put_stop(state: &mut State, now: Moment, known: &Known) {
     let Some(health) = known.health.as_ref().filter(|health| health.stopped != 0) else {
         return;
     };
+    state.stop = Some(health.stop_word);
     state.stop_cause = word(health.stop_cause);
     state.stop_by = word(health.stop_origin);
     let at = Some(health.stopped_at_ns).filter(|at| *at != 0);

@@ -274,7 +274,11 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         }
         Command::Drive { command, seconds } => operator()?.drive(command, seconds)?,
         Command::Arm { command } => operator()?.arm(command)?,
-        Command::Resume => operator()?.resume(&config)?,
+        Command::Resume => {
+            // As it is when the person says so: one that comes later is not released.
+            let before = stop::current(&config)?;
+            operator()?.resume(&config, before)?
+        }
         Command::Mode { mode } => operator()?.mode(match mode {
             ModeName::Manual => Mode::Manual,
             ModeName::Autonomous => Mode::Autonomous,

@@ -380,7 +380,7 @@ impl Whole {
                     self.stop.get_or_insert(stop);
                     self.bridge.stop(stop);
                 }
-                Action::Release => {
+                Action::Release(_) => {
                     self.stop = None;
                     self.bridge.released(true);
                 }

@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow, bail};
 use lager_bridge::arbiter::LEASE;
-use lager_ports::{Bus, BusConfig, Clock, Subscriber};
+use lager_lines::LATEST_MOVE;
+use lager_ports::{Bus, BusConfig, Clock, Stop, Subscriber};
 use lager_topics::{
     Answer, Ask, AskKind, EventKind, Finish, Health, Input, InputKind, LinkHealth, MissionEvent,
     Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Pick, Refusal, Role, SteeringOrder,
@@ -84,15 +85,17 @@ impl Operator {
         self.carry_out(command, None)
     }
 
-    /// `lager resume`: tells what it releases, and what truly happened.
-    pub fn resume(&self, config: &Config) -> Result<String> {
-        let before = stop::current(config)?;
+    /// `lager resume`: releases the stop that was set when its command was given, tells which that
+    /// is, and what truly happened.
+    pub fn resume(&self, config: &Config, before: Option<Stop>) -> Result<String> {
         if let Some(stop) = before {
             let said = stop::describe(stop.origin(), stop.cause(), stop.at_ns());
             crate::say(&format!("it was stopped {said}"))?;
         }
         let answer = self.hands.ask(Ask {
             kind: AskKind::Resume.into(),
+            stop_word: before.map_or(0, Stop::word),
+            lifetime_ms: LATEST_MOVE.as_millis() as u32,
             ..Ask::default()
         })?;
         match (answer.outcome.get(), before) {
@@ -104,7 +107,7 @@ impl Operator {
             }
             _ => match stop::current(config)? {
                 Some(stop) => bail!(
-                    "it stays stopped: it was stopped again meanwhile, {}",
+                    "it stays stopped: a newer stop is set, {}; give `lager resume` anew to release it",
                     stop::describe(stop.origin(), stop.cause(), stop.at_ns())
                 ),
                 None => bail!("the bridge does not release the stop now; try again"),

@@ -7,8 +7,6 @@ import { decimal, put, say, span } from "./words.js";
 
 /** How long Resume is held, in ms. */
 const HOLD_MS = 1_000;
-/** A stop that began so much later than another one is a new one, in ms. */
-const NEWER_MS = 500;
 
 export class Bar {
   constructor(link, parts, robot) {
@@ -16,7 +14,7 @@ export class Bar {
     this.parts = parts;
     this.robot = robot;
     this.stop = new Stop(link, { button: parts.stop, said: parts.stopSaid, resume: parts.resume }, robot, () => this.letResumeGo());
-    /** The robot whose Resume is held, when its stop began, and the end of the hold. */
+    /** The robot whose Resume is held, the stop that was shown when the hold began, and the end of the hold. */
     this.held = null;
     this.resume();
   }
@@ -30,12 +28,13 @@ export class Bar {
       resume.classList.add("held");
       const timer = setTimeout(async () => {
         const may = this.isStillHeld(robot);
+        const { stop } = this.held;
         this.letResumeGo();
         if (!may) return;
-        const answer = await this.link.act(robot, "resume");
+        const answer = await this.link.act(robot, `resume ${stop}`);
         this.stop.say(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
       }, HOLD_MS);
-      this.held = { robot, since: robot.stoppedSince, timer };
+      this.held = { robot, stop: robot.state.stop, timer };
     };
     const end = () => this.letResumeGo();
     resume.addEventListener("pointerdown", begin);
@@ -53,15 +52,15 @@ export class Bar {
   /** Whether what is held would end the stop that it was held for. */
   isStillHeld(robot) {
     const { held } = this;
-    return held?.robot === robot && this.mayResume(robot) && robot.stoppedSince - held.since < NEWER_MS;
+    return held?.robot === robot && this.mayResume(robot) && robot.state.stop === held.stop;
   }
 
   /** Whether this page may end the stop: a driver's, with the robot at rest and nobody else at the wheel. */
   mayResume(robot) {
-    const { stopped, left_duty: left, right_duty: right } = robot.state;
+    const { stopped, stop, left_duty: left, right_duty: right } = robot.state;
     const isAnothers = robot.driver && robot.driver !== this.link.me;
     const moves = Number(left) || Number(right);
-    return stopped === "1" && this.link.mayDrive && !isAnothers && !moves && !robot.isStale(performance.now());
+    return stopped === "1" && stop && this.link.mayDrive && !isAnothers && !moves && !robot.isStale(performance.now());
   }
 
   draw(robot, now) {

@@ -128,7 +128,12 @@ fn read_for_robot(word: &str, rest: &str) -> Result<Said, Unread> {
             )
         })?;
         return match Order::read(&format!("do {number} {action}")) {
-            Some(Ok(Order::Do { number, action })) => Ok(Said::Do {
+            // How late it is, nobody says but the panel.
+            Some(Ok(Order::Do {
+                number,
+                late_ms: 0,
+                action,
+            })) => Ok(Said::Do {
                 robot,
                 number,
                 said_ms,
@@ -180,9 +185,9 @@ mod tests {
         let why = |line| read(line).unwrap_err();
         assert_eq!(why("do r1 5 0 fly").number, Some(5));
         assert!(why("do r1 5 0 fly").why.contains("one of order"));
-        assert!(why("do r1 5 resume").why.contains("time in ms"));
-        assert_eq!(why("do r1 x 0 resume").number, None);
-        assert_eq!(why("do R! 5 0 resume").number, Some(5));
+        assert!(why("do r1 5 resume 7").why.contains("time in ms"));
+        assert_eq!(why("do r1 x 0 resume 7").number, None);
+        assert_eq!(why("do R! 5 0 resume 7").number, Some(5));
         assert_eq!(why("here").number, None);
         assert_eq!(why("take r1 5 6").number, Some(5));
         assert!(why("hello").why.contains("warehouse"));

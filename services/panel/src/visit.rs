@@ -7,7 +7,9 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::extension::{Action, Report};
-use lager_station::{Awaited, Doing, Driver, Reply, Saving, Subscription, Told, View, Warehouse};
+use lager_station::{
+    Awaited, Doing, Driver, Given, Reply, Saving, Subscription, Told, View, Warehouse,
+};
 use tokio::sync::watch;
 
 use crate::Place;
@@ -20,10 +22,6 @@ use crate::speech::{Said, Unread, read};
 const STAY: Duration = Duration::from_secs(1);
 /// How often a page is told of a robot that says nothing.
 const ABOUT: Duration = Duration::from_millis(100);
-/// How late an action may come that moves the robot or lets it move.
-const LATEST_MOVE: Duration = Duration::from_millis(200);
-/// How late any other may come.
-const LATEST: Duration = Duration::from_secs(2);
 /// Lines without a number that a page may say.
 const MOST_UNREAD: u32 = 20;
 
@@ -151,11 +149,7 @@ impl Visit {
                 ..
             } => {
                 let late = self.late.hear(said_ms, handle.now());
-                if late > latest(action) {
-                    let late = late.as_millis();
-                    return self.refuse(number, &format!("came {late} ms late; give it anew"));
-                }
-                self.act(&robot, number, action);
+                self.act(&robot, number, Given { what: action, late });
             }
             Said::Take { robot, .. } => self.take(robot, number),
             Said::Free { robot, .. } => {
@@ -232,20 +226,23 @@ impl Visit {
         handover.unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn act(&mut self, robot: &Name, number: u32, action: Action) {
+    fn act(&mut self, robot: &Name, number: u32, action: Given<Action>) {
         let driver = self.wheels.get(robot);
-        let asked = match (action, driver) {
+        let late = action.late;
+        let asked = match (action.what, driver) {
             (Action::Drive { .. } | Action::Arm(_), None) => {
                 return self.refuse(number, NOT_DRIVER);
             }
             // Its lease is the station's.
-            (Action::Drive { wheels, .. }, Some(driver)) => driver.drive(wheels),
-            (Action::Arm(step), Some(driver)) => driver.arm(step),
+            (Action::Drive { wheels, .. }, Some(driver)) => {
+                driver.drive(Given { what: wheels, late })
+            }
+            (Action::Arm(step), Some(driver)) => driver.arm(Given { what: step, late }),
             (action, None) if is_the_drivers(action) && self.driver_of(robot).is_some() => {
                 let by = self.driver_of(robot).unwrap_or_default();
                 return self.refuse(number, &format!("{by} drives the robot; ask him"));
             }
-            (other, _) => self.place.shared.handle.act(robot, other),
+            (_, _) => self.place.shared.handle.act(robot, action),
         };
         match asked {
             Ok(awaited) => self.asked.push((number, awaited)),
@@ -409,27 +406,12 @@ impl Drop for Visit {
     }
 }
 
-/// How late an action may come. A command to stand is never too late.
-fn latest(action: Action) -> Duration {
-    match action {
-        Action::Drive { wheels, .. } if wheels.is_stop() => Duration::MAX,
-        Action::Drive { .. }
-        | Action::Arm(_)
-        | Action::Resume
-        | Action::Mode(_)
-        | Action::Picked { .. }
-        | Action::Reset
-        | Action::Place(_) => LATEST_MOVE,
-        _ => LATEST,
-    }
-}
-
 /// Whether this is left to the driver as long as there is one: it moves the robot, lets it move, or
 /// changes how it drives. Orders wait in a queue, and things in a simulated world are anybody's.
 fn is_the_drivers(action: Action) -> bool {
     matches!(
         action,
-        Action::Resume
+        Action::Resume { .. }
             | Action::Mode(_)
             | Action::Pick(_)
             | Action::Picked { .. }

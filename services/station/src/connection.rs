@@ -10,6 +10,9 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use lager_lines::splitter::{LineError, LineSplitter};
+use rustix::io::ioctl_fionread;
+
+use crate::unread::is_unread;
 
 /// What a peer may leave unread, in bytes: some sixty of the longest lines.
 const MOST_UNREAD: usize = 64 * 1024;
@@ -75,6 +78,8 @@ pub(crate) struct Connection {
     opened: Instant,
     /// Whether its first line is still awaited.
     is_silent: bool,
+    /// For how long what is read now may have waited, since this process was held up.
+    late: Duration,
 }
 
 impl Connection {
@@ -90,7 +95,33 @@ impl Connection {
             begun_since: None,
             opened: now,
             is_silent: speaks_first,
+            late: Duration::ZERO,
         }
+    }
+
+    /// This process was held up for so long, and what waits now may have come meanwhile.
+    pub(crate) fn held_up(&mut self, pause: Duration) {
+        if self.waits() {
+            self.late = self.late.max(pause);
+        }
+    }
+
+    /// Whether something waits to be read here.
+    fn waits(&self) -> bool {
+        ioctl_fionread(&self.stream).is_ok_and(|waits| waits > 0)
+    }
+
+    /// For how long what is read next may have waited at most.
+    pub(crate) const fn late(&self) -> Duration {
+        self.late
+    }
+
+    /// Whether the peer, of a unix socket, has read all that it was told, and nothing waits here
+    /// that it has said: then what it says from now on it says after that.
+    pub(crate) fn has_read_all(&self) -> bool {
+        // In this order: what it says between the two waits here.
+        let has_read = self.unread.is_empty() && !is_unread(&self.stream);
+        has_read && !self.waits()
     }
 
     /// Whether something waits to be written.
@@ -112,9 +143,16 @@ impl Connection {
         let count = match self.stream.read(&mut buffer) {
             Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(count) => count,
-            Err(error) if is_nothing(&error) => return Ok(()),
+            Err(error) if is_nothing(&error) => {
+                self.late = Duration::ZERO;
+                return Ok(());
+            }
             Err(error) => return Err(error),
         };
+        if count < READ {
+            // Nothing more waits.
+            self.late = Duration::ZERO;
+        }
         let mut bytes = &buffer[..count];
         let mut ended = false;
         while let Some(line) = self.splitter.next(&mut bytes) {

@@ -32,6 +32,7 @@ use lager_lines::extension::Action;
 use lager_wire::OperatorArm;
 
 use crate::awaited::{Awaited, Outlets, Saved, Saving, Subscription};
+use crate::given::Given;
 use crate::robot::Doing;
 use crate::shown::Shown;
 use crate::station::{Station, Wish, WishRefused};
@@ -114,7 +115,11 @@ impl Handle {
     /// # Errors
     ///
     /// When it takes no action, or this one is its driver's.
-    pub fn act(&self, robot: &Name, action: Action) -> Result<Awaited, WishRefused> {
+    pub fn act(
+        &self,
+        robot: &Name,
+        action: impl Into<Given<Action>>,
+    ) -> Result<Awaited, WishRefused> {
         self.ask(robot, |station| station.act(robot, action))
     }
 
@@ -203,7 +208,7 @@ impl Driver {
     /// # Errors
     ///
     /// When he drives it no more, or the robot takes no action.
-    pub fn drive(&self, wheels: Wheels) -> Result<Awaited, WishRefused> {
+    pub fn drive(&self, wheels: impl Into<Given<Wheels>>) -> Result<Awaited, WishRefused> {
         let drive = |station: &mut Station| station.drive(&self.robot, self.key, wheels);
         self.handle.ask(&self.robot, drive)
     }
@@ -213,7 +218,7 @@ impl Driver {
     /// # Errors
     ///
     /// As with [`Driver::drive`].
-    pub fn arm(&self, step: OperatorArm) -> Result<Awaited, WishRefused> {
+    pub fn arm(&self, step: impl Into<Given<OperatorArm>>) -> Result<Awaited, WishRefused> {
         let arm = |station: &mut Station| station.arm(&self.robot, self.key, step);
         self.handle.ask(&self.robot, arm)
     }

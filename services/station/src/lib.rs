@@ -20,11 +20,10 @@
 //!
 //! It never joins a robot's bus. It knows only what robots have told it.
 
-#![forbid(unsafe_code)]
-
 mod asked;
 mod awaited;
 mod connection;
+mod given;
 mod handle;
 mod queues;
 mod robot;
@@ -32,10 +31,12 @@ mod saver;
 mod server;
 mod shown;
 mod station;
+mod unread;
 mod warehouse;
 mod wheel;
 
 pub use awaited::{Awaited, Saving, Subscription};
+pub use given::Given;
 pub use handle::{Driver, Handle, View};
 pub use queues::Queues;
 pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};

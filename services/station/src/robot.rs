@@ -34,7 +34,7 @@ use std::time::Duration;
 use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
 use lager_lines::extension::{Hello, Order};
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{Coord, Direction, Map, ProductId, Products, SideLength, Text};
+use lager_lines::{Coord, Direction, Map, ProductId, Products, SideLength, Text, TooLate};
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
@@ -111,6 +111,9 @@ pub enum ActRefused {
     /// Only who drives it may.
     #[error("the robot is moved by its driver alone; take the wheel first")]
     NotDriver,
+    /// It was given too long ago.
+    #[error(transparent)]
+    Late(#[from] TooLate),
 }
 
 /// Why a product is not put in a robot's queue.
@@ -373,6 +376,19 @@ impl Robot {
         self.told = Some(product);
         self.is_unanswered = true;
         self.doing = Doing::Fetching;
+    }
+
+    /// Whether it turns its wheels by a command of the document, or more commands wait.
+    pub(crate) fn is_commanded(&self) -> bool {
+        self.turns_wheels || !self.commands.is_empty() || self.is_picked
+    }
+
+    /// Whatever waits to be told it was given before the station was held up; whether there was
+    /// anything.
+    pub(crate) fn forget_commands(&mut self) -> bool {
+        let waited = !self.commands.is_empty() || self.is_picked;
+        self.drop_commands();
+        waited
     }
 
     /// Whoever gave commands gives no more: none of them waits any longer, and the robot stands

@@ -7,6 +7,8 @@
 //!   found by the kernel: it probes every silent peer after 5 s, and gives one up that has not
 //!   answered for 10 s, or has not confirmed for 10 s what it was sent.
 //! - Each connection reads at most 4 KiB a turn.
+//! - What waits when this thread was held up for more than 200 ms counts as old by as much, until
+//!   there is nothing more of it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_lines::{Called, Name, ProductId, UnknownProduct};
+use lager_lines::{Called, LATEST_MOVE, Name, ProductId, UnknownProduct};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt;
 use thiserror::Error;
@@ -32,7 +34,7 @@ use crate::station::{Output, Peer, Station, WishRefused};
 use crate::warehouse::{LoadError, Warehouse, WarehouseError, load};
 
 /// How often slow peers and the wish to end are looked for when nothing happens.
-const GLANCE: Duration = Duration::from_millis(100);
+const GLANCE: Duration = Duration::from_millis(50);
 /// When the kernel begins to ask a silent peer whether it is there, and how often.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 const KEEP_ALIVE_AGAIN: Duration = Duration::from_secs(2);
@@ -131,6 +133,8 @@ pub struct Server {
     saved: Queues,
     connections: BTreeMap<Peer, Connection>,
     next_link: u64,
+    /// How long this thread was held up before this turn, if that makes old what waits.
+    pause: Option<Duration>,
 }
 
 impl Server {
@@ -192,6 +196,7 @@ impl Server {
             handle,
             connections: BTreeMap::new(),
             next_link: 0,
+            pause: None,
         })
     }
 
@@ -215,9 +220,18 @@ impl Server {
     ///
     /// When the machine does not let it wait for its sockets.
     pub fn run(mut self, shutdown: &AtomicBool) -> Result<(), ServerError> {
+        let mut turned = Instant::now();
         while !shutdown.load(Ordering::SeqCst) {
             let ready = self.wait()?;
             let now = Instant::now();
+            let pause = now.saturating_duration_since(turned);
+            turned = now;
+            self.pause = Some(pause).filter(|pause| *pause > LATEST_MOVE);
+            if let Some(pause) = self.pause {
+                for connection in self.connections.values_mut() {
+                    connection.held_up(pause);
+                }
+            }
             self.handle.turn();
             for peer in ready.write {
                 if let Some(connection) = self.connections.get_mut(&peer) {
@@ -231,6 +245,7 @@ impl Server {
             self.let_in(now);
             self.close_overdue(now);
             self.say(now);
+            self.watch_gag();
             self.save();
         }
         Ok(())
@@ -319,7 +334,10 @@ impl Server {
     fn greet(&mut self, now: Instant, peer: Peer, stream: Stream) {
         // A GaG speaks when it is asked, which may take as long as it likes.
         let speaks_first = peer != Peer::Gag;
-        let connection = Connection::new(stream, now, speaks_first);
+        let mut connection = Connection::new(stream, now, speaks_first);
+        if let Some(pause) = self.pause {
+            connection.held_up(pause);
+        }
         self.connections.insert(peer, connection);
         self.handle.change(|station| station.connected(peer));
     }
@@ -329,8 +347,9 @@ impl Server {
             return;
         };
         let handle = &self.handle;
+        let late = connection.late();
         let heard = connection.read(now, |line| {
-            handle.change(|station| station.heard(peer, line));
+            handle.change(|station| station.heard_late(peer, late, line));
         });
         if let Err(error) = heard {
             self.end(peer, &error.to_string());
@@ -358,6 +377,16 @@ impl Server {
                     Output::Close { peer, why } => self.end(peer, &why),
                 }
             }
+        }
+    }
+
+    /// Looks what the GaG has read, where somebody waits to learn it.
+    fn watch_gag(&mut self) {
+        if let Some(gag) = self.connections.get(&Peer::Gag)
+            && self.handle.look(Station::watches_gag)
+        {
+            let all = gag.has_read_all();
+            self.handle.take(|station| station.gag_has_read(all));
         }
     }
 

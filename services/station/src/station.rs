@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   a connection's first line         its robot is called
-//!   lager 1 <name>                    by that name; it is answered `lager 1 <station>`
+//!   lager 1 <name> [<ms>]             by that name; it is answered `lager 1 <station> [<ms>]`
 //!   anything else of a robot          robot-1, robot-2 ..., the first that is free
 //! ```
 //!
@@ -11,6 +11,8 @@
 //! - A line that breaks the grammar closes its connection; no part of it counts.
 //! - A GaG's language has no names of robots, so it speaks for one: the one that has been connected
 //!   for longest. The others are answered from the warehouse and their queues.
+//! - What a GaG says moves no robot when it may have waited for more than 200 ms, or may have been
+//!   meant for the robot for which the GaG spoke before. One that reads nothing drives nobody on.
 //! - A GaG's answers are checked as a file is. The station refuses an impossible answer in a
 //!   `thought` and asks again. It takes over what a GaG says of the warehouse.
 //!
@@ -128,6 +130,14 @@ struct Gag {
     held: Held,
     /// The robot it speaks for.
     robot: Option<Name>,
+    /// That robot's connection.
+    link: Option<u64>,
+    /// What it says may still be meant for this robot, for which it spoke before.
+    may_mean: Option<Name>,
+    /// Since when it has not read all that it has been told, by the station's clock.
+    unread: Option<Duration>,
+    /// When it was told something last.
+    told: Duration,
     side: Option<SideLength>,
     map: Option<Map>,
     products: Option<Products>,
@@ -298,13 +308,19 @@ impl Station {
 
     /// A peer has sent a line, or bytes that cannot be one.
     pub fn heard(&mut self, peer: Peer, line: Result<&str, LineError>) {
+        self.heard_late(peer, Duration::ZERO, line);
+    }
+
+    /// The same of a line that may have waited for so long before the station read it. A robot
+    /// tells of itself, and that is taken however late it comes.
+    pub fn heard_late(&mut self, peer: Peer, late: Duration, line: Result<&str, LineError>) {
         let line = match line {
             Ok(line) => line,
             Err(error) => return self.close(peer, error.to_string()),
         };
         match peer {
             Peer::Robot(link) => self.robot_said(link, line),
-            Peer::Gag => self.gag_said(line),
+            Peer::Gag => self.gag_said(late, line),
         }
     }
 
@@ -323,7 +339,10 @@ impl Station {
                 Err(why) => return self.close(Peer::Robot(link), why),
             },
         };
-        let is_hello = matches!(said, RobotLine::Hello(_));
+        let signed = match &said {
+            RobotLine::Hello(hello) => Some(hello.clock_ms),
+            _ => None,
+        };
         if let Some(Gag { robot, .. }) = &self.gag
             && robot.as_ref() == Some(&name)
             && let RobotLine::Request(Request::Telemetry(telemetry)) = &said
@@ -335,10 +354,11 @@ impl Station {
             .robots
             .get_mut(&name)
             .and_then(|robot| robot.heard(said));
-        if is_hello {
+        if let Some(clock_ms) = signed {
             let hello = Hello {
                 version: Hello::VERSION,
                 name: self.name.clone(),
+                clock_ms,
             };
             self.put(Peer::Robot(link), &StationLine::Hello(hello));
         }
@@ -419,7 +439,12 @@ impl Station {
 
     fn put(&mut self, to: Peer, line: &impl core::fmt::Display) {
         match to_line(line) {
-            Ok(line) => self.outputs.push(Output::Say { to, line }),
+            Ok(line) => {
+                if let (Peer::Gag, Some(gag)) = (to, &mut self.gag) {
+                    gag.told = self.now;
+                }
+                self.outputs.push(Output::Say { to, line });
+            }
             // Everything that is too long has been refused before; a text of a peer is a line's.
             Err(error) => self.close(to, error.to_string()),
         }

@@ -1,7 +1,8 @@
-//! `lager 1 <name>`: that a peer speaks the extension.
+//! `lager 1 <name> [<ms>]`: that a peer speaks the extension, and that it is there.
 
 use core::fmt;
 
+use super::fields::Value as _;
 use crate::misread::Misread;
 use crate::reader::Reader;
 use crate::text::Name;
@@ -13,6 +14,8 @@ pub struct Hello {
     pub version: u8,
     /// The name of the robot, or of the station.
     pub name: Name,
+    /// The robot's clock in ms when it said so; a station repeats what it answers.
+    pub clock_ms: Option<u64>,
 }
 
 impl Hello {
@@ -24,15 +27,23 @@ impl Hello {
     ///
     /// # Errors
     ///
-    /// When a version or a name is missing or is none.
+    /// When a version, a name or a time is none, or one of the first two is missing.
     pub fn read(line: &str) -> Option<Result<Self, Misread>> {
         let mut reader = Reader::new(line);
         (reader.word().text == Self::WORD).then(|| {
             let version = reader.word().number("a version from 1 to 255", 1, 255)?;
             let name = reader.word();
             let name = name.read(Name::WANTED, |name| Name::new(name).ok())?;
+            let clock_ms = reader.word().read("a time in ms", |word| match word {
+                "" => Some(None),
+                ms => u64::of(ms).map(Some),
+            })?;
             reader.end()?;
-            Ok(Self { version, name })
+            Ok(Self {
+                version,
+                name,
+                clock_ms,
+            })
         })
     }
 
@@ -44,6 +55,10 @@ impl Hello {
 
 impl fmt::Display for Hello {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} {} {}", Self::WORD, self.version, self.name)
+        write!(formatter, "{} {} {}", Self::WORD, self.version, self.name)?;
+        match self.clock_ms {
+            Some(ms) => write!(formatter, " {ms}"),
+            None => Ok(()),
+        }
     }
 }

@@ -1,12 +1,15 @@
 //! Station to robot: stops and numbered actions.
 
 use core::fmt;
+use core::time::Duration;
 
 use lager_wire::{OperatorArm, OperatorCommand};
 use thiserror::Error;
 
+use super::fields::Value as _;
 use super::listed::Edge;
 use crate::command::{Code, CommandError, Wheels, read_arm, read_wheels};
+use crate::late::{LATEST, LATEST_MOVE};
 use crate::misread::Misread;
 use crate::reader::{Reader, Word};
 use crate::warehouse::ProductId;
@@ -23,6 +26,8 @@ pub enum Order {
     Do {
         /// What `done` or `refused` repeats.
         number: u32,
+        /// For how long it had been given when the station said this, in ms.
+        late_ms: u32,
         /// What to do.
         action: Action,
     },
@@ -57,8 +62,11 @@ pub enum Action {
     Clear,
     /// `mode`: who drives.
     Mode(Mode),
-    /// `resume`: end a stop.
-    Resume,
+    /// `resume`: end a stop, and no other that was set meanwhile.
+    Resume {
+        /// Which, as [`State`](super::State) tells it.
+        stop: u64,
+    },
     /// `reset`: the robot stands on the delivery corner and looks into the warehouse (B1).
     Reset,
     /// `place`: the robot stands on a crossing and looks along the grid; a simulated one is put
@@ -96,6 +104,23 @@ pub enum Action {
         /// Where.
         edge: Edge,
     },
+}
+
+impl Action {
+    /// How late it may come. A command to stand is never too late.
+    pub const fn latest(self) -> Duration {
+        match self {
+            Self::Drive { wheels, .. } if wheels.is_stop() => Duration::MAX,
+            Self::Drive { .. }
+            | Self::Arm(_)
+            | Self::Resume { .. }
+            | Self::Mode(_)
+            | Self::Picked { .. }
+            | Self::Reset
+            | Self::Place(_) => LATEST_MOVE,
+            _ => LATEST,
+        }
+    }
 }
 
 /// Who drives.
@@ -261,7 +286,7 @@ fn read_do(mut reader: Reader<'_>) -> Result<Order, ActionError> {
         number: None,
         misread,
     })?;
-    let action = read_action(reader).map_err(|fault| match fault {
+    let (late_ms, action) = read_given(reader).map_err(|fault| match fault {
         Fault::Misread(misread) => ActionError::Misread {
             number: Some(number),
             misread,
@@ -272,7 +297,24 @@ fn read_do(mut reader: Reader<'_>) -> Result<Order, ActionError> {
             error,
         },
     })?;
-    Ok(Order::Do { number, action })
+    Ok(Order::Do {
+        number,
+        late_ms,
+        action,
+    })
+}
+
+/// For how long it was given, and what.
+fn read_given(mut reader: Reader<'_>) -> Result<(u32, Action), Fault> {
+    let late_ms = match reader.ahead().text {
+        "late" => {
+            reader.word();
+            let wanted = "a time from 0 to 4294967295 ms";
+            reader.word().number(wanted, 0, i64::from(u32::MAX))?
+        }
+        _ => 0,
+    };
+    Ok((late_ms, read_action(reader)?))
 }
 
 pub(super) fn number(reader: &mut Reader<'_>) -> Result<u32, Misread> {
@@ -298,7 +340,11 @@ fn read_action(mut reader: Reader<'_>) -> Result<Action, Fault> {
         },
         "clear" => Action::Clear,
         "mode" => Action::Mode(reader.word().read(Mode::WANTED, Mode::from_word)?),
-        "resume" => Action::Resume,
+        "resume" => Action::Resume {
+            stop: reader
+                .word()
+                .read("the number of the stop, as the state tells it", u64::of)?,
+        },
         "reset" => Action::Reset,
         "place" => Action::Place(Edge::read(&mut reader)?),
         "picked" => Action::Picked {
@@ -353,7 +399,16 @@ impl fmt::Display for Order {
             Self::Stop {
                 number: Some(number),
             } => write!(formatter, "stop {number}"),
-            Self::Do { number, action } => write!(formatter, "do {number} {action}"),
+            Self::Do {
+                number,
+                late_ms: 0,
+                action,
+            } => write!(formatter, "do {number} {action}"),
+            Self::Do {
+                number,
+                late_ms,
+                action,
+            } => write!(formatter, "do {number} late {late_ms} {action}"),
         }
     }
 }
@@ -367,7 +422,7 @@ impl fmt::Display for Action {
             Self::Up { order } => write!(formatter, "up {order}"),
             Self::Clear => formatter.write_str("clear"),
             Self::Mode(mode) => write!(formatter, "mode {}", mode.as_str()),
-            Self::Resume => formatter.write_str("resume"),
+            Self::Resume { stop } => write!(formatter, "resume {stop}"),
             Self::Reset => formatter.write_str("reset"),
             Self::Place(on) => write!(formatter, "place {on}"),
             Self::Picked { force: false } => formatter.write_str("picked"),

@@ -52,6 +52,8 @@ fields! {
         stop_cause: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
         /// The part of the robot that set it, such as `comm`, which does so for a station.
         stop_by: Name = "a name of 1 to 32 of a-z, 0-9, - and _",
+        /// Which stop it is: a resume names it.
+        stop: u64 = "the number of a stop",
         /// How long ago that was, in ms.
         stop_age_ms: u64 = "a time in ms",
         /// The order it is on.

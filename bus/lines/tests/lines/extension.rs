@@ -20,7 +20,9 @@ fn every_line_of_the_station_is_read_and_written() {
         "do 3 clear",
         "do 4 mode manual",
         "do 5 mode autonomous",
-        "do 6 resume",
+        "do 6 resume 9223372036854775809",
+        "do 6 late 35 drive 00000010 150",
+        "lager 1 station 81250",
         "do 7 reset",
         "do 8 picked",
         "do 9 picked force",
@@ -89,6 +91,7 @@ fn two_versions_meet_at_the_lower_one() {
     let hello = |version| Hello {
         version,
         name: Name::new("r1").expect("a name"),
+        clock_ms: None,
     };
     let ours = hello(Hello::VERSION);
     assert_eq!(ours.version_with(&hello(9)), 1);
@@ -129,6 +132,7 @@ fn the_fullest_state_fits_in_a_line() {
         stopped: Some(true),
         stop_cause: name(),
         stop_by: name(),
+        stop: Some(u64::MAX),
         stop_age_ms: Some(u64::MAX),
         failure: name(),
         failure_expected: Some(i32::MIN),
@@ -246,5 +250,13 @@ fn an_action_that_cannot_be_read_still_has_the_number_to_refuse_it_with() {
     }
     let good = Order::read("do 7 clear");
     let action = Action::Clear;
-    assert_eq!(good, Some(Ok(Order::Do { number: 7, action })));
+    let (number, late_ms) = (7, 0);
+    assert_eq!(
+        good,
+        Some(Ok(Order::Do {
+            number,
+            late_ms,
+            action
+        }))
+    );
 }

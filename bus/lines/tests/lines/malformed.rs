@@ -257,7 +257,16 @@ fn lines_of_the_station_that_are_none() {
             ("lager 0 x", word(7, "0", VERSION)),
             ("lager 1", ends(8, NAME)),
             ("lager 1 R1", word(9, "R1", NAME)),
-            ("lager 1 r1 r2", word(12, "r2", END)),
+            ("lager 1 r1 r2", word(12, "r2", "a time in ms")),
+            ("lager 1 r1 7 8", word(14, "8", END)),
+            (
+                "do 1 resume",
+                ends(12, "the number of the stop, as the state tells it"),
+            ),
+            (
+                "do 1 late x clear",
+                word(11, "x", "a time from 0 to 4294967295 ms"),
+            ),
             ("do", ends(3, NUMBER)),
             ("do x clear", word(4, "x", NUMBER)),
             ("do 1", ends(5, ACTION)),

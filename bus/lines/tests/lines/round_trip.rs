@@ -116,7 +116,7 @@ fn action() -> impl Strategy<Value = Action> {
         any::<u32>().prop_map(|order| Action::Up { order }),
         Just(Action::Clear),
         mode().prop_map(Action::Mode),
-        Just(Action::Resume),
+        any::<u64>().prop_map(|stop| Action::Resume { stop }),
         Just(Action::Reset),
         edge().prop_map(Action::Place),
         any::<bool>().prop_map(|force| Action::Picked { force }),
@@ -133,7 +133,13 @@ fn action() -> impl Strategy<Value = Action> {
 fn order() -> impl Strategy<Value = Order> {
     prop_oneof![
         any::<Option<u32>>().prop_map(|number| Order::Stop { number }),
-        (any::<u32>(), action()).prop_map(|(number, action)| Order::Do { number, action }),
+        any::<(u32, u32)>().prop_flat_map(|(number, late_ms)| {
+            action().prop_map(move |action| Order::Do {
+                number,
+                late_ms,
+                action,
+            })
+        }),
     ]
 }
 
@@ -281,7 +287,11 @@ fn report() -> impl Strategy<Value = Report> {
 }
 
 fn hello() -> impl Strategy<Value = Hello> {
-    (1..=255_u8, name()).prop_map(|(version, name)| Hello { version, name })
+    (1..=255_u8, name(), any::<Option<u64>>()).prop_map(|(version, name, clock_ms)| Hello {
+        version,
+        name,
+        clock_ms,
+    })
 }
 
 fn good() -> impl Strategy<Value = Good> {

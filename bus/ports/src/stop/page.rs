@@ -127,18 +127,21 @@ impl StopPage {
         self.page.put(at::REPORTED_AT, at_ns / 1_000);
     }
 
-    /// Clears the word, if it is the one that was obeyed.
-    pub fn release(&mut self) -> Release {
+    /// Clears the word, if it is that of this stop.
+    pub fn release(&mut self, stop: Stop) -> Release {
         let word = self.page.word();
-        let cleared = word.compare_exchange(self.heeded, 0, Ordering::AcqRel, Ordering::Acquire);
-        match (cleared, Stop::of_word(self.heeded)) {
-            (Ok(_), None) => Release::NotStopped,
-            (Ok(_) | Err(0), Some(stop)) => {
-                self.heeded = 0;
-                Release::Done(stop)
-            }
-            (Err(word), _) => Stop::of_word(word).map_or(Release::NotStopped, Release::Newer),
+        let cleared = word.compare_exchange(stop.word(), 0, Ordering::AcqRel, Ordering::Acquire);
+        let is_heeded = self.heeded == stop.word();
+        match cleared {
+            Ok(_) => {}
+            // Somebody else has cleared it, and it would be set again.
+            Err(0) if is_heeded => {}
+            Err(word) => return Stop::of_word(word).map_or(Release::NotStopped, Release::Newer),
         }
+        if is_heeded {
+            self.heeded = 0;
+        }
+        Release::Done(stop)
     }
 }
 
@@ -214,7 +217,6 @@ pub(super) mod tests {
         let path = folder.path().join("stop");
         let mut page = page(&path, false);
         assert_eq!((page.news(), page.heeded()), (None, None));
-        assert_eq!(page.release(), Release::NotStopped);
         let stop = set(&path);
         assert_eq!(page.news(), Some(stop));
         page.heed(stop, 5_000);
@@ -222,7 +224,8 @@ pub(super) mod tests {
         assert_eq!(told(&path).obeyed(), Some((stop, 5_000)));
         page.rest(7_000);
         assert_eq!(told(&path).rested(), Some((stop, 7_000)));
-        assert_eq!(page.release(), Release::Done(stop));
+        assert_eq!(page.release(stop), Release::Done(stop));
+        assert_eq!(page.release(stop), Release::NotStopped);
         assert_eq!((page.news(), page.heeded()), (None, None));
         assert_eq!(told(&path).stop(), None);
     }
@@ -234,10 +237,9 @@ pub(super) mod tests {
         let mut page = page(&path, false);
         let first = set(&path);
         page.heed(page.news().unwrap(), 0);
-        std::thread::sleep(Duration::from_micros(2));
         let newer = set(&path);
         assert_ne!(first, newer);
-        assert_eq!(page.release(), Release::Newer(newer));
+        assert_eq!(page.release(first), Release::Newer(newer));
         assert_eq!(page.news(), Some(newer));
         assert_eq!(told(&path).stop(), Some(newer));
     }
@@ -337,7 +339,7 @@ pub(super) mod tests {
                 });
                 assert_eq!(news.cause(), cause);
                 page.heed(news, 1);
-                assert_eq!(page.release(), Release::Done(news));
+                assert_eq!(page.release(news), Release::Done(news));
                 // Only now it is certain that a thread watches the new file.
                 let stop = wait_for(|| {
                     set(&path);

@@ -136,7 +136,7 @@ impl CalibratedSensor {
 
 payload! {
     /// Both links and the arbiter: all that a restarted bridge needs to go on.
-    pub struct Health: 224 bytes {
+    pub struct Health: 232 bytes {
         /// The sensor board's link.
         pub sensor: BoardHealth,
         /// The steering board's link.
@@ -149,6 +149,8 @@ payload! {
         pub driven_by_hand: u64,
         /// When the stop that is latched was set, in ns of `CLOCK_MONOTONIC`; 0 = none is.
         pub stopped_at_ns: u64,
+        /// The word of that stop, which a request to release it names; 0 = none is latched.
+        pub stop_word: u64,
         /// The order in force.
         pub current_id: u32,
         /// The order that ended last.

@@ -12,7 +12,7 @@ coded! {
     pub enum AskKind {
         /// Change the mode to `mode`.
         SetMode = 0,
-        /// Release the latched stop.
+        /// Release the stop `stop_word`.
         Resume = 1,
         /// Set the gains of the line control to `gain_p` and `gain_d`.
         SetGains = 2,
@@ -76,9 +76,8 @@ payload! {
         pub gain_p: u8,
         /// Gain on the change of the error, in the firmware's unit.
         pub gain_d: u8,
-        /// Always 0.
-        #[serde(skip)]
-        pub reserved: [u8; 8],
+        /// The stop to release, by its word; 0 = none is known. No other one is released.
+        pub stop_word: u64,
     }
 }
 

@@ -3,6 +3,7 @@
 //! It is apart from the core, because the code that carries the actions out needs nothing else of
 //! it.
 
+use lager_ports::Stop;
 use lager_topics::{ArmProfileState, AskKind, Mode, StopCause};
 use lager_wire::{Callsign, PACKET_LENGTH, SteerCommand};
 
@@ -33,8 +34,9 @@ pub enum Action {
     ShowReport(ShownReport),
     /// Set a stop of the bridge's own.
     Stop(StopCause),
-    /// Release the stop in force, and tell [`released`](super::BridgeCore::released).
-    Release,
+    /// Release this stop, if it is the one in force, and tell
+    /// [`released`](super::BridgeCore::released).
+    Release(Stop),
     /// Tell people.
     Say(News),
 }

@@ -35,16 +35,15 @@ impl BridgeCore {
                 }
                 Answered(Outcome::Done)
             }
-            // It releases the stop that its asker knew of and none that was set after he asked.
-            (Some(AskKind::Resume), _)
-                if self.stop.is_some_and(|stop| stop.at_ns() > ask.issued_ns) =>
-            {
-                Answered(Outcome::Refused)
-            }
-            (Some(AskKind::Resume), _) => {
-                self.due.release = true;
-                Asked::Releasing
-            }
+            // It releases the stop that its asker has named, and no other.
+            (Some(AskKind::Resume), _) => match self.stop {
+                Some(stop) if stop.word() == ask.stop_word => {
+                    self.due.release = Some(stop);
+                    Asked::Releasing
+                }
+                Some(_) => Answered(Outcome::Refused),
+                None => Answered(Outcome::Done),
+            },
             (Some(AskKind::SetGains), _) => {
                 let gains = [ask.gain_p.into(), ask.gain_d.into()];
                 self.set(now.robot, &[SettingKey::GainP, SettingKey::GainD], &gains)

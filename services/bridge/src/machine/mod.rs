@@ -143,7 +143,7 @@ struct Due {
     /// A stop has come: its standby, before everything else.
     halt: bool,
     handshake: [Option<Handshake>; 2],
-    release: bool,
+    release: Option<Stop>,
     stop: Option<StopCause>,
     shown: Option<ShownReport>,
     /// `steering/state`, because of the report read then, in ns.
@@ -411,8 +411,8 @@ impl BridgeCore {
                 }));
             }
         }
-        if core::mem::take(&mut self.due.release) {
-            return Some(Action::Release);
+        if let Some(stop) = self.due.release.take() {
+            return Some(Action::Release(stop));
         }
         if let Some(shown) = self.due.shown.take() {
             return Some(Action::ShowReport(shown));

@@ -36,6 +36,7 @@ impl BridgeCore {
             health.stop_cause = stop.cause().into();
             health.stop_origin = stop.origin().unwrap_or(Role::Bridge).into();
             health.stopped_at_ns = stop.at_ns();
+            health.stop_word = stop.word();
         }
     }
 

@@ -262,17 +262,22 @@ fn what_the_last_stage_of_a_turn_finds_out_is_told_in_that_turn() {
 }
 
 #[test]
-fn a_release_that_was_asked_for_before_a_stop_does_not_end_it() {
+fn a_release_ends_the_stop_that_it_names_and_no_other() {
     let mut core = core();
-    core.stop(Stop::new(Role::Operator, StopCause::Ordered, at(2_000).ns));
+    let [older, newer] =
+        [1_990, 2_000].map(|millis| Stop::new(Role::Operator, StopCause::Ordered, at(millis).ns));
+    core.stop(older);
+    core.stop(newer);
     turn(&mut core, 2_000);
-    let resume = |millis| Ask {
+    let resume = |stop: Stop| Ask {
         kind: AskKind::Resume.into(),
-        issued_ns: at(millis).ns,
+        stop_word: stop.word(),
+        issued_ns: at(2_001).ns,
         lifetime_ms: 500,
         ..Ask::default()
     };
-    core.ask(at(2_001), &resume(1_999));
+    // It is younger than both.
+    core.ask(at(2_001), &resume(older));
     let did = turn(&mut core, 2_001);
     assert!(!did.contains(&("release", None)), "{did:?}");
     let answer = core.answer().expect("an answer");
@@ -280,7 +285,7 @@ fn a_release_that_was_asked_for_before_a_stop_does_not_end_it() {
         (answer.outcome.get(), answer.stopped),
         (Some(Outcome::Refused), 1)
     );
-    core.ask(at(2_002), &resume(2_002));
+    core.ask(at(2_002), &resume(newer));
     let did = turn(&mut core, 2_002);
     assert!(did.contains(&("release", None)), "{did:?}");
 }

@@ -59,7 +59,7 @@ impl Service<'_> {
             }
             // Seen at the next look at the word.
             Action::Stop(cause) => self.page.stop(cause),
-            Action::Release => self.release(),
+            Action::Release(stop) => self.release(stop),
             Action::Say(news) => self.say(&news),
         }
     }
@@ -72,9 +72,9 @@ impl Service<'_> {
         tracing::warn!("stopped {stop}; a resume releases it");
     }
 
-    /// Releases the stop in force; one that was set meanwhile holds.
-    fn release(&mut self) {
-        match self.page.release() {
+    /// Releases this stop; one that was set meanwhile holds.
+    fn release(&mut self, stop: Stop) {
+        match self.page.release(stop) {
             Release::NotStopped => self.core.released(true),
             Release::Done(stop) => {
                 tracing::info!("resumed; it was stopped {stop}");

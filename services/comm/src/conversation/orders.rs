@@ -3,7 +3,10 @@
 //! An action is judged here and carried out as a person at the robot would: by the same orders,
 //! presses and requests as the commands of `lager`. In doubt the robot stands and says why.
 
+use core::time::Duration;
+
 use lager_lines::extension::{Action as Wanted, Edge, Mode as WantedMode, Pick as WantedPick, Put};
+use lager_lines::{LATEST_MOVE, TooLate};
 use lager_topics::{Ask, AskKind, Goal, Mode, Order, Phase, Pick, Refusal, WorldAsk, WorldAskKind};
 use lager_wire::{Command, OperatorCommand, WheelCommand};
 
@@ -19,6 +22,7 @@ impl Conversation {
     pub(super) fn command(
         &mut self,
         now: Moment,
+        late: Duration,
         command: OperatorCommand,
         whose: For,
     ) -> Result<(), String> {
@@ -40,7 +44,7 @@ impl Conversation {
             return Ok(());
         }
         let id = self.ids.fresh(now);
-        let order = self.driving.begin(now, id, command, whose);
+        let order = self.driving.begin(now, late, id, command, whose);
         self.actions.push(Action::Steer(order));
         Ok(())
     }
@@ -68,7 +72,6 @@ impl Conversation {
     pub(super) fn stop(&mut self, now: Moment, number: Option<u32>) {
         self.driving.let_go(STOPPED);
         self.actions.push(Action::Stop);
-        self.stops_again = self.tasks.resumes();
         if let Some(number) = number.filter(|_| self.is_up && self.is_extended)
             && self.stops.len() < MOST_STOPS
         {
@@ -76,12 +79,22 @@ impl Conversation {
         }
     }
 
-    /// Carries an action out; it is answered when it is done or refused. `is_stopped`: a stop has
-    /// come with it.
-    pub(super) fn carry_out(&mut self, now: Moment, number: u32, wanted: Wanted, is_stopped: bool) {
-        let begun = match is_stopped && ends_a_stop(wanted) {
-            true => Err("a stop has come with it; give it anew".into()),
-            false => self.begin(now, number, wanted),
+    /// Carries an action out that comes so `late`; it is answered when it is done or refused.
+    /// `is_stopped`: a stop has come with it.
+    pub(super) fn carry_out(
+        &mut self,
+        now: Moment,
+        late: Duration,
+        number: u32,
+        wanted: Wanted,
+        is_stopped: bool,
+    ) {
+        let begun = match TooLate::check(late, wanted.latest()) {
+            _ if is_stopped && ends_a_stop(wanted) => {
+                Err("a stop has come with it; give it anew".into())
+            }
+            Err(why) => Err(why.to_string()),
+            Ok(()) => self.begin(now, late, number, wanted),
         };
         match begun {
             Ok(Begun::Waits) => {}
@@ -90,7 +103,13 @@ impl Conversation {
         }
     }
 
-    fn begin(&mut self, now: Moment, number: u32, wanted: Wanted) -> Result<Begun, String> {
+    fn begin(
+        &mut self,
+        now: Moment,
+        late: Duration,
+        number: u32,
+        wanted: Wanted,
+    ) -> Result<Begun, String> {
         let asker = Asker::Action(number);
         if !self.tasks.has_room() {
             let most = Tasks::MOST;
@@ -98,16 +117,19 @@ impl Conversation {
         }
         match wanted {
             Wanted::Drive { wheels, lease } => {
-                let until_ns = Some(now.ns + u64::from(lease.get()) * 1_000_000);
+                // It ends with its lease, and it was given no longer ago than it may come late.
+                let lease = Duration::from_millis(lease.get().into());
+                let left = lease.min(LATEST_MOVE.saturating_sub(late));
+                let until_ns = Some(now.ns + u64::try_from(left.as_nanos()).unwrap_or(0));
                 let whose = For::Action { number, until_ns };
-                self.command(now, wheels.into(), whose)?;
+                self.command(now, late, wheels.into(), whose)?;
             }
             Wanted::Arm(step) => {
                 let whose = For::Action {
                     number,
                     until_ns: None,
                 };
-                self.command(now, OperatorCommand::Arm(step), whose)?;
+                self.command(now, late, OperatorCommand::Arm(step), whose)?;
             }
             Wanted::Add { order: 0, .. } => {
                 return Err("orders are numbered from 1 on: 0 means none".into());
@@ -181,16 +203,27 @@ impl Conversation {
                 now,
                 asker,
                 Ask {
-                    kind: AskKind::SetMode.into(),
                     mode: match mode {
                         WantedMode::Manual => Mode::Manual,
                         WantedMode::Autonomous => Mode::Autonomous,
                     }
                     .into(),
-                    ..Ask::default()
+                    ..moving(now, late, AskKind::SetMode)
                 },
             ),
-            Wanted::Resume => self.ask_bridge(now, asker, kind(AskKind::Resume)),
+            Wanted::Resume { stop } => {
+                if self.known.is_stopped() && self.known.stop_word() != stop {
+                    return Err(self.known.newer_stop(stop));
+                }
+                self.ask_bridge(
+                    now,
+                    asker,
+                    Ask {
+                        stop_word: stop,
+                        ..moving(now, late, AskKind::Resume)
+                    },
+                );
+            }
             Wanted::Calibrate => self.ask_bridge(now, asker, kind(AskKind::Calibrate)),
             Wanted::Gains { p, d } => self.ask_bridge(
                 now,
@@ -262,7 +295,7 @@ enum Begun {
 const fn ends_a_stop(wanted: Wanted) -> bool {
     matches!(
         wanted,
-        Wanted::Resume | Wanted::Drive { .. } | Wanted::Arm(_)
+        Wanted::Resume { .. } | Wanted::Drive { .. } | Wanted::Arm(_)
     )
 }
 
@@ -270,6 +303,15 @@ fn kind(kind: AskKind) -> Ask {
     Ask {
         kind: kind.into(),
         ..Ask::default()
+    }
+}
+
+/// A request that lets the robot move: its time is over as early as that of any other such order.
+fn moving(now: Moment, late: Duration, of: AskKind) -> Ask {
+    Ask {
+        issued_ns: now.given_ns(late),
+        lifetime_ms: u32::try_from(LATEST_MOVE.as_millis()).unwrap_or(0),
+        ..kind(of)
     }
 }
 

@@ -8,7 +8,6 @@ use lager_topics::{
 };
 
 use super::{AGAIN, Conversation, STOPPED};
-use crate::action::Action;
 use crate::known::Senses;
 use crate::map::direction;
 use crate::moment::Moment;
@@ -121,15 +120,7 @@ impl Conversation {
 
     /// What became of an [`Action::Ask`]; `Err` is why nobody knows.
     pub fn answered_by_bridge(&mut self, id: u32, answer: Result<Answer, String>) {
-        let resumed = self.tasks.resumes();
-        let calibrated = self
-            .known
-            .health
-            .map_or(0, |health| health.calibrations_ended);
-        self.tasks.answered(id, answer, calibrated);
-        if resumed && !self.tasks.resumes() && core::mem::take(&mut self.stops_again) {
-            self.actions.push(Action::Stop);
-        }
+        self.tasks.answered(id, answer, &self.known);
         self.settle();
     }
 

@@ -69,9 +69,10 @@ fn a_silent_station_that_speaks_the_extension_is_a_lost_link() {
     let mut robot = Robot::connected(Mode::Manual);
     robot.hears(&["lager 1 station"]);
     assert_eq!(robot.hears(&["styrcomm 2"]), ["[steers 2]", "styrcomm"]);
-    for _ in 0..20 {
+    for number in 1..20 {
         let said = robot.pass(50);
-        assert!(said.contains(&"lager 1 r1".to_owned()), "{said:?}");
+        assert!(robot.signs > number, "it gives its sign of life");
+        assert!(said.iter().all(|line| line == "[renews 2]"), "{said:?}");
         robot.hears(&["lager 1 station"]);
     }
     let said = robot.pass(150);
@@ -86,7 +87,7 @@ fn a_standing_robot_is_patient_with_a_silent_station() {
     let mut robot = Robot::connected(Mode::Manual);
     robot.hears(&["lager 1 station"]);
     let said = robot.pass(4_000);
-    assert!(said.iter().all(|line| line == "lager 1 r1"), "{said:?}");
+    assert_eq!(said, [""; 0]);
     assert!(robot.pass(1_100).contains(&"[hangs up]".to_owned()));
 }
 
@@ -217,10 +218,11 @@ fn a_stop_that_cannot_be_read_stops() {
 }
 
 #[test]
-fn the_warehouse_is_asked_for_first_where_the_extension_is_spoken() {
+fn the_warehouse_is_asked_for_where_the_extension_is_spoken_and_nobody_drives() {
     let mut robot = Robot::with_map(Mode::Manual, None);
     robot.connect();
-    assert_eq!(robot.hears(&["lager 1 station"]), ["sidelength"]);
+    assert_eq!(robot.hears(&["lager 1 station"]), [""; 0]);
+    assert_eq!(robot.pass(1_000), ["sidelength"]);
     assert_eq!(robot.hears(&["sidelength 40"]), ["karta"]);
     assert_eq!(robot.hears(&["karta 4 3 0 0"]), ["prodlis"]);
     let said = robot.hears(&["prodlis 1 7 1 0 down"]);
@@ -235,12 +237,27 @@ fn the_warehouse_is_asked_for_first_where_the_extension_is_spoken() {
 fn a_station_without_a_warehouse_keeps_nobody_from_driving() {
     let mut robot = Robot::with_map(Mode::Manual, None);
     robot.connect();
-    assert_eq!(robot.hears(&["lager 1 station"]), ["sidelength"]);
-    let said = robot.pass(1_000);
-    assert_eq!(
-        said.last().map(String::as_str),
-        Some("styrcomm"),
-        "{said:?}"
-    );
+    robot.hears(&["lager 1 station"]);
+    assert_eq!(robot.pass(1_000), ["sidelength"]);
+    assert_eq!(robot.pass(1_000), ["styrcomm"], "for a second");
+    robot.is_answered();
     assert_eq!(robot.hears(&["styrcomm 2"])[0], "[steers 2]");
+    // A GaG that only drives is not asked about the floor again, by no connection.
+    robot.disconnect();
+    assert_eq!(robot.connect(), ["lager 1 r1", "styrcomm"]);
+    robot.hears(&["lager 1 station"]);
+    assert_eq!(robot.pass(3_000), [""; 0]);
+}
+
+#[test]
+fn a_gag_that_drives_at_once_is_never_asked_about_the_floor() {
+    let mut robot = Robot::with_map(Mode::Manual, None);
+    assert_eq!(robot.connect(), ["lager 1 r1", "styrcomm"]);
+    robot.hears(&["lager 1 station"]);
+    assert_eq!(robot.hears(&["styrcomm 2"]), ["[steers 2]", "styrcomm"]);
+    for _ in 0..300 {
+        let said = robot.pass(10);
+        assert!(said.iter().all(|line| line == "[renews 2]"), "{said:?}");
+        robot.is_answered();
+    }
 }

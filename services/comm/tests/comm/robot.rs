@@ -3,6 +3,8 @@
 use core::time::Duration;
 
 use lager_comm::{Action, Conversation, LinkLost, Moment};
+use lager_lines::conversation::RobotLine;
+use lager_lines::extension::Hello;
 use lager_lines::gag::Query;
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
@@ -20,11 +22,16 @@ pub(crate) struct Robot {
     pub(crate) ordered: Option<Order>,
     /// The last steering order that was given or renewed: its id and code.
     pub(crate) steered: Option<(u32, u8)>,
+    /// When it was given, in ns.
+    pub(crate) given_ns: u64,
     /// What was pressed last.
     pub(crate) pressed: Option<Input>,
     /// What was asked last, with the number of the answer.
     pub(crate) asked: Option<(u32, Ask)>,
     pub(crate) asked_world: Option<(u32, WorldAsk)>,
+    /// The clock of its last sign, which a station repeats, and how many there were.
+    pub(crate) signed_ms: Option<u64>,
+    pub(crate) signs: usize,
     /// The reports that show how things are, since the last look.
     pub(crate) shown: Vec<String>,
 }
@@ -52,9 +59,12 @@ impl Robot {
             map: None,
             ordered: None,
             steered: None,
+            given_ns: 0,
             pressed: None,
             asked: None,
             asked_world: None,
+            signed_ms: None,
+            signs: 0,
             shown: Vec::new(),
         };
         robot.conversation.turn(robot.now);
@@ -83,11 +93,26 @@ impl Robot {
         self.done()
     }
 
-    /// What has been done since the last look: lines as they are, other actions in brackets.
+    /// The station answers the last sign, as one of ours does.
+    pub(crate) fn is_answered(&mut self) -> Vec<String> {
+        let echo = format!("lager 1 station {}", self.signed_ms.expect("a sign"));
+        self.hears(&[&echo])
+    }
+
+    /// What has been done since the last look: lines as they are but for signs, other actions in
+    /// brackets.
     pub(crate) fn done(&mut self) -> Vec<String> {
         let mut done = Vec::new();
         for action in self.conversation.actions() {
             done.push(match action {
+                Action::Say(RobotLine::Hello(Hello {
+                    clock_ms: Some(clock_ms),
+                    ..
+                })) => {
+                    self.signed_ms = Some(clock_ms);
+                    self.signs += 1;
+                    continue;
+                }
                 Action::Say(line) => to_line(&line).expect("it fits").trim_end().to_owned(),
                 Action::HangUp(_) => "[hangs up]".into(),
                 Action::Map(map) => {
@@ -123,6 +148,7 @@ impl Robot {
                     assert_eq!(order.origin.get(), Some(Origin::Operator));
                     let renewed = self.steered == Some((order.id, order.code));
                     self.steered = Some((order.id, order.code));
+                    self.given_ns = order.given_ns;
                     match renewed {
                         true => format!("[renews {}]", order.code),
                         false => format!("[steers {}]", order.code),

@@ -280,7 +280,8 @@ impl Link<TcpStream> {
 fn answer(line: &str, command: OperatorCommand) -> Result<Option<String>> {
     let said = RobotLine::read(line).with_context(|| format!("this was said: {line:?}"))?;
     Ok(match said {
-        RobotLine::Hello(_) => Some("lager 1 bench".to_owned()),
+        // As a station of ours repeats it.
+        RobotLine::Hello(hello) => Some(hello.to_string()),
         RobotLine::Request(Request::Query(query)) => match query {
             Query::SideLength => Some("sidelength 40".to_owned()),
             Query::Map => Some("karta 2 2 0 0".to_owned()),

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use lager_benches::{BenchError, Domain, FAMILY, heed_interrupts, interrupted};
-use lager_ports::{Bus, StopPage, StopTold, StopWord};
+use lager_ports::{Bus, Stop, StopPage, StopTold, StopWord};
 use lager_topics::{Ask, AskKind, Role};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -131,8 +131,10 @@ impl Robot {
     /// Releases the stop that it has.
     pub(super) fn release(&self) -> Result<()> {
         self.wait("the stop to be released", || {
+            let stop = self.told()?.and_then(|told| told.stop());
             let answer = self.hands.ask(Ask {
                 kind: AskKind::Resume.into(),
+                stop_word: stop.map_or(0, Stop::word),
                 ..Ask::default()
             });
             Ok(answer.is_ok_and(|answer| answer.stopped == 0))

@@ -121,6 +121,7 @@ fn a_board_that_keeps_resetting_latches_the_stop_until_somebody_resumes() {
 
     let resume = Ask {
         kind: AskKind::Resume.into(),
+        stop_word: health.stop_word,
         ..Ask::default()
     };
     whole.ask(&resume);

@@ -61,7 +61,7 @@ fn what_moves_a_robot_or_how_it_drives_is_its_drivers_while_there_is_one() {
     anna.say("take r1 1");
     assert_eq!(anna.line("answer 1").unwrap(), "answer 1 done");
     let hers = [
-        "resume",
+        "resume 7",
         "mode manual",
         "pick auto",
         "picked",

@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use lager_lines::TooLate;
 use lager_lines::command::Wheels;
 use lager_lines::conversation::StationLine;
 use lager_lines::extension::{Action, Order};
 use lager_wire::{OperatorArm, OperatorCommand};
 
 use super::{ActRefused, Robot};
+use crate::given::Given;
 use crate::shown::{Reply, Told};
 use crate::wheel::{Key, LEASE};
 
@@ -17,11 +19,16 @@ impl Robot {
     ///
     /// # Errors
     ///
-    /// When it does not speak the extension, too many are unanswered, or only its driver may.
-    pub fn act(&mut self, action: Action) -> Result<(u32, StationLine), ActRefused> {
-        match action {
+    /// When it does not speak the extension, too many are unanswered, only its driver may, or it
+    /// comes too late.
+    pub fn act(
+        &mut self,
+        action: impl Into<Given<Action>>,
+    ) -> Result<(u32, StationLine), ActRefused> {
+        let Given { what, late } = action.into();
+        match what {
             Action::Drive { .. } | Action::Arm(_) => Err(ActRefused::NotDriver),
-            action => self.order(action),
+            action => self.order(action, late),
         }
     }
 
@@ -40,13 +47,19 @@ impl Robot {
     /// # Errors
     ///
     /// When he drives it no more, or as with [`Robot::act`].
-    pub fn drive(&mut self, key: Key, wheels: Wheels) -> Result<(u32, StationLine), ActRefused> {
+    pub fn drive(
+        &mut self,
+        key: Key,
+        wheels: impl Into<Given<Wheels>>,
+    ) -> Result<(u32, StationLine), ActRefused> {
+        let Given { what: wheels, late } = wheels.into();
         let drives = OperatorCommand::from(wheels) != OperatorCommand::Stop;
         self.word(key, Some(drives))?;
-        self.order(Action::Drive {
+        let action = Action::Drive {
             wheels,
             lease: LEASE,
-        })
+        };
+        self.order(action, late)
     }
 
     /// Its driver moves the arm by a step.
@@ -54,9 +67,14 @@ impl Robot {
     /// # Errors
     ///
     /// As with [`Robot::drive`].
-    pub fn arm(&mut self, key: Key, step: OperatorArm) -> Result<(u32, StationLine), ActRefused> {
+    pub fn arm(
+        &mut self,
+        key: Key,
+        step: impl Into<Given<OperatorArm>>,
+    ) -> Result<(u32, StationLine), ActRefused> {
+        let Given { what: step, late } = step.into();
         self.word(key, None)?;
-        self.order(Action::Arm(step))
+        self.order(Action::Arm(step), late)
     }
 
     /// Its driver is still there.
@@ -96,12 +114,18 @@ impl Robot {
         })
     }
 
-    fn order(&mut self, action: Action) -> Result<(u32, StationLine), ActRefused> {
+    fn order(&mut self, action: Action, late: Duration) -> Result<(u32, StationLine), ActRefused> {
         if self.hello.is_none() {
             return Err(ActRefused::Plain);
         }
+        TooLate::check(late, action.latest())?;
         let number = self.asked.open(self.now).ok_or(ActRefused::Full)?;
-        Ok((number, StationLine::Order(Order::Do { number, action })))
+        let order = Order::Do {
+            number,
+            late_ms: u32::try_from(late.as_millis()).unwrap_or(u32::MAX),
+            action,
+        };
+        Ok((number, StationLine::Order(order)))
     }
 
     /// Makes it stand whose driver is gone. Nobody waits for the answer.
@@ -112,7 +136,12 @@ impl Robot {
             lease: LEASE,
         };
         let number = self.asked.number();
-        Some(StationLine::Order(Order::Do { number, action }))
+        let late_ms = 0;
+        Some(StationLine::Order(Order::Do {
+            number,
+            late_ms,
+            action,
+        }))
     }
 
     pub(super) fn lose(&mut self, numbers: impl IntoIterator<Item = u32>) {

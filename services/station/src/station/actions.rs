@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use lager_lines::Name;
 use lager_lines::command::Wheels;
 use lager_lines::extension::Action;
+use lager_lines::{LATEST_MOVE, Name};
 use lager_wire::OperatorArm;
 
 use super::{Station, WishRefused};
+use crate::given::Given;
 use crate::robot::{ActRefused, Robot};
 use crate::shown::Told;
 use crate::wheel::Key;
@@ -30,7 +31,11 @@ impl Station {
     /// # Errors
     ///
     /// When it takes none, or it is its driver's to do that; see [`Robot::act`].
-    pub fn act(&mut self, name: &Name, action: Action) -> Result<u32, WishRefused> {
+    pub fn act(
+        &mut self,
+        name: &Name,
+        action: impl Into<Given<Action>>,
+    ) -> Result<u32, WishRefused> {
         let (number, line) = self.known(name)?.act(action)?;
         self.say(name, Some(line));
         Ok(number)
@@ -71,7 +76,12 @@ impl Station {
     /// # Errors
     ///
     /// When he drives it no more, or the robot takes no action.
-    pub fn drive(&mut self, name: &Name, key: Key, wheels: Wheels) -> Result<u32, WishRefused> {
+    pub fn drive(
+        &mut self,
+        name: &Name,
+        key: Key,
+        wheels: impl Into<Given<Wheels>>,
+    ) -> Result<u32, WishRefused> {
         let (number, line) = self.known(name)?.drive(key, wheels)?;
         self.say(name, Some(line));
         Ok(number)
@@ -82,7 +92,12 @@ impl Station {
     /// # Errors
     ///
     /// As with [`Station::drive`].
-    pub fn arm(&mut self, name: &Name, key: Key, step: OperatorArm) -> Result<u32, WishRefused> {
+    pub fn arm(
+        &mut self,
+        name: &Name,
+        key: Key,
+        step: impl Into<Given<OperatorArm>>,
+    ) -> Result<u32, WishRefused> {
         let (number, line) = self.known(name)?.arm(key, step)?;
         self.say(name, Some(line));
         Ok(number)
@@ -114,9 +129,15 @@ impl Station {
 /// Time, and what robots say.
 impl Station {
     /// Time has passed. To be called before anything else that happens at this moment, and at least
-    /// every 100 ms; it counts from any origin.
+    /// every 100 ms; it counts from any origin. Commands that have waited while the station was held
+    /// up are dropped.
     pub fn turn(&mut self, now: Duration) {
+        let pause = now.saturating_sub(self.now);
         self.now = now;
+        if pause > LATEST_MOVE {
+            self.forget_commands(pause);
+        }
+        self.watch_gag();
         let mut said = Vec::new();
         for (name, robot) in &mut self.robots {
             if let Some(line) = robot.turn(now) {

@@ -5,17 +5,25 @@
 //! does the `pickup_done` behind them (C5). The robot takes them before the GaG is asked for
 //! another one.
 
+use std::time::Duration;
+
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{Map, Name, Products, SideLength, Text};
+use lager_lines::{LATEST_MOVE, Map, Name, Products, SideLength, Text, TooLate};
 use lager_wire::OperatorCommand;
 
 use super::{Peer, Station};
 use crate::robot::{ActRefused, CommandRefused, Robot};
 use crate::warehouse::{StoredProduct, Warehouse, WarehouseError};
 
+/// How long a GaG whose robot does something by its word may leave unread what it is told, and when
+/// it is asked again that has read everything. So a robot stands within half a second when its GaG
+/// has frozen, and the shell looks every 50 ms.
+const UNREAD: Duration = LATEST_MOVE;
+const ASKED_AGAIN: Duration = LATEST_MOVE;
+
 /// What it says.
 impl Station {
-    pub(super) fn gag_said(&mut self, line: &str) {
+    pub(super) fn gag_said(&mut self, late: Duration, line: &str) {
         if self.gag.is_none() {
             return;
         }
@@ -23,6 +31,12 @@ impl Station {
             Ok(answer) => answer,
             Err(error) => return self.correct_gag(&error.to_string()),
         };
+        if let Err(why) = TooLate::check(late, answer.latest()) {
+            return self.correct_gag(&format!("{answer}: {why}"));
+        }
+        if let Some(why) = self.meant_for_another(&answer) {
+            return self.correct_gag(&why);
+        }
         if let Some(by) = self.other_driver(&answer) {
             return self.correct_gag(&ActRefused::Driven { by }.to_string());
         }
@@ -71,6 +85,88 @@ impl Station {
         }
         let name = self.gag.as_ref()?.robot.as_ref()?;
         self.robots.get(name)?.driver().map(str::to_owned)
+    }
+
+    /// Whether the GaG has read all that it has been told, and nothing waits that it has said. To be
+    /// told whenever it may have changed, and again and again.
+    pub fn gag_has_read(&mut self, all: bool) {
+        let Some(gag) = &mut self.gag else { return };
+        if all {
+            gag.unread = None;
+            if gag.robot.is_some() {
+                // It knows by now for whom it speaks.
+                gag.may_mean = None;
+            }
+        } else {
+            gag.unread.get_or_insert(self.now);
+        }
+    }
+
+    /// Whether somebody waits to learn what the GaG has read.
+    pub fn watches_gag(&self) -> bool {
+        let gag = self.gag.as_ref();
+        gag.is_some_and(|gag| gag.may_mean.is_some()) || self.drives_by_gag().is_some()
+    }
+
+    /// The robot that does something by the GaG's word.
+    fn drives_by_gag(&self) -> Option<&Name> {
+        let name = self.gag.as_ref()?.robot.as_ref()?;
+        let robot = self.robots.get(name)?;
+        robot.is_commanded().then_some(name)
+    }
+
+    /// Makes a robot stand whose GaG does not read. One that has read everything is asked again, so
+    /// that there is something to read.
+    pub(super) fn watch_gag(&mut self) {
+        let Some(name) = self.drives_by_gag().cloned() else {
+            return;
+        };
+        let Some(gag) = &mut self.gag else { return };
+        let since = |then: Duration| self.now.saturating_sub(then);
+        match gag.unread {
+            Some(unread) if since(unread) >= UNREAD => {
+                gag.unread = None;
+                let stands = self.robots.get_mut(&name).and_then(Robot::end_commands);
+                self.say(&name, stands);
+                let why = format!(
+                    "you have read nothing for {} ms, so the robot stands; give the command anew",
+                    UNREAD.as_millis()
+                );
+                self.put(Peer::Gag, &thought(&why));
+            }
+            None if since(gag.told) >= ASKED_AGAIN => {
+                if let Some(query) = gag.held.get() {
+                    self.put(Peer::Gag, &Request::Query(query));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Drops what has waited for robots while the station was held up for so long.
+    pub(super) fn forget_commands(&mut self, pause: Duration) {
+        let waited = |(name, robot): (&Name, &mut Robot)| {
+            let has_waited = robot.forget_commands();
+            has_waited.then(|| name.clone())
+        };
+        let waited: Vec<Name> = self.robots.iter_mut().filter_map(waited).collect();
+        for name in waited {
+            self.tell_gag_of(&name, &TooLate(pause).to_string());
+        }
+    }
+
+    /// Why this moves nobody: it may be meant for a robot for which the GaG speaks no more.
+    fn meant_for_another(&self, answer: &Answer) -> Option<String> {
+        let gag = self.gag.as_ref()?;
+        let before = gag.may_mean.as_ref()?;
+        let moves = answer.latest() < Duration::MAX;
+        let now = gag.robot.as_ref();
+        let now = now.map_or("for none".to_owned(), |now| format!("for {now}"));
+        moves.then(|| {
+            format!(
+                "{answer} may be meant for {before}; you speak {now} from now on, so give it anew"
+            )
+        })
     }
 
     /// It could not be saved; who described it is told.
@@ -130,13 +226,21 @@ impl Station {
 impl Station {
     /// Lets the GaG speak for the robot that has been connected for longest.
     pub(super) fn seat_gag(&mut self) {
-        let first = self.links.values().flatten().next().cloned();
+        let mut named = self.links.iter();
+        let first = named.find_map(|(link, name)| Some((*link, name.clone()?)));
         let Some(gag) = &mut self.gag else { return };
-        if gag.robot == first {
+        let (link, first) = first.unzip();
+        // A plain robot's name may be another one's by now, but no connection comes twice.
+        if gag.link == link && gag.robot == first {
             return;
         }
+        gag.link = link;
         let before = core::mem::replace(&mut gag.robot, first.clone());
-        before.into_iter().for_each(|name| self.unseat(&name));
+        if let Some(before) = before {
+            gag.may_mean = Some(before.clone());
+            gag.held.clear();
+            self.unseat(&before);
+        }
         let Some(name) = first else { return };
         let Some(robot) = self.robots.get_mut(&name) else {
             return;

@@ -114,11 +114,11 @@ fn a_robot_that_speaks_the_documents_language_alone_takes_no_actions() {
     station.connected(LINK);
     station.heard(LINK, Ok("styrcomm"));
     let plain = name("robot-1");
-    let refused = station.act(&plain, Action::Resume);
+    let refused = station.act(&plain, Action::Resume { stop: 7 });
     assert_eq!(refused, Err(ActRefused::Plain.into()));
     assert_eq!(station.stop(&plain), Ok(None));
     assert_eq!(said(&mut station), ["styrcomm 00000001"]);
-    let nobody = station.act(&name("r9"), Action::Resume);
+    let nobody = station.act(&name("r9"), Action::Resume { stop: 7 });
     assert_eq!(nobody, Err(WishRefused::NoRobot(name("r9"))));
 }
 

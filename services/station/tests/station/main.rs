@@ -7,5 +7,6 @@ mod extended;
 mod file;
 mod gag;
 mod handle;
+mod late;
 mod sockets;
 mod transcript;

@@ -274,6 +274,7 @@ impl Hands {
     pub(crate) fn resume(&self) -> Answer {
         self.ask(Ask {
             kind: AskKind::Resume.into(),
+            stop_word: self.stop_told().stop().map_or(0, Stop::word),
             ..Ask::default()
         })
     }

@@ -20,7 +20,7 @@ fn a_reset_is_done_when_logic_says_so_after_it() {
     );
     // What logic had said before is no answer.
     assert_eq!(robot.does(Phase::WaitingForOrder, None), [""; 0]);
-    assert_eq!(pass(&mut robot, 250), ["[presses ResetPressed]"]);
+    assert_eq!(pass(&mut robot, 250), [""; 0], "later it would come late");
     assert_eq!(robot.does(Phase::WaitingForOrder, None), ["done 1"]);
 }
 

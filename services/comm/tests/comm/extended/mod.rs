@@ -2,6 +2,7 @@
 
 mod asked;
 mod driven;
+mod late;
 mod ordered;
 mod told;
 

@@ -236,6 +236,7 @@ fn a_stop_and_a_failure_are_told_with_what_is_known_of_them() {
     robot.health.stop_cause = StopCause::BoardResets.into();
     robot.health.stop_origin = Role::Bridge.into();
     robot.health.stopped_at_ns = robot.now.ns - 30_000_000;
+    robot.health.stop_word = 9_223_372_036_854_775_809;
     robot.health.gain_p = 20;
     robot.health.gain_d = 3;
     robot.told();
@@ -253,7 +254,7 @@ fn a_stop_and_a_failure_are_told_with_what_is_known_of_them() {
     let age: u64 = age.split(' ').next().unwrap().parse().unwrap();
     assert!((30..=130).contains(&age), "{state}");
     for field in [
-        " stopped=1 stop_cause=board_resets stop_by=bridge stop_age_ms=",
+        " stopped=1 stop_cause=board_resets stop_by=bridge stop=9223372036854775809 stop_age_ms=",
         " failure=line_lost failure_expected=90 failure_seen=120 remedy=reset ",
         " gain_p=20 gain_d=3",
     ] {
