@@ -143,3 +143,23 @@ fn a_gag_that_freezes_while_it_drives_makes_the_robot_stand_and_learns_why() {
     };
     assert!(why.contains("so the robot stands"), "{why}");
 }
+
+#[test]
+fn a_reset_that_logic_finds_when_it_thaws_is_not_taken() {
+    let scene = Scene::new();
+    let station = Served::new(&scene);
+    let robot = Name::new("r1").expect("a name");
+    let reset = || {
+        let asked = station.handle.act(&robot, Action::Reset).ok()?;
+        asked.wait(WATCHDOG)
+    };
+    wait_for("a reset to be done", || {
+        (reset() == Some(Reply::Done)).then_some(())
+    });
+    let logic = Frozen::new(scene.up.service("logic").expect("it runs"));
+    let asked = station.handle.act(&robot, Action::Reset).expect("connected");
+    std::thread::sleep(FROZEN);
+    drop(logic);
+    let reply = asked.wait(WATCHDOG);
+    assert_ne!(reply, Some(Reply::Done));
+}

@@ -57,8 +57,10 @@ impl Desk {
     fn heard(&mut self, line: &str) {
         match Request::read(line) {
             Ok(Request::Query(query)) => {
+                // The station asks again to see that this one reads.
+                let is_again = self.held.get() == Some(query);
                 self.held.ask(query);
-                if !self.answer() {
+                if !self.answer() && !is_again {
                     self.told.push(format!("{query}: {}", hint(query)));
                 }
             }

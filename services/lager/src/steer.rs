@@ -95,7 +95,7 @@ impl Operator {
         let answer = self.hands.ask(Ask {
             kind: AskKind::Resume.into(),
             stop_word: before.map_or(0, Stop::word),
-            lifetime_ms: LATEST_MOVE.as_millis() as u32,
+            lifetime_ms: u32::try_from(LATEST_MOVE.as_millis())?,
             ..Ask::default()
         })?;
         match (answer.outcome.get(), before) {

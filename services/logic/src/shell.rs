@@ -58,6 +58,10 @@ const FRAME_PERIOD: Duration = Duration::from_millis(5);
 /// at that often.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
+/// How late a press may come that lets the robot move, in ns of real time: this process may have
+/// been held up.
+const LATEST_NS: u64 = 200_000_000;
+
 /// How long a predecessor's status is waited for, in real time.
 const RESUME_WAIT: Duration = Duration::from_millis(500);
 
@@ -267,6 +271,12 @@ impl Shell {
         }
         if self.waiter.has::<OperatorInput>() {
             while let Some((input, cause)) = self.next(|shell| shell.inputs.receive()) {
+                let age_ns = Clock::monotonic_ns().saturating_sub(input.stamp().publish_time_ns);
+                if age_ns > LATEST_NS && input.kind.get().is_some_and(lets_it_move) {
+                    let late_ms = age_ns / 1_000_000;
+                    tracing::warn!("{} came {late_ms} ms late and is not taken", input.kind);
+                    continue;
+                }
                 match input.kind.get() {
                     Some(kind @ (InputKind::PickupDone | InputKind::PickupForced)) => {
                         let order_id = input.order_id;
@@ -515,4 +525,15 @@ fn is_setpoint(order: Option<SteeringOrder>) -> bool {
     order
         .and_then(|order| Command::from_code(order.code))
         .is_some_and(|command| !command.is_one_shot())
+}
+
+/// Whether the robot may drive off when it has been told this.
+const fn lets_it_move(kind: InputKind) -> bool {
+    matches!(
+        kind,
+        InputKind::PickupDone
+            | InputKind::PickupForced
+            | InputKind::ResetPressed
+            | InputKind::Placed
+    )
 }

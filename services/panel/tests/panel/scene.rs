@@ -169,13 +169,16 @@ impl Page {
 pub(crate) struct Robot(pub(crate) Arc<Mutex<Vec<String>>>);
 
 impl Robot {
-    /// The actions that it was given.
+    /// The actions that it was given, without the numbers and without how long ago that was given.
     pub(crate) fn told(&self) -> Vec<String> {
         let told = self.0.lock().unwrap();
         let actions = told.iter().filter_map(|line| line.strip_prefix("do "));
         actions
             .filter_map(|action| action.split_once(' '))
-            .map(|(_, action)| action.to_owned())
+            .map(|(_, action)| match action.strip_prefix("late ") {
+                Some(late) => late.split_once(' ').unwrap().1.to_owned(),
+                None => action.to_owned(),
+            })
             .collect()
     }
 }
