@@ -130,6 +130,8 @@ fn a_gag_that_freezes_while_it_drives_makes_the_robot_stand_and_learns_why() {
         assert!(start.elapsed() < WATCHDOG, "the robot does not drive");
         if gag.waits_for(&["sidelength", "karta", "prodlis", "styrcomm"]) == "styrcomm" {
             gag.says("styrcomm 6");
+            // The wheels begin to turn in a moment.
+            std::thread::sleep(Duration::from_millis(50));
         }
     }
     // From here on it reads nothing, and its connection stays as it is.

@@ -34,8 +34,12 @@
 //!   `pickup_done` that nobody has asked for wait with Robert, as long as the robot asks for
 //!   commands at all. At most 32 wait, a stop takes their place, and what does not wait is refused
 //!   in a `thought` (C5).
-//! - A command that never ends by itself ends with its GaG: where the socket closes, Robert has the
-//!   robot stand.
+//! - A command that never ends by itself ends with its GaG: where the socket closes, or where what
+//!   GaG is told lies unread for 200 ms, Robert has the robot stand. So that a GaG that has frozen
+//!   is found, Robert repeats the question that is held while the robot moves by GaG's word, five
+//!   times a second; it wants one answer. A GaG that waits for its user reads on meanwhile.
+//! - What moves the robot counts for 200 ms: a command that Robert finds later, because he was held
+//!   up, is refused in a `thought`, and the question is asked again.
 //! - `pickup_done` is the answer to `armcomm` that ends the picking; the document has the signal
 //!   but no word for it (AMB-44).
 //! - The codes of commands are read in four forms and written in one; see
