@@ -175,7 +175,8 @@ impl Domain {
         wait_for(&format!("{args:?} to be renewed in time"), || {
             let output = self.run(args);
             let said = String::from_utf8_lossy(&output.stderr);
-            let late = said.contains("held up for") || said.contains("not renewed in time");
+            let late = ["held up for", "not renewed in time", "has not reported for"];
+            let late = late.iter().any(|why| said.contains(why));
             (!late).then_some(output)
         })
     }

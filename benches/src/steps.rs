@@ -269,7 +269,7 @@ pub fn steering() -> Arbiter {
 #[inline(always)]
 pub fn arbitrate(arbiter: &mut Arbiter, id: u32) -> Option<SteerCommand> {
     let now = Duration::from_millis(5);
-    let verdict = arbiter.order(now, now, black_box(&order(id)));
+    let verdict = arbiter.order(now, Duration::ZERO, black_box(&order(id)));
     assert_eq!(verdict, Verdict::Executes);
     arbiter.advance(now);
     arbiter.poll(now)

@@ -4,7 +4,7 @@
 
 use core::time::Duration;
 
-use lager_topics::{Request, Topic};
+use lager_topics::{Request, Stamp, Topic};
 
 use crate::any::AnyPublisher;
 use crate::bus::Bus;
@@ -86,15 +86,19 @@ impl Bus {
         Keeper::new(self)
     }
 
-    /// The last value, from before this process's restart, of a topic that it writes itself. Waits
-    /// at most `timeout` of real time. `None`: the topic can be read, and no value was kept.
+    /// The last value, from before this process's restart, of a topic that it writes itself, and the
+    /// stamp that it was published with: how old it is decides what may be taken up. Waits at most
+    /// `timeout` of real time. `None`: the topic can be read, and no value was kept.
     ///
     /// Call it before making the topic's publisher.
     ///
     /// # Errors
     /// The topic cannot be read, so it is not known whether a value was kept; faults that pass were
     /// waited for. A process that must resume from that value must not take this for a first start.
-    pub fn kept<T: Topic>(&self, timeout: Duration) -> Result<Option<T::Payload>, KeptError> {
+    pub fn kept<T: Topic>(
+        &self,
+        timeout: Duration,
+    ) -> Result<Option<(T::Payload, Stamp)>, KeptError> {
         kept::kept::<T>(self, timeout)
     }
 }

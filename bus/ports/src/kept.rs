@@ -6,7 +6,7 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use lager_topics::Topic;
+use lager_topics::{Stamp, Topic};
 
 use crate::bus::Bus;
 use crate::error::{PortError, ReceiveError};
@@ -55,7 +55,7 @@ const PAUSE: Duration = Duration::from_millis(10);
 pub(crate) fn kept<T: Topic>(
     bus: &Bus,
     timeout: Duration,
-) -> Result<Option<T::Payload>, KeptError> {
+) -> Result<Option<(T::Payload, Stamp)>, KeptError> {
     let start = Instant::now();
     let mut attempt = 1;
     loop {
@@ -77,7 +77,7 @@ fn look_for<T: Topic>(
     bus: &Bus,
     start: Instant,
     timeout: Duration,
-) -> Result<Option<T::Payload>, KeptError> {
+) -> Result<Option<(T::Payload, Stamp)>, KeptError> {
     let mut subscriber = Subscriber::<T>::new(bus)?;
     loop {
         let unreadable = |fault| KeptError::Unreadable {
@@ -85,7 +85,7 @@ fn look_for<T: Topic>(
             fault,
         };
         match subscriber.latest() {
-            Ok(Some(sample)) => return Ok(Some(*sample)),
+            Ok(Some(sample)) => return Ok(Some((*sample, *sample.stamp()))),
             Ok(None) => (),
             Err(ReceiveError::Transport(fault)) => return Err(unreadable(fault)),
             Err(ReceiveError::TooManyHeld { .. }) => return Err(unreadable(TransportFault::Limit)),

@@ -5,9 +5,11 @@
 
 use lager_topics::Health;
 
-/// A press that is older than this no longer counts, in real ns: the person who pressed has given
-/// it up.
-const LONGEST_NS: u64 = 1_000_000_000;
+use crate::arbiter::STALE;
+
+/// A press that is older than this no longer counts, in real ns: it lets the robot move, and the
+/// person who pressed has given it up.
+const LONGEST_NS: u64 = STALE.as_nanos() as u64 + 1;
 
 /// The presses taken last.
 #[derive(Clone, Copy, Debug, Default)]

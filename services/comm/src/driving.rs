@@ -15,12 +15,13 @@
 //! further action renews it; then the robot is made to stand.
 //!
 //! Whoever was held up for as long as the bridge's lease of 120 ms has lost the command, and does
-//! not take it up again.
+//! not take it up again. Nor is it renewed when the steering board has not reported for 200 ms:
+//! bridge or board may have gone, and what comes in its place must not move the robot by it.
 
 use core::time::Duration;
 
 use lager_topics::{Finish, Health, Origin, Refusal, SteeringOrder, SteeringReport};
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Version};
 
 use crate::moment::Moment;
 
@@ -29,6 +30,9 @@ const RENEWAL: Duration = Duration::from_millis(40);
 
 /// Its lease in the bridge, in robot time.
 const LEASE: Duration = Duration::from_millis(120);
+
+/// How long the steering board may be silent, in robot time: the bridge then lets nothing move.
+const UNHEARD: Duration = Duration::from_millis(200);
 
 /// The longest that a one-shot may take, in robot time: no turn and no step of the arm takes half.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -65,6 +69,8 @@ struct Running {
     order: SteeringOrder,
     begun: Duration,
     renewed: Duration,
+    /// When the steering board reported last, or when this began.
+    heard: Duration,
     /// The actions that have not been answered yet.
     unanswered: Vec<u32>,
     /// When it is over unless it is renewed, in real time.
@@ -109,6 +115,7 @@ impl Driving {
             order,
             begun: now.robot,
             renewed: now.robot,
+            heard: now.robot,
             unanswered: number.into_iter().collect(),
             until_ns: None,
             is_refused: false,
@@ -194,6 +201,15 @@ impl Driving {
             self.end(&why);
             return None;
         }
+        let unheard = now.saturating_sub(running.heard);
+        if unheard >= UNHEARD {
+            let why = format!(
+                "is over: the steering board has not reported for {} ms; give it anew",
+                unheard.as_millis()
+            );
+            self.end(&why);
+            return None;
+        }
         if running.is_one_shot() && now.saturating_sub(running.begun) >= LONGEST {
             self.end("does not come to its end");
             return None;
@@ -210,11 +226,14 @@ impl Driving {
         Some(running.order)
     }
 
-    /// The board has reported.
-    pub(crate) fn reported(&mut self, report: &SteeringReport) {
+    /// The bridge has told what the board does.
+    pub(crate) fn reported(&mut self, now: Duration, report: &SteeringReport) {
         let Some(running) = &mut self.running else {
             return;
         };
+        if report.age_ms == 0 {
+            running.heard = now;
+        }
         let id = running.order.id;
         let is_own = |origin: Option<Origin>, told| origin == Some(Origin::Operator) && told == id;
         let has_begun = is_own(report.current_origin.get(), report.current_id);
@@ -242,10 +261,14 @@ impl Driving {
     }
 
     /// The bridge has told who may steer.
-    pub(crate) fn refused(&mut self, health: &Health) {
-        let Some(running) = &self.running else {
+    pub(crate) fn refused(&mut self, now: Duration, health: &Health) {
+        let Some(running) = &mut self.running else {
             return;
         };
+        // An original board reports nothing, so its bridge has to do.
+        if health.steering.up != 0 && health.steering.version == Version::Original as u8 {
+            running.heard = now;
+        }
         let is_own = health.refused_origin.get() == Some(Origin::Operator)
             && health.refused_id == running.order.id;
         match health.refusal.get().filter(|_| is_own) {

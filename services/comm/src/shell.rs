@@ -138,6 +138,7 @@ impl Shell {
             }),
             false => None,
         };
+        let kept = kept.map(|(map, _)| map);
         watchdog.enter("opening the bells");
         let waiter = bus.waiter(Policy::Block)?;
         let shell = Self {

@@ -50,7 +50,7 @@ pub fn run(bus: &Bus, config: &Config, resume: bool, shutdown: &Shutdown) -> Res
     let truth = bus.publisher::<TruthPose>()?;
     let hands = bus.server::<WorldRequest>()?;
     let warehouse = config.warehouse()?;
-    let mut emulator = Emulator::start(config, kept.as_ref())?;
+    let mut emulator = Emulator::start(config, kept.as_ref().map(|(truth, _)| truth))?;
     while !shutdown.is_requested() {
         let mut heard = Ok(true);
         hands.serve(|ask| {

@@ -132,9 +132,9 @@ mod tests {
             let blocks = bus.kept::<NavBlocks>(wait).expect("readable");
             let queue = bus.kept::<MissionQueue>(wait).expect("readable");
             (
-                status.map(|status| status.x),
-                blocks.map(|blocks| blocks.width),
-                queue.map(|queue| queue.order_id),
+                status.map(|(status, _)| status.x),
+                blocks.map(|(blocks, _)| blocks.width),
+                queue.map(|(queue, _)| queue.order_id),
             )
         });
         while !successor.is_finished() {

@@ -8,7 +8,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow, bail};
-use lager_bridge::arbiter::LEASE;
+use lager_bridge::arbiter::{LEASE, REPORT_DEADLINE};
 use lager_lines::LATEST_MOVE;
 use lager_ports::{Bus, BusConfig, Clock, Stop, Subscriber};
 use lager_topics::{
@@ -16,7 +16,7 @@ use lager_topics::{
     Mode, NavStatus, NavigatorStatus, Origin, Outcome, Phase, Pick, Refusal, Role, SteeringOrder,
     SteeringState, StopCause, Topic,
 };
-use lager_wire::OperatorCommand;
+use lager_wire::{OperatorCommand, Version};
 
 use crate::config::Config;
 use crate::hands::Hands;
@@ -320,6 +320,8 @@ impl Operator {
         let mut ended = None;
         let mut heard = None;
         let mut renewed = clock.now();
+        // When the steering board reported last.
+        let mut reported = renewed;
         while end.is_none_or(|end| clock.now() < end) {
             // This process was stopped and continued, or kept from its core: the order that it
             // renewed is over.
@@ -337,6 +339,9 @@ impl Operator {
                 break;
             }
             if let Some(report) = state.latest()? {
+                if report.age_ms == 0 {
+                    reported = clock.now();
+                }
                 let own =
                     |origin: Option<Origin>, id| origin == Some(Origin::Operator) && id == order.id;
                 accepted |= own(report.current_origin.get(), report.current_id);
@@ -346,6 +351,10 @@ impl Operator {
             }
             if let Some(health) = self.health.latest()?.map(|health| *health) {
                 heard = Some(Instant::now());
+                // An original board reports nothing, so its bridge has to do.
+                if health.steering.up != 0 && health.steering.version == Version::Original as u8 {
+                    reported = clock.now();
+                }
                 if health.refused_origin.get() == Some(Origin::Operator)
                     && health.refused_id == order.id
                     && let Some(why) = health.refusal.get()
@@ -367,8 +376,15 @@ impl Operator {
                     Some(finish) => bail!("`{name}` {finish}"),
                 }
             }
-            if self.patience.is_silent(heard) {
-                bail!("the bridge has fallen silent; the robot stands by itself");
+            // Bridge or board may have gone, and what comes in its place must not move the robot by
+            // an order that was given before.
+            let unheard = clock.now().saturating_sub(reported);
+            if unheard >= REPORT_DEADLINE {
+                bail!(
+                    "the steering board has not reported for {} ms, so the robot stands; give it \
+                     anew",
+                    unheard.as_millis()
+                );
             }
             if !accepted && self.patience.is_over() {
                 bail!("the robot does not carry out `{name}`; `lager doctor` looks for the cause");

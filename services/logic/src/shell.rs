@@ -103,10 +103,11 @@ pub fn run(bus: &Bus, config: &LogicConfig, shutdown: &Shutdown) -> Result<(), P
 /// What an earlier navigator has left. If it cannot be read, for whatever reason, the robot may be
 /// anywhere.
 fn kept<T: Topic>(bus: &Bus) -> Option<T::Payload> {
-    bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
+    let kept = bus.kept::<T>(RESUME_WAIT).unwrap_or_else(|error| {
         tracing::warn!("the earlier navigator's {} is lost: {error}", T::NAME);
         None
-    })
+    });
+    kept.map(|(value, _)| value)
 }
 
 struct Shell {

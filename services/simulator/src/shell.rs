@@ -91,7 +91,7 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
         ..RobotOptions::default()
     };
     let mut robot = Robot::new(&config.warehouse, options)?;
-    if let Some(kept) = &kept {
+    if let Some((kept, _)) = &kept {
         robot.resume(&world_state(kept));
         tracing::info!(
             seconds = robot.now().as_secs_f64(),

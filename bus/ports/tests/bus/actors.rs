@@ -286,7 +286,8 @@ fn a_state_that_is_handed_over_reaches_the_successor_and_both_kinds_of_readers()
         }
         kept.join().unwrap().unwrap()
     });
-    assert_eq!(kept.unwrap().bus_lost, 7);
+    let (health, stamp) = kept.unwrap();
+    assert_eq!((health.bus_lost, stamp.source_time_ns), (7, 1234));
     for reader in &mut readers {
         let sample = reader.latest().unwrap().unwrap();
         assert_eq!((sample.bus_lost, sample.stamp().source_time_ns), (7, 1234));

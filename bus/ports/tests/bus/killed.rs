@@ -188,7 +188,7 @@ fn the_last_value_of_a_killed_service_is_handed_to_its_successor() {
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let bus = domain.open(Role::Logic);
-            let kept = bus.kept::<NavStatus>(LONG).unwrap().unwrap();
+            let (kept, _) = bus.kept::<NavStatus>(LONG).unwrap().unwrap();
             assert_eq!(kept.order_id, 7);
             let publisher = bus.publisher::<NavStatus>().unwrap();
             let status = NavigatorStatus {

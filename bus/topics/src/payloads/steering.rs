@@ -124,8 +124,8 @@ payload! {
     /// [`StopCause`](super::StopCause).
     pub struct SteeringOrder: 16 bytes {
         /// When a person first gave the order of this id, in ns of `CLOCK_MONOTONIC`; renewals
-        /// repeat it. An order that is not in force is begun within a second of it or never.
-        /// Without meaning for logic's orders.
+        /// repeat it. An order that is not in force is begun within 200 ms of it or never. Without
+        /// meaning for logic's orders, which are as old as their sample.
         pub given_ns: u64,
         /// The same id renews the lease, a new id executes.
         pub id: u32,

@@ -28,8 +28,8 @@ impl Arbiter {
             return;
         };
         let by_person = over.key.origin == Origin::Operator;
-        let given_up = matches!(finish, Finish::NoWord | Finish::NoTape);
-        if over.command.is_one_shot() || finish == Finish::Refused || by_person || given_up {
+        // To stand is never too late, and logic stands by one order for as long as it likes.
+        if over.command != STANDBY || finish == Finish::Refused || by_person {
             let key = over.key;
             self.ledger.enter(Ended { key, finish });
         }

@@ -9,7 +9,7 @@ use lager_topics::{Finish, Health, Mode, Origin, Refusal, SteeringReport};
 use lager_wire::Command;
 
 use super::driven::Driven;
-use super::lease::Lease;
+use super::lease::{LEASE, Lease};
 use super::ledger::{Ended, OrderKey};
 use super::{Arbiter, Grant, Running, moves};
 
@@ -17,9 +17,13 @@ impl Arbiter {
     /// Goes on where an earlier life of the bridge ended: mode, latch, counters, and which order
     /// belongs to which sequence byte.
     ///
-    /// Nothing is written for the order in force until its origin renews it. If the origin does not
-    /// within [`LEASE`], the order lapses. Until then the board's own limit of 150 ms protects.
-    pub fn resume(kept: &Health) -> Self {
+    /// The state was published at `published` (robot time). Nothing is written for the order in
+    /// force until its origin renews it while the board is up. If that has not come about [`LEASE`]
+    /// after `published`, the order ends as any whose lease is over, and its id is used up: what has
+    /// stood meanwhile is not set in motion again. A one-shot is only looked for in the board's
+    /// reports, so it is given [`LEASE`] from now on. Until then the board's own limit of 150 ms
+    /// protects.
+    pub fn resume(kept: &Health, published: Duration) -> Self {
         let mut arbiter = Self {
             mode: kept.mode.get().unwrap_or(Mode::Manual),
             mode_is_chosen: kept.mode_chosen != 0,
@@ -64,7 +68,7 @@ impl Arbiter {
                 command,
                 seq: kept.wire_seq,
                 arm_granted: false,
-                lease: Lease::Unclaimed(None),
+                lease: Lease::Unclaimed((!command.is_one_shot()).then_some(published + LEASE)),
                 held_until: None,
                 written: Some(Duration::ZERO),
                 search: None,

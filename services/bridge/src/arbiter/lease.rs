@@ -13,7 +13,8 @@ pub(super) enum Lease {
     /// Until this moment.
     Until(Duration),
     /// Taken up from an earlier life of the bridge: nothing is written for it until its origin
-    /// renews it, and it lapses at this moment (known after the first `advance`).
+    /// renews it, and it lapses at this moment. That of what is only looked for in the board's
+    /// reports is counted from the first `advance`.
     Unclaimed(Option<Duration>),
 }
 

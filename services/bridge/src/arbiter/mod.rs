@@ -21,10 +21,13 @@
 //!   extend it.
 //! * **Setpoints and one-shots**: a setpoint (drive, standby) is a level. A one-shot (turn, arm
 //!   step) is an event: however it ended, its id is used up.
-//! * **Nothing comes back by itself.** A person's order is carried out when it is given or never.
-//!   If it is not allowed then, or if it has ended for any reason (lease, stop, mode, a board that
-//!   was reset or away), its id is used up and a renewal moves nothing. Logic looks before it goes
-//!   on, so its setpoint is taken up again once it is allowed.
+//! * **Nothing comes back by itself.** An order that has ended for any reason (lease, stop, mode, a
+//!   board that was reset or away, a pause of this process, the death of the one before) has its id
+//!   used up, and a renewal moves nothing, whoever gave it. Its origin hears the end, looks, and
+//!   gives a new one.
+//! * **Nothing comes late.** An order begins within [`STALE`] of the moment when its person gave it
+//!   or logic sent it last, or never. A person's order that is not allowed at once is used up, too;
+//!   logic's may begin once it is allowed.
 //! * **No motion unseen**: unless the steering board has reported within [`REPORT_DEADLINE`], every
 //!   order that moves something ends, and no origin may move anything. An original board does not
 //!   report and has no limit on a command's age. So it gets only standby, unless the configuration
@@ -73,9 +76,10 @@ pub use verdict::Verdict;
 /// How long the steering board may be silent before no origin may move anything, in robot time.
 pub const REPORT_DEADLINE: Duration = Duration::from_millis(200);
 
-/// The time within which a person's order must begin after it was given, in robot time; later it is
-/// refused. A process that was held up for longer must not move the robot when it goes on.
-pub const STALE: Duration = Duration::from_secs(1);
+/// The time within which what moves the robot, or lets it move, must be read after it was given, in
+/// real time; later it is refused. A process that was held up for longer must not move the robot
+/// when it goes on.
+pub const STALE: Duration = Duration::from_millis(200);
 
 /// When the command in force is written again to a version-1 board at the latest, so that its age
 /// stays below the board's limit of 150 ms.
@@ -295,6 +299,12 @@ impl Arbiter {
     /// Counts what a person has driven until `now`.
     fn count_driven(&mut self, now: Duration) {
         self.driven.advance(now, self.mode == Mode::Manual);
+    }
+
+    /// This process was held up for [`LEASE`] or longer until `now`: ends what was in force before,
+    /// whatever renewals have come meanwhile. To be called before they are handed in.
+    pub fn wake(&mut self, now: Duration) {
+        self.expire(now);
     }
 
     /// Says whether the arm may be moved, from the next order on.

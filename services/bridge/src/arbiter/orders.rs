@@ -14,12 +14,12 @@ use super::verdict::Verdict;
 use super::{Arbiter, ArmGate, Grant, Running, STALE, STANDBY, moves};
 
 impl Arbiter {
-    /// Takes one order that its origin sent at `sent` and, if it is a person's, first gave at
-    /// `given` (robot time, at most the present).
+    /// Takes one order that its origin sent at `sent` (robot time, at most the present). It is as
+    /// old as `age` says (real time): since a person first gave it, or since logic sent it.
     ///
     /// Hand in everything that has arrived before asking [`Arbiter::poll`] for what to write:
     /// then of several setpoints only the last is written.
-    pub fn order(&mut self, sent: Duration, given: Duration, order: &SteeringOrder) -> Verdict {
+    pub fn order(&mut self, sent: Duration, age: Duration, order: &SteeringOrder) -> Verdict {
         // Judge it against the order that was in force when it was sent.
         self.expire(sent);
         let Some(origin) = order.origin.get() else {
@@ -43,7 +43,7 @@ impl Arbiter {
         let Some(command) = Command::from_code(order.code) else {
             return self.refuse(key, Refusal::Undefined);
         };
-        if let Some(verdict) = self.objection(sent, given, key, command) {
+        if let Some(verdict) = self.objection(sent, age, key, command) {
             return verdict;
         }
         let as_guest = self.mode == Mode::Autonomous && origin == Origin::Operator;
@@ -66,6 +66,10 @@ impl Arbiter {
             }
             running.arm_granted = order.arm_granted != 0;
             let claimed = matches!(running.lease, Lease::Unclaimed(_));
+            if claimed && self.board.is_none() && !running.command.is_one_shot() {
+                // Nothing can be written for it yet, and it must not lie in wait for the board.
+                return Some(Verdict::Renewed);
+            }
             running.lease.renew(received);
             if claimed {
                 self.claim(received);
@@ -96,7 +100,7 @@ impl Arbiter {
     fn objection(
         &mut self,
         sent: Duration,
-        given: Duration,
+        age: Duration,
         key: OrderKey,
         command: Command,
     ) -> Option<Verdict> {
@@ -111,7 +115,8 @@ impl Arbiter {
             Mode::Manual => by_person,
             Mode::Autonomous => !by_person || (is_arm && self.arm_is_granted()),
         };
-        let board = self.board_objection(sent).filter(|_| command != STANDBY);
+        let moves_it = command != STANDBY;
+        let board = self.board_objection(sent).filter(|_| moves_it);
         // A person must give a refused order again; logic's renewals may count later.
         let why = if logic_only && by_person {
             Refusal::LogicOnly
@@ -119,7 +124,7 @@ impl Arbiter {
             Refusal::NotInCharge
         } else if self.stopped {
             Refusal::StopLatched
-        } else if by_person && sent.saturating_sub(given) > STALE {
+        } else if moves_it && age > STALE {
             Refusal::Stale
         } else if let Some(why) = board {
             why

@@ -129,8 +129,9 @@ impl Arbiter {
         let failsafe = report.flags.contains(SteerFlags::FAILSAFE) && moves(running.command);
         let old = |written| now.saturating_sub(written) >= COMMAND_AGE;
         if failsafe && !running.command.is_one_shot() && running.written.is_some_and(old) {
-            // The board gave the command up for its age, but its origin still wants it.
-            self.reseat();
+            // The board gave the command up for its age and stands. It does not set off again by
+            // an order that was given before.
+            self.finish_running(Finish::Aborted);
         }
     }
 

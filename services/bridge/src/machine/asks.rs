@@ -10,6 +10,7 @@ use lager_wire::{Callsign, SettingKey, Version};
 
 use super::action::News;
 use super::{Asked, BridgeCore};
+use crate::arbiter::STALE;
 use crate::events::Moment;
 use crate::settings::{self, Progress};
 
@@ -17,9 +18,17 @@ impl BridgeCore {
     /// Begins to carry out a request.
     pub fn ask(&mut self, now: Moment, ask: &Ask) {
         use Asked::Answered;
+        self.wake(now.robot);
+        // What lets the robot move comes at once or not at all.
+        let lets_move = match ask.kind.get() {
+            Some(AskKind::Resume | AskKind::Begin) => true,
+            Some(AskKind::SetMode) => ask.mode.get() == Some(Mode::Autonomous),
+            _ => false,
+        };
+        let is_stale = now.ns.abs_diff(ask.issued_ns) > STALE.as_nanos() as u64;
         self.asked = Some(match (ask.kind.get(), ask.mode.get()) {
             // The asker or this process was held up, and no process waits for the effect any more.
-            (kind, _) if ask.is_over(now.ns) => {
+            (kind, _) if ask.is_over(now.ns) || (lets_move && is_stale) => {
                 self.say(News::Late(kind));
                 Answered(Outcome::Late)
             }

@@ -46,7 +46,7 @@ use lager_wire::{
 
 pub use action::{Action, News, ShownReport, Write};
 
-use crate::arbiter::{Arbiter, Ended, OrderKey, Verdict};
+use crate::arbiter::{Arbiter, Ended, LEASE, OrderKey, Verdict};
 use crate::boards::Boards;
 use crate::calibration::Calibration;
 use crate::events::Moment;
@@ -112,6 +112,8 @@ pub struct BridgeCore {
     writes_first: bool,
     told: Told,
     health_due: Duration,
+    /// When something was handed in last, or asked for.
+    awake: Option<Duration>,
 }
 
 /// A request under way.
@@ -195,12 +197,16 @@ fn packet_time(baud: u32) -> Duration {
 }
 
 impl BridgeCore {
-    /// A bridge that goes on where an earlier one ended, if that bridge's state was kept.
+    /// A bridge that goes on where an earlier one ended, if that bridge's state was kept: what it
+    /// published last, and when (robot time).
     ///
     /// A stop that was latched then is not taken over: the stop word decides, and the caller sets
     /// it again if it is clear.
-    pub fn new(options: CoreOptions, kept: Option<&Health>) -> Self {
-        let mut arbiter = kept.map_or_else(Arbiter::new, Arbiter::resume);
+    pub fn new(options: CoreOptions, kept: Option<(&Health, Duration)>) -> Self {
+        let mut arbiter = kept.map_or_else(Arbiter::new, |(kept, published)| {
+            Arbiter::resume(kept, published)
+        });
+        let kept = kept.map(|(kept, _)| kept);
         arbiter.resume_from_stop();
         arbiter.drive_original_boards(options.original_boards);
         arbiter.pace(packet_time(options.baud));
@@ -243,25 +249,38 @@ impl BridgeCore {
                 shown: SteeringReport::default(),
             },
             health_due: Duration::ZERO,
+            awake: None,
             arbiter,
         }
     }
 
-    /// Takes an order that its origin sent at `sent` and first gave at `given`, in robot time at
-    /// most the present; the order that it has put in force.
+    /// Notices a pause of this process: whatever comes after it, and whatever was decided before it
+    /// and not done yet, moves nothing by an order of before.
+    fn wake(&mut self, now: Duration) {
+        let before = self.awake.replace(now).unwrap_or(now);
+        if now.saturating_sub(before) >= LEASE {
+            self.arbiter.wake(now);
+        }
+    }
+
+    /// Takes an order that its origin sent at `sent`, in robot time at most `now`, and that is as
+    /// old as `age` says ([`Arbiter::order`]); the order that it has put in force.
     pub fn order(
         &mut self,
+        now: Duration,
         sent: Duration,
-        given: Duration,
+        age: Duration,
         order: &SteeringOrder,
     ) -> Option<OrderKey> {
-        let verdict = self.arbiter.order(sent, given, order);
+        self.wake(now);
+        let verdict = self.arbiter.order(sent, age, order);
         let (key, _) = self.arbiter.current()?;
         (verdict == Verdict::Executes).then_some(key)
     }
 
     /// The switch was pressed at `pressed_ns` of `CLOCK_MONOTONIC`, which changes the mode.
     pub fn press(&mut self, now: Moment, id: u32, pressed_ns: u64) {
+        self.wake(now.robot);
         if self.presses.take(id, pressed_ns, now.ns) {
             let mode = match self.arbiter.mode() {
                 Mode::Manual => Mode::Autonomous,
@@ -316,6 +335,7 @@ impl BridgeCore {
 
     /// All that has come in this turn was handed in: lets time pass and settles what is due.
     pub fn decide(&mut self, now: Duration) {
+        self.wake(now);
         self.arbiter.advance(now);
         self.hear_answer(now);
         self.tells = self.arbiter.revision() != self.told.health || self.health_due <= now;
@@ -325,8 +345,10 @@ impl BridgeCore {
         self.stage = Stage::Health;
     }
 
-    /// What to do now; ask until there is nothing.
+    /// What to do now; ask until there is nothing, each time with the present moment: this process
+    /// may have been held up since it asked last.
     pub fn next(&mut self, now: Moment) -> Option<Action> {
+        self.wake(now.robot);
         loop {
             // The actions of one stage are carried out before the next stage.
             if let Some(action) = self.at_once(now) {

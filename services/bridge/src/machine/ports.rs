@@ -16,6 +16,7 @@ use crate::frames::ServoTable;
 impl BridgeCore {
     /// Takes what has happened at the port at `place`, 0 or 1.
     pub fn port(&mut self, now: Moment, place: usize, event: PortEvent) {
+        self.wake(now.robot);
         match event {
             PortEvent::Opened => self.transmitters[place] = HostTransmitter::new(),
             PortEvent::Lost => {

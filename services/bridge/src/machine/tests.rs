@@ -109,14 +109,25 @@ fn turn(core: &mut BridgeCore, millis: u64) -> Vec<(&'static str, Option<u8>)> {
 }
 
 fn order(core: &mut BridgeCore, millis: u64, id: u32, command: WheelCommand) {
+    assert!(order_at(core, millis, millis, id, command).is_some());
+}
+
+/// A person's order that was sent at `sent` and is read at `millis`.
+fn order_at(
+    core: &mut BridgeCore,
+    millis: u64,
+    sent: u64,
+    id: u32,
+    command: WheelCommand,
+) -> Option<OrderKey> {
     let order = SteeringOrder {
         id,
         origin: Origin::Operator.into(),
         code: Command::Wheel(command).code(),
         ..SteeringOrder::default()
     };
-    let now = at(millis).robot;
-    assert!(core.order(now, now, &order).is_some());
+    let [now, sent] = [millis, sent].map(|ms| at(ms).robot);
+    core.order(now, sent, now - sent, &order)
 }
 
 fn code(command: WheelCommand) -> Option<u8> {
@@ -194,7 +205,8 @@ fn a_request_whose_asker_has_given_up_changes_nothing() {
         (1_002, 1_502, Outcome::Late, Mode::Manual),
         // A time that has not come yet is none of this machine's clock.
         (1_502, 1_002, Outcome::Late, Mode::Manual),
-        (1_002, 1_501, Outcome::Done, Mode::Autonomous),
+        (1_002, 1_203, Outcome::Late, Mode::Manual),
+        (1_002, 1_202, Outcome::Done, Mode::Autonomous),
     ] {
         let mut core = core();
         core.ask(at(found), &ask(asked));
@@ -206,6 +218,54 @@ fn a_request_whose_asker_has_given_up_changes_nothing() {
         );
         assert_eq!(core.mode(), mode, "asked at {asked}, found at {found}");
     }
+}
+
+#[test]
+fn what_lets_the_robot_move_is_asked_for_at_once_or_not_at_all() {
+    let asks = [
+        (AskKind::Resume, Mode::Manual, Outcome::Late),
+        (AskKind::Begin, Mode::Manual, Outcome::Late),
+        (AskKind::SetMode, Mode::Autonomous, Outcome::Late),
+        (AskKind::SetMode, Mode::Manual, Outcome::Done),
+    ];
+    for (kind, mode, outcome) in asks {
+        let ask = Ask {
+            issued_ns: at(1_002).ns,
+            lifetime_ms: 500,
+            kind: kind.into(),
+            mode: mode.into(),
+            ..Ask::default()
+        };
+        for (found, outcome) in [(1_202, Outcome::Done), (1_203, outcome)] {
+            let mut core = core();
+            core.ask(at(found), &ask);
+            for action in std::iter::from_fn(|| core.next(at(found))).collect::<Vec<_>>() {
+                if matches!(action, Action::Release) {
+                    core.released(true);
+                }
+            }
+            let answer = core.answer().expect("an answer at once");
+            assert_eq!(answer.outcome, outcome, "{kind:?}, found at {found}");
+        }
+    }
+}
+
+#[test]
+fn what_was_decided_before_a_pause_is_not_written_after_it() {
+    let mut core = core();
+    order(&mut core, 1_002, 1, FORWARD);
+    core.decide(at(1_002).robot);
+    // The process is frozen between its decision and the first action.
+    let done: Vec<_> = std::iter::from_fn(|| step(&mut core, 1_502)).collect();
+    let commands: Vec<_> = done.iter().filter(|(what, _)| *what == "command").collect();
+    assert!(
+        commands.iter().all(|(_, told)| *told == code(STANDBY)),
+        "{done:?}"
+    );
+    // What lay in its queue meanwhile is of before, too.
+    order_at(&mut core, 1_503, 1_042, 1, FORWARD);
+    let done = turn(&mut core, 1_503);
+    assert!(!done.contains(&("command", code(FORWARD))), "{done:?}");
 }
 
 #[test]
@@ -244,7 +304,7 @@ fn a_robot_that_begins_by_itself_leaves_the_mode_that_somebody_has_set() {
     // The bridge's successor knows that it was set.
     let mut kept = Health::default();
     core.fill_health(at(1_002).robot, &crate::Counts::default(), &mut kept);
-    let mut heir = BridgeCore::new(options(), Some(&kept));
+    let mut heir = BridgeCore::new(options(), Some((&kept, at(1_002).robot)));
     assert_eq!(done(&mut heir, &begin), Mode::Manual);
 }
 

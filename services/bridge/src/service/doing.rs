@@ -13,11 +13,14 @@ use crate::serial::{PacketWriter, Sent};
 impl Service<'_> {
     /// Does what there is to do, one action after the other, and looks at the stop word before each
     /// and after the last.
-    pub(super) fn act(&mut self, now: Moment) {
+    /// Each is decided upon at the moment of its own: what was decided before this process was
+    /// frozen is not done after it.
+    pub(super) fn act(&mut self) {
         loop {
             if let Some(stop) = self.page.news() {
                 self.obey(stop);
             }
+            let now = self.moment();
             match self.core.next(now) {
                 Some(action) => self.carry_out(action, now),
                 None => return,

@@ -30,7 +30,7 @@ use lager_ports::{
 };
 use lager_topics::{
     Answer, Ask, BridgeRequest, Health, Input, InputKind, LatencyCommand, LinkHealth, Mode,
-    OperatorInput, SteeringCommand, SteeringState, StopCause, Topic,
+    OperatorInput, Origin, SteeringCommand, SteeringState, StopCause, Topic,
 };
 
 use crate::buttons::{self, Opener, Touch};
@@ -85,7 +85,9 @@ pub fn run_with(
     } else {
         None
     };
-    let counts = Counts::new(kept.as_ref());
+    let clock = bus.clock();
+    let kept = kept.map(|(health, stamp)| (health, clock.at(stamp.publish_time_ns)));
+    let counts = Counts::new(kept.as_ref().map(|(health, _)| health));
     let end = AtomicBool::new(false);
     let mut queues: [Queue<FromReader, QUEUE>; 2] = [Queue::new(), Queue::new()];
     let [first, second] = &mut queues;
@@ -96,16 +98,16 @@ pub fn run_with(
 
     let server = bus.server::<BridgeRequest>()?;
     let events = [first_out, second_out];
-    let mut service = Service::new(bus, config, &counts, kept.as_ref(), events, touches)?;
+    let mut service = Service::new(bus, config, &counts, kept, events, touches)?;
     let ringer = service.waiter.ringer()?;
     shutdown.wake(ringer.clone());
     // The word decides whether the robot is stopped. If it is clear although a stop was latched,
     // the bridge before ended during a release, or somebody has wiped the word.
-    if config.resume && kept.is_none_or(|kept| kept.stopped != 0) {
+    if config.resume && kept.is_none_or(|(kept, _)| kept.stopped != 0) {
         service.page.stop(StopCause::StateLost);
     }
     // Before a thread can bring a board: nothing is written that a stop forbids.
-    service.act(service.moment());
+    service.act();
     std::thread::scope(|scope| {
         for (place, events) in [first_in, second_in].into_iter().enumerate() {
             let port = (config.ports[place].as_path(), config.baud);
@@ -184,7 +186,7 @@ impl<'a> Service<'a> {
         bus: &Bus,
         config: &'a BridgeConfig,
         counts: &'a Counts,
-        kept: Option<&Health>,
+        kept: Option<(Health, Duration)>,
         events: [Consumer<'a, FromReader>; 2],
         touches: Consumer<'a, Touch>,
     ) -> Result<Self, PortError> {
@@ -196,7 +198,7 @@ impl<'a> Service<'a> {
         let waiter = bus.waiter(config.waiting)?;
         let path = bus.place().robot(bus.robot()).join(StopPage::FILE);
         let page = StopPage::open(&path, config.resume, waiter.ringer()?)?;
-        if let Some(kept) = kept {
+        if let Some((kept, _)) = kept {
             tracing::info!(
                 mode = ?kept.mode,
                 stopped = kept.stopped != 0,
@@ -227,9 +229,9 @@ impl<'a> Service<'a> {
             latency: bus.publisher()?,
             ports: events.map(port),
             page,
-            core: BridgeCore::new(options, kept),
+            core: BridgeCore::new(options, kept.as_ref().map(|(kept, at)| (kept, *at))),
             meter: CommandMeter::default(),
-            lost_before: kept.map_or(0, |kept| kept.bus_lost),
+            lost_before: kept.map_or(0, |(kept, _)| kept.bus_lost),
             bus_complaints: 0,
         })
     }
@@ -253,7 +255,7 @@ impl<'a> Service<'a> {
         let left = self.core.next_due().saturating_sub(self.clock.now());
         self.waiter.wait(self.clock.real(left).min(LONGEST_WAIT));
         if self.page.news().is_some() {
-            self.act(self.moment());
+            self.act();
         }
     }
 
@@ -272,7 +274,7 @@ impl<'a> Service<'a> {
                 };
                 let now = self.moment();
                 self.core.port(now, place, event);
-                self.act(now);
+                self.act();
                 if matches!(event, PortEvent::Lost) {
                     self.ports[place].device = None;
                 }
@@ -306,7 +308,7 @@ impl<'a> Service<'a> {
     fn answer(&mut self, ask: &Ask) -> Answer {
         let now = self.moment();
         self.core.ask(now, ask);
-        self.act(now);
+        self.act();
         loop {
             // An answer is given when its content is in force and published.
             self.flush();
@@ -355,10 +357,14 @@ impl<'a> Service<'a> {
         // here.
         let sent_ns = order.stamp().publish_time_ns.min(received_ns);
         // An order from the future was not dated by this machine's clock.
-        let given_ns = Some(order.given_ns).filter(|given_ns| *given_ns <= received_ns);
-        let sent = self.clock.at(sent_ns);
-        let given = self.clock.at(given_ns.unwrap_or(0));
-        let in_force = self.core.order(sent, given, order);
+        let since_ns = match order.origin.get() {
+            Some(Origin::Logic) => sent_ns,
+            _ => order.given_ns,
+        };
+        let age_ns = received_ns.checked_sub(since_ns).unwrap_or(u64::MAX);
+        let age = Duration::from_nanos(age_ns);
+        let [now, sent] = [received_ns, sent_ns].map(|ns| self.clock.at(ns));
+        let in_force = self.core.order(now, sent, age, order);
         self.meter.heard(in_force, order.stamp(), received_ns);
     }
 
@@ -366,7 +372,7 @@ impl<'a> Service<'a> {
     fn flush(&mut self) {
         let now = self.moment();
         self.core.decide(now.robot);
-        self.act(now);
+        self.act();
         self.meter.turn_over();
         if self.meter.is_due(now.ns) {
             self.publish_latency();
@@ -383,7 +389,7 @@ impl<'a> Service<'a> {
             self.turn(server);
         }
         self.core.tell_health();
-        self.act(self.moment());
+        self.act();
     }
 
     fn moment(&self) -> Moment {

@@ -23,7 +23,7 @@ impl Conversation {
             self.driving.let_go("the mode has been changed");
             self.held.clear();
         }
-        self.driving.refused(health);
+        self.driving.refused(now.robot, health);
         if health.stopped != 0 && self.driving.let_go(STOPPED) {
             self.think(STOPPED);
         }
@@ -71,7 +71,7 @@ impl Conversation {
     /// The steering board has reported.
     pub fn report(&mut self, now: Moment, report: &SteeringReport) {
         self.known.report = Some(*report);
-        self.driving.reported(report);
+        self.driving.reported(now.robot, report);
         // The board's own words, which have just come.
         let stands = (report.left_duty, report.right_duty, report.age_ms) == (0, 0, 0);
         if self.known.is_stopped() && stands && self.known.board_tells_duties() {

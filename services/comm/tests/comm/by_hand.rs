@@ -143,6 +143,38 @@ fn a_pause_as_long_as_the_lease_ends_the_command() {
 }
 
 #[test]
+fn a_command_is_let_go_when_the_board_does_not_report() {
+    let mut robot = driven();
+    robot.board = None;
+    let said = robot.pass(190);
+    assert!(said.iter().all(|done| done == "[renews 2]"), "{said:?}");
+    let said = robot.pass(20);
+    let over = said.iter().find(|line| line.starts_with("thought"));
+    assert!(
+        over.is_some_and(|why| why.contains("has not reported for 200 ms")),
+        "{said:?}"
+    );
+    let said = robot.pass(1_000);
+    assert!(!said.contains(&"[renews 2]".to_owned()), "{said:?}");
+}
+
+#[test]
+fn an_original_board_which_reports_nothing_is_driven_while_its_bridge_lives() {
+    let mut robot = driven();
+    robot.board = None;
+    robot.health.steering.up = 1;
+    robot.health.steering.version = 0;
+    for _ in 0..20 {
+        robot.told();
+        let said = robot.pass(100);
+        assert!(said.contains(&"[renews 2]".to_owned()), "{said:?}");
+    }
+    // The bridge is gone, too.
+    let said = robot.pass(400);
+    assert!(said.iter().any(|line| line.contains("has not reported")));
+}
+
+#[test]
 fn a_change_of_the_mode_lets_go_and_asks_first() {
     let mut robot = driven();
     robot.does(Phase::WaitingForOrder, None);

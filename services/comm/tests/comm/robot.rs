@@ -34,6 +34,9 @@ pub(crate) struct Robot {
     pub(crate) signs: usize,
     /// The reports that show how things are, since the last look.
     pub(crate) shown: Vec<String>,
+    /// What the steering board reports again and again while it is driven from here; `None` is a
+    /// board that has fallen silent.
+    pub(crate) board: Option<SteeringReport>,
 }
 
 impl Robot {
@@ -66,6 +69,10 @@ impl Robot {
             signed_ms: None,
             signs: 0,
             shown: Vec::new(),
+            board: Some(SteeringReport {
+                age_ms: 0,
+                ..SteeringReport::default()
+            }),
         };
         robot.conversation.turn(robot.now);
         robot.mode(mode);
@@ -180,6 +187,9 @@ impl Robot {
         self.now.ns += microseconds * 1_000;
         self.now.robot += Duration::from_micros(microseconds);
         self.conversation.turn(self.now);
+        if let (Some(_), Some(report), 0) = (self.steered, self.board, self.health.stopped) {
+            self.conversation.report(self.now, &report);
+        }
         self.conversation.tell(self.now);
     }
 
@@ -239,6 +249,7 @@ impl Robot {
 
     pub(crate) fn reports(&mut self, report: &SteeringReport) -> Vec<String> {
         self.conversation.report(self.now, report);
+        self.board = self.board.map(|_| *report);
         self.done()
     }
 

@@ -48,16 +48,19 @@ fn a_restarted_bridge_does_not_take_up_what_the_board_gave_up() {
 }
 
 #[test]
-fn a_command_that_grew_old_is_still_wanted() {
+fn a_command_that_the_board_gave_up_for_its_age_does_not_set_it_off_again() {
     let mut bench = Bench::autonomous();
     let order = drive(Origin::Logic, 1, FOLLOW);
     bench.run_renewed(400, order);
     bench.connected = false;
     bench.run_renewed(180, order);
     bench.connected = true;
+    bench.board.executed.clear();
     bench.run_renewed(300, order);
+    assert!(!bench.board.executed.contains(&FOLLOW.code()));
+    assert_eq!(bench.ended(), Some((Origin::Logic, 1, Finish::Aborted)));
+    bench.run_renewed(50, drive(Origin::Logic, 2, FOLLOW));
     assert_eq!(bench.board.code, FOLLOW.code());
-    assert_eq!(bench.ended(), None);
 }
 
 #[test]

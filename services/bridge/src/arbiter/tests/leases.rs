@@ -42,33 +42,101 @@ fn an_order_that_lay_in_a_queue_is_as_old_as_it_is() {
     let stale = bench.now.checked_sub(LEASE).unwrap();
     bench
         .arbiter
-        .order(stale, stale, &drive(Origin::Operator, 1, FORWARD));
+        .order(stale, LEASE, &drive(Origin::Operator, 1, FORWARD));
     bench.run(200);
     assert!(!bench.board.executed.contains(&FORWARD.code()));
 }
 
 #[test]
-fn a_late_renewal_takes_logics_lapsed_setpoint_up_again_but_not_its_one_shot() {
+fn a_late_renewal_moves_nothing_and_its_origin_hears_the_end() {
     let mut bench = Bench::autonomous();
-    bench.give(drive(Origin::Logic, 1, FOLLOW));
-    bench.run(200);
-    assert!(!code_moves(bench.board.code));
-    assert_eq!(
-        bench.give(drive(Origin::Logic, 1, FOLLOW)),
-        Verdict::Executes
-    );
-    bench.run(10);
-    assert_eq!(bench.board.code, FOLLOW.code());
+    for (id, command) in [(1, FOLLOW), (2, LEFT_PERP)] {
+        bench.give(drive(Origin::Logic, id, command));
+        bench.run(200);
+        assert!(!code_moves(bench.board.code));
+        bench.give(drive(Origin::Operator, id, DROP));
+        assert_eq!(
+            bench.give(drive(Origin::Logic, id, command)),
+            Verdict::Ended(Finish::Aborted)
+        );
+        assert_eq!(bench.ended(), Some((Origin::Logic, id, Finish::Aborted)));
+        bench.run_renewed(200, drive(Origin::Logic, id, command));
+        assert!(!code_moves(bench.board.code));
+    }
+    bench.run_renewed(50, drive(Origin::Logic, 3, FOLLOW));
+    assert!(code_moves(bench.board.code), "a new order does");
+}
 
-    bench.give(drive(Origin::Logic, 2, LEFT_PERP));
+#[test]
+fn to_stand_is_taken_up_again_by_a_late_renewal() {
+    let mut bench = Bench::autonomous();
+    bench.give(granted_standby(1));
     bench.run(200);
-    assert_eq!(bench.ended(), Some((Origin::Logic, 2, Finish::Aborted)));
-    assert_eq!(
-        bench.give(drive(Origin::Logic, 2, LEFT_PERP)),
-        Verdict::Ended(Finish::Aborted)
-    );
-    bench.run(50);
-    assert!(!code_moves(bench.board.code));
+    assert_eq!(bench.arbiter.current(), None);
+    assert_eq!(bench.give(granted_standby(1)), Verdict::Executes);
+}
+
+#[test]
+fn renewals_that_come_after_a_pause_of_the_bridge_take_nothing_up() {
+    for (origin, command) in [
+        (Origin::Operator, FORWARD),
+        (Origin::Operator, LEFT_DIAG),
+        (Origin::Logic, FOLLOW),
+    ] {
+        let mut bench = Bench::new(match origin {
+            Origin::Operator => Mode::Manual,
+            Origin::Logic => Mode::Autonomous,
+        });
+        let order = drive(origin, 1, command);
+        bench.run_renewed(100, order);
+        let frozen = bench.now;
+        // The origin renews, the board stops by itself, and nobody reads.
+        bench.board.step(frozen + ms(1_000));
+        bench.now += ms(1_000);
+        bench.arbiter.wake(bench.now);
+        for sent in (40..=1_000).step_by(40) {
+            let verdict = bench.arbiter.order(frozen + ms(sent), ms(0), &order);
+            assert_eq!(verdict, Verdict::Ended(Finish::Aborted), "{sent} ms");
+        }
+        bench.board.executed.clear();
+        bench.run_renewed(400, order);
+        assert!(!bench.board.executed.contains(&command.code()));
+        bench.run_renewed(50, drive(origin, 2, command));
+        assert!(code_moves(bench.board.code), "a new order does");
+    }
+}
+
+#[test]
+fn what_was_read_too_late_is_refused_whoever_gave_it_but_a_standby() {
+    let late = STALE + ms(1);
+    for (origin, command) in [
+        (Origin::Operator, LEFT_DIAG),
+        (Origin::Operator, ARM_UP),
+        (Origin::Logic, FOLLOW),
+    ] {
+        let mut bench = Bench::new(match origin {
+            Origin::Operator => Mode::Manual,
+            Origin::Logic => Mode::Autonomous,
+        });
+        let mut give = |id, age, command| {
+            let order = drive(origin, id, command);
+            bench.arbiter.order(bench.now, age, &order)
+        };
+        assert_eq!(give(1, STALE, command), Verdict::Executes);
+        let refused = match origin {
+            Origin::Operator => Verdict::Refused(Refusal::Stale),
+            // It renews, and its next sample is as old as it is.
+            Origin::Logic => Verdict::Ignored(Refusal::Stale),
+        };
+        assert_eq!(give(2, late, command), refused);
+        assert_eq!(give(3, late, STANDBY), Verdict::Executes);
+        let health = bench.health();
+        assert_eq!(
+            (health.refused_id, health.refusal.get()),
+            (2, Some(Refusal::Stale)),
+            "its giver is told"
+        );
+    }
 }
 
 #[test]
@@ -160,7 +228,6 @@ fn a_late_renewal_of_a_persons_setpoint_moves_nothing() {
 #[test]
 fn a_persons_order_that_everybody_has_forgotten_is_too_old_to_begin() {
     let mut bench = Bench::manual();
-    let given = bench.now;
     let order = drive(Origin::Operator, 1, FORWARD);
     bench.run_renewed(50, order);
     for id in 2..100 {
@@ -168,19 +235,12 @@ fn a_persons_order_that_everybody_has_forgotten_is_too_old_to_begin() {
         bench.run(20);
     }
     bench.run(200);
-    let late = |bench: &mut Bench, order| bench.arbiter.order(bench.now, given, &order);
+    let late = |bench: &mut Bench, order| bench.arbiter.order(bench.now, ms(2_000), &order);
     assert_eq!(late(&mut bench, order), Verdict::Refused(Refusal::Stale));
     bench.run(50);
     assert!(!code_moves(bench.board.code));
-    // In force it is renewed however long ago it was given; logic's order is not asked for it.
-    bench
-        .arbiter
-        .order(bench.now, bench.now, &drive(Origin::Operator, 200, FORWARD));
+    // In force it is renewed however long ago it was given.
     let renewed = drive(Origin::Operator, 200, FORWARD);
+    bench.give(renewed);
     assert_eq!(late(&mut bench, renewed), Verdict::Renewed);
-    bench.arbiter.set_mode(Mode::Autonomous);
-    assert_eq!(
-        late(&mut bench, drive(Origin::Logic, 1, FOLLOW)),
-        Verdict::Executes
-    );
 }

@@ -177,7 +177,7 @@ impl Bench {
     }
 
     fn give(&mut self, order: SteeringOrder) -> Verdict {
-        self.arbiter.order(self.now, self.now, &order)
+        self.arbiter.order(self.now, Duration::ZERO, &order)
     }
 
     fn run(&mut self, millis: u64) {
@@ -214,7 +214,7 @@ impl Bench {
 
     /// A bridge that was killed and has come back with what it had last published.
     fn restart_bridge(&mut self) {
-        self.arbiter = Arbiter::resume(&self.health());
+        self.arbiter = Arbiter::resume(&self.health(), self.now);
     }
 
     fn ended(&self) -> Option<(Origin, u32, Finish)> {

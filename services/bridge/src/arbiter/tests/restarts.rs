@@ -52,6 +52,38 @@ fn a_person_who_goes_on_drives_on_across_a_restart_of_the_bridge() {
     }
 }
 
+/// A bridge that was killed, or frozen and replaced: the board stops meanwhile, and the origin goes
+/// on renewing.
+#[test]
+fn a_successor_does_not_set_the_robot_off_again_by_an_order_of_before() {
+    for (origin, command) in [(Origin::Operator, FORWARD), (Origin::Logic, FOLLOW)] {
+        for away in [119, 120, 300, 3_000] {
+            for board_comes_after in [1, 60, 130] {
+                let mut bench = Bench::new(match origin {
+                    Origin::Operator => Mode::Manual,
+                    Origin::Logic => Mode::Autonomous,
+                });
+                let order = drive(origin, 1, command);
+                bench.run_renewed(300, order);
+                let (kept, published) = (bench.health(), bench.now);
+                bench.arbiter = Arbiter::new();
+                bench.run(away);
+                bench.arbiter = Arbiter::resume(&kept, published);
+                bench.run_renewed(board_comes_after, order);
+                bench.arbiter.board_up(bench.now, Version::One, false);
+                bench.board.executed.clear();
+                bench.run_renewed(500, order);
+                let what = format!("{origin:?}, away {away} ms, board after {board_comes_after}");
+                assert!(!bench.board.executed.contains(&command.code()), "{what}");
+                let (of, id, finish) = bench.ended().expect(&what);
+                assert_eq!((of, id, finish), (origin, 1, Finish::Aborted), "{what}");
+                bench.run_renewed(50, drive(origin, 2, command));
+                assert!(code_moves(bench.board.code), "{what}: a new order does");
+            }
+        }
+    }
+}
+
 #[test]
 fn what_a_person_drove_is_summed_across_a_restart_of_the_bridge() {
     let mut bench = Bench::autonomous();
@@ -138,7 +170,7 @@ fn a_setpoint_that_was_written_and_not_told_keeps_no_later_one_from_the_board() 
     bench.give(drive(Origin::Logic, 2, FORWARD));
     bench.run(1);
     assert_eq!(bench.board.code, FORWARD.code());
-    bench.arbiter = Arbiter::resume(&told);
+    bench.arbiter = Arbiter::resume(&told, bench.now);
     bench.arbiter.board_up(bench.now, Version::One, false);
     bench.run_renewed(50, drive(Origin::Logic, 4, STANDBY));
     assert_eq!(bench.board.code, STANDBY.code());
@@ -188,10 +220,10 @@ fn a_turn_is_carried_out_once_across_a_restart_of_the_bridge_at_any_moment() {
             let turn = drive(Origin::Logic, 1, LEFT_PERP);
             bench.run_renewed(killed_after, turn);
             // While the bridge is away the board runs alone; its reports are not heard.
-            let kept = bench.health();
+            let (kept, published) = (bench.health(), bench.now);
             bench.arbiter = Arbiter::new();
             bench.run(away);
-            bench.arbiter = Arbiter::resume(&kept);
+            bench.arbiter = Arbiter::resume(&kept, published);
             bench.run(1);
             bench.arbiter.board_up(bench.now, Version::One, false);
             bench.run_renewed(3_500, turn);

@@ -100,20 +100,6 @@ fn a_board_that_refuses_an_order_ends_it_so() {
     );
 }
 
-#[test]
-fn a_board_that_gave_up_a_live_setpoint_is_told_anew() {
-    let mut bench = Bench::autonomous();
-    let order = drive(Origin::Logic, 1, FOLLOW);
-    bench.run_renewed(100, order);
-    bench.connected = false;
-    bench.run_renewed(300, order);
-    assert!(bench.board.failsafe);
-    bench.connected = true;
-    bench.run_renewed(300, order);
-    assert_eq!(bench.board.code, FOLLOW.code());
-    assert!(!bench.board.failsafe);
-}
-
 /// An arbiter with an original board, which may be driven or not.
 fn with_original_board(mode: Mode, accepted: bool) -> Bench {
     let mut bench = Bench::new(mode);
@@ -196,7 +182,7 @@ fn what_an_original_board_reports_ends_no_order() {
     let mut arbiter = Arbiter::new();
     arbiter.drive_original_boards(true);
     arbiter.board_up(ms(0), Version::Original, false);
-    arbiter.order(ms(0), ms(0), &drive(Origin::Operator, 1, ARM_UP));
+    arbiter.order(ms(0), Duration::ZERO, &drive(Origin::Operator, 1, ARM_UP));
     turn(&mut arbiter, ms(0));
     for seq in 0..=u8::MAX {
         let mut data = Board::new().step(ms(1));
@@ -213,12 +199,12 @@ fn nothing_is_written_while_no_board_is_up() {
     arbiter.set_mode(Mode::Autonomous);
     let forward = drive(Origin::Logic, 1, FORWARD);
     assert_eq!(
-        arbiter.order(ms(0), ms(0), &forward),
+        arbiter.order(ms(0), Duration::ZERO, &forward),
         Verdict::Ignored(Refusal::NoBoard)
     );
     assert_eq!(turn(&mut arbiter, ms(10)), []);
     arbiter.board_up(ms(20), Version::One, false);
-    arbiter.order(ms(20), ms(20), &forward);
+    arbiter.order(ms(20), Duration::ZERO, &forward);
     let written = turn(&mut arbiter, ms(20));
     let commands = [written[0].command(), written[1].command()];
     assert_eq!(commands, [Some(STANDBY), Some(FORWARD)]);
@@ -245,11 +231,11 @@ fn a_parked_arbiter_writes_standby_again_and_again_and_takes_no_orders() {
     for version in [Version::One, Version::Original] {
         let mut arbiter = Arbiter::new();
         arbiter.board_up(ms(0), version, false);
-        arbiter.order(ms(0), ms(0), &drive(Origin::Operator, 1, FORWARD));
+        arbiter.order(ms(0), Duration::ZERO, &drive(Origin::Operator, 1, FORWARD));
         turn(&mut arbiter, ms(0));
         arbiter.park();
         assert_eq!(
-            arbiter.order(ms(1), ms(1), &drive(Origin::Operator, 2, FORWARD)),
+            arbiter.order(ms(1), Duration::ZERO, &drive(Origin::Operator, 2, FORWARD)),
             Verdict::Ignored(Refusal::ShuttingDown)
         );
         let written: Vec<_> = (1..100)
@@ -277,7 +263,7 @@ fn the_next_due_time_misses_nothing() {
     eager.give(order);
     eager.run(400);
     let mut written = Vec::new();
-    lazy.order(start, start, &order);
+    lazy.order(start, Duration::ZERO, &order);
     let mut now = start;
     while now < start + ms(400) {
         let due = turn(&mut lazy, now).into_iter();

@@ -1,0 +1,220 @@
+//! Nothing may move late, or twice: every machine between a person and the motors, joined in virtual
+//! time, with a fault at every hop.
+//!
+//! ```text
+//!  page -> panel -> station -> link -> comm --.
+//!  GaG ------------^                          |-> bus -> bridge -> steering board -> motors, arm
+//!  lager drive, logic ------------------------'
+//! ```
+//!
+//! The laws are in `judge.rs`. They are held over freezes, kills, cuts and delays (`case.rs`), and
+//! each mend is shown to be needed: without it the same search finds who breaks a law.
+
+mod case;
+mod giver;
+mod judge;
+#[path = "../../services/panel/src/late.rs"]
+mod late;
+mod mends;
+mod robot;
+mod wire;
+mod world;
+
+use case::{Act, Case, Fault, LEFT, Line, TURN, Way, Who, cases, squeeze};
+
+use mends::Mends;
+use proptest::prelude::*;
+use world::run;
+
+
+
+
+fn case(way: Way, acts: &[(u64, Act)], faults: &[Fault]) -> Case {
+    Case {
+        way,
+        acts: acts.to_vec(),
+        faults: faults.to_vec(),
+    }
+}
+
+const HELD: Act = Act::Hold {
+    command: LEFT,
+    lasts: 1_500,
+};
+const DRIVEN: Act = Act::Drive {
+    command: LEFT,
+    lasts: 4_500,
+};
+
+/// What happened to people, each with the mends that keep it from happening again.
+fn found() -> Vec<(&'static str, Case, fn(&mut Mends))> {
+    let by_hand = |acts: &[(u64, Act)], faults: &[Fault]| case(Way::ByHand, acts, faults);
+    let frozen = |who, at, lasts| Fault::Freeze { who, at, lasts };
+    let cut = |at, lasts| Fault::Cut {
+        line: Line::Link,
+        at,
+        lasts,
+    };
+    let stopped = [
+        (500, Act::Stop),
+        (900, Act::Resume),
+        (1_500, Act::Stop),
+    ];
+    vec![
+        (
+            "an old resume over a frozen comm",
+            case(Way::ByItself, &stopped, &[frozen(Who::Comm, 800, 1_500)]),
+            |mends| mends.named = false,
+        ),
+        (
+            "an old resume over a cut link",
+            case(Way::ByItself, &stopped, &[cut(800, 1_500)]),
+            |mends| mends.named = false,
+        ),
+        (
+            "a turn over a cut link",
+            by_hand(&[(1_000, Act::Press(TURN))], &[cut(900, 1_200)]),
+            |mends| mends.aged = false,
+        ),
+        (
+            "a GaG's turn at a frozen station",
+            by_hand(&[(1_000, Act::Say(LEFT))], &[frozen(Who::Station, 900, 1_000)]),
+            |mends| mends.aged = false,
+        ),
+        (
+            "a turn while the bridge is frozen",
+            by_hand(
+                &[(1_000, Act::Press(TURN))],
+                &[frozen(Who::Bridge, 950, 1_000)],
+            ),
+            // Comm lets go of it as well.
+            |mends| (mends.aged, mends.heirs) = (false, false),
+        ),
+        (
+            "a GaG's command and a bridge that is replaced",
+            by_hand(
+                &[(500, Act::Say(LEFT))],
+                &[Fault::Replace {
+                    at: 1_000,
+                    lasts: 2_000,
+                }],
+            ),
+            |mends| mends.heirs = false,
+        ),
+        (
+            "a GaG's command and a bridge that is killed",
+            by_hand(
+                &[(500, Act::Say(LEFT))],
+                &[Fault::Kill {
+                    who: Who::Bridge,
+                    at: 1_000,
+                    back: 350,
+                }],
+            ),
+            |mends| mends.heirs = false,
+        ),
+        (
+            "lager drive and a bridge that is replaced",
+            by_hand(
+                &[(500, DRIVEN)],
+                &[Fault::Replace {
+                    at: 1_000,
+                    lasts: 1_000,
+                }],
+            ),
+            |mends| mends.heirs = false,
+        ),
+        (
+            "a step of the arm over a frozen comm while logic stands at goods",
+            case(
+                Way::Picking,
+                &[(1_000, Act::Say(squeeze()))],
+                &[frozen(Who::Comm, 900, 1_000)],
+            ),
+            |mends| (mends.aged, mends.signs) = (false, false),
+        ),
+        (
+            "a GaG that freezes",
+            by_hand(&[(500, Act::Say(LEFT))], &[frozen(Who::Gag, 1_000, 4_000)]),
+            |mends| mends.seen = false,
+        ),
+    ]
+}
+
+#[test]
+fn what_happened_to_people_does_not_happen_again() {
+    let mut broken = Vec::new();
+    for (name, case, _) in found() {
+        let run = run(&case, Mends::ALL);
+        if !run.faults.is_empty() {
+            broken.push(format!("{name}: {:#?}\n{:#?}", run.faults, run.thoughts));
+        }
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+#[test]
+fn without_its_mend_each_of_them_happens() {
+    let mut kept = Vec::new();
+    for (name, case, take_out) in found() {
+        let mut mends = Mends::ALL;
+        take_out(&mut mends);
+        if run(&case, mends).faults.is_empty() {
+            kept.push(name);
+        }
+    }
+    assert!(kept.is_empty(), "these happen no more without it: {kept:#?}");
+}
+
+/// A model in which nothing ever moves would keep both laws.
+#[test]
+fn where_nothing_is_wrong_everybody_moves_the_robot() {
+    let [held, said, driven] = [HELD, Act::Say(LEFT), DRIVEN].map(|act| {
+        let run = run(&case(Way::ByHand, &[(500, act)], &[]), Mends::ALL);
+        assert_eq!((run.faults, run.hung_up), (Vec::new(), 0), "{act:?}");
+        run.motion
+    });
+    assert!((1_300..2_000).contains(&held), "{held}");
+    assert!(said > 5_000, "{said}");
+    assert!((4_300..4_800).contains(&driven), "{driven}");
+    let logic = run(&case(Way::ByItself, &[], &[]), Mends::ALL);
+    assert!(logic.motion > 5_500 && logic.faults.is_empty(), "{logic:?}");
+    for act in [Act::Press(TURN), Act::Say(TURN)] {
+        let run = run(&case(Way::ByHand, &[(500, act)], &[]), Mends::ALL);
+        assert_eq!((run.one_shots, run.hung_up), (1, 0), "{act:?} {run:?}");
+        assert!(run.motion > 500 && run.faults.is_empty(), "{act:?} {run:?}");
+    }
+}
+
+/// Sign and silence follow from what runs: a step of the arm that takes long hangs no link up,
+/// whoever drives.
+#[test]
+fn a_step_of_the_arm_that_takes_long_comes_to_its_end() {
+    for way in [Way::ByHand, Way::Picking] {
+        let case = case(way, &[(500, Act::Say(squeeze()))], &[]);
+        let whole = run(&case, Mends::ALL);
+        assert_eq!((whole.one_shots, whole.hung_up), (1, 0), "{way:?} {whole:?}");
+        assert!(whole.faults.is_empty(), "{way:?} {whole:?}");
+        let mends = Mends {
+            signs: false,
+            ..Mends::ALL
+        };
+        let is_hung_up = run(&case, mends).hung_up > 0;
+        assert_eq!(is_hung_up, way == Way::Picking, "{way:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 128,
+        // A case that is found becomes one of `found`.
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn nothing_moves_late_or_after_a_newer_stop(case in cases()) {
+        let run = run(&case, Mends::ALL);
+        prop_assert!(run.faults.is_empty(), "{:#?}\n{:#?}", run.faults, run.thoughts);
+    }
+}

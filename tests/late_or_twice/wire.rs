@@ -1,0 +1,39 @@
+//! What carries something from one process to the next: it may hold things up, and it may be cut for
+//! a while, but it keeps their order and loses nothing, as TCP does.
+
+use std::collections::VecDeque;
+
+/// One direction of a connection.
+#[derive(Debug)]
+pub(crate) struct Wire<T> {
+    under_way: VecDeque<(u64, T)>,
+}
+
+impl<T> Default for Wire<T> {
+    fn default() -> Self {
+        let under_way = VecDeque::new();
+        Self { under_way }
+    }
+}
+
+impl<T> Wire<T> {
+    /// Sends something at `now` (ms) that takes `delay` ms.
+    pub(crate) fn send(&mut self, now: u64, delay: u64, what: T) {
+        let before = self.under_way.back().map_or(0, |(at, _)| *at);
+        self.under_way.push_back((before.max(now + delay), what));
+    }
+
+    /// What has arrived by `now`, unless the wire is cut.
+    pub(crate) fn receive(&mut self, now: u64, is_cut: bool) -> Vec<T> {
+        let mut arrived = Vec::new();
+        while !is_cut && self.under_way.front().is_some_and(|(at, _)| *at <= now) {
+            arrived.extend(self.under_way.pop_front().map(|(_, what)| what));
+        }
+        arrived
+    }
+
+    /// The end that receives is closed: what is under way is lost.
+    pub(crate) fn drop_all(&mut self) {
+        self.under_way.clear();
+    }
+}

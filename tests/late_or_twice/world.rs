@@ -1,0 +1,559 @@
+//! Everything joined, in virtual time: people, station, link, comm, bus, bridge, board. Each process
+//! takes its turns as its shell does, unless it is frozen, and all of its code is the real one but
+//! for the shells.
+
+use lager_comm::{Action as Does, Conversation, LinkLost};
+use lager_lines::extension::Action;
+use lager_lines::splitter::LineError;
+use lager_lines::{Name, to_line};
+use lager_ports::Stop;
+use lager_station::{Key, Output, Peer, Station, Warehouse};
+use lager_topics::{Ask, AskKind, Mode, NavigatorStatus, OrderQueue, Phase, Role, StopCause};
+use lager_wire::OperatorCommand;
+
+use crate::case::{Act, Case, Fault, LENGTH, Line, Way, Who};
+use crate::giver::{Drive, Logic, Page, Said, drive};
+use crate::judge::Judge;
+use crate::late::Late;
+use crate::mends::Mends;
+use crate::robot::{Bus, Robot, moment};
+use crate::wire::Wire;
+
+/// When the robot can be driven, in ms: its boards are up by then, and somebody has its wheel.
+const READY: u64 = 1_500;
+/// How often comm and station look around at least, in ms.
+const LOOK: u64 = 10;
+/// How long comm waits before it connects again, in ms.
+const AGAIN: u64 = 100;
+/// How long the bridge may take to answer, in ms.
+const ANSWER: u64 = 500;
+
+/// A line towards comm, or the end of the connection.
+type ToComm = Option<String>;
+
+/// What comes to the station over the link.
+#[derive(Debug)]
+enum ToStation {
+    Up(u64),
+    Line(u64, String),
+    Down(u64),
+}
+
+/// How a run went.
+#[derive(Debug)]
+pub(crate) struct Run {
+    /// Who broke which law.
+    pub(crate) faults: Vec<String>,
+    /// How long something moved, in ms, and how many one-shots began.
+    pub(crate) motion: u64,
+    pub(crate) one_shots: u32,
+    /// Links that comm gave up, and what comm said of what it could not do.
+    pub(crate) hung_up: u32,
+    pub(crate) thoughts: Vec<String>,
+}
+
+/// Runs a case with these mends in.
+pub(crate) fn run(case: &Case, mends: Mends) -> Run {
+    let mut world = World::new(case, mends);
+    for now in 1..READY + LENGTH {
+        world.tick(now, case);
+    }
+    Run {
+        faults: world.judge.faults,
+        motion: world.judge.motion,
+        one_shots: world.judge.one_shots,
+        hung_up: world.hung_up,
+        thoughts: world.thoughts,
+    }
+}
+
+struct World {
+    mends: Mends,
+    way: Way,
+    judge: Judge,
+    bus: Bus,
+    robot: Robot,
+    logic: Option<Logic>,
+    drive: Option<Drive>,
+    page: Page,
+    to_panel: Wire<Said>,
+    late: Late,
+    gag: Wire<String>,
+    station: Station,
+    key: Option<Key>,
+    to_station: Wire<ToStation>,
+    to_comm: Wire<ToComm>,
+    comm: Option<Comm>,
+    hung_up: u32,
+    thoughts: Vec<String>,
+}
+
+/// One life of comm.
+struct Comm {
+    conversation: Conversation,
+    /// The number of the connection, if there is one.
+    link: Option<u64>,
+    connects: u64,
+    looks: u64,
+    turned: u64,
+    /// What it has seen of the bus.
+    health: u64,
+    state: u64,
+    asked: Vec<(u32, u64)>,
+    signed: u64,
+}
+
+impl Comm {
+    fn new(now: u64) -> Self {
+        let name = r1();
+        Self {
+            conversation: Conversation::new(name, None, LinkLost::GoOn),
+            link: None,
+            connects: now + AGAIN,
+            looks: 0,
+            turned: now,
+            health: 0,
+            state: 0,
+            asked: Vec::new(),
+            signed: 0,
+        }
+    }
+}
+
+fn r1() -> Name {
+    Name::new("r1").expect("a name")
+}
+
+impl World {
+    fn new(case: &Case, mends: Mends) -> Self {
+        let warehouse: Warehouse =
+            toml::from_str("size = [2, 2]\nside_length_cm = 50").expect("a warehouse");
+        let name = Name::new("lager").expect("a name");
+        let mut station = Station::new(name, Some(warehouse)).expect("a warehouse");
+        let has_gag = case.acts.iter().any(|(_, act)| matches!(act, Act::Say(_)));
+        if has_gag {
+            station.connected(Peer::Gag);
+        }
+        Self {
+            mends,
+            way: case.way,
+            judge: Judge::default(),
+            bus: Bus::default(),
+            robot: Robot::new(mends),
+            logic: Logic::new(case.way),
+            drive: None,
+            page: Page::default(),
+            to_panel: Wire::default(),
+            late: Late::default(),
+            gag: Wire::default(),
+            station,
+            key: None,
+            to_station: Wire::default(),
+            to_comm: Wire::default(),
+            comm: Some(Comm::new(0)),
+            hung_up: 0,
+            thoughts: Vec::new(),
+        }
+    }
+
+    fn tick(&mut self, now: u64, case: &Case) {
+        let faults = Faults(now, &case.faults);
+        if now == READY - 1 {
+            self.begin(now);
+        }
+        for (_, act) in case.acts.iter().filter(|(at, _)| at + READY == now) {
+            self.act(now, *act, faults);
+        }
+        if faults.runs(Who::Page) {
+            let slow = faults.slow(Line::Page);
+            for said in self.page.turn(now, &mut self.judge) {
+                self.to_panel.send(now, slow + 1, said);
+            }
+        }
+        if faults.runs(Who::Gag) {
+            // What turns the wheels by its word does so while it is there.
+            if case.acts.iter().any(|(_, act)| matches!(act, Act::Say(_))) {
+                self.judge.is_there(now);
+            }
+        }
+        if faults.runs(Who::Station) {
+            self.serve(now, faults);
+        }
+        self.talk(now, faults);
+        if faults.runs(Who::Drive)
+            && let Some(drive) = &mut self.drive
+            && !drive.turn(now, &mut self.bus, &mut self.judge)
+        {
+            self.drive = None;
+        }
+        if faults.runs(Who::Logic)
+            && let Some(logic) = &mut self.logic
+        {
+            logic.turn(now, &mut self.bus, &mut self.judge);
+        }
+        self.robot.cut(faults.is_cut(Line::Serial));
+        self.robot.advance(now, &mut self.judge);
+        match (faults.is_killed(Who::Bridge), self.robot.is_up()) {
+            (true, true) => self.robot.kill(&mut self.bus),
+            (false, false) => self.robot.succeed(now, &mut self.bus),
+            _ => {}
+        }
+        if faults.runs(Who::Bridge) {
+            self.robot.turn(now, &mut self.bus, &mut self.judge);
+        }
+    }
+
+    /// The robot is up: somebody says who drives, and a page takes the wheel.
+    fn begin(&mut self, now: u64) {
+        if self.way != Way::ByHand {
+            let ask = Ask {
+                kind: AskKind::SetMode.into(),
+                mode: Mode::Autonomous.into(),
+                ..Ask::default()
+            };
+            self.bus.ask(now, 0, ask);
+        }
+        if !self.station.has_gag() {
+            self.key = self.station.take_wheel(&r1(), "panel-1").ok();
+        }
+    }
+
+    fn act(&mut self, now: u64, act: Act, faults: Faults<'_>) {
+        match act {
+            Act::Hold { command, lasts } if faults.runs(Who::Page) => {
+                self.page.hold(now, command, lasts);
+            }
+            Act::Press(command) if faults.runs(Who::Page) => {
+                let action = match command {
+                    OperatorCommand::Arm(step) => Some(Action::Arm(step)),
+                    command => drive(command),
+                };
+                self.judge.gives(now, command.firmware());
+                self.page.press(action.expect("a command to the wheels or the arm"));
+            }
+            Act::Resume if faults.runs(Who::Page) => {
+                if let Some(action) = self.resume() {
+                    self.page.press(action);
+                }
+            }
+            Act::Say(command) if faults.runs(Who::Gag) => {
+                self.judge.gives(now, command.firmware());
+                self.gag.send(now, 0, written(command));
+            }
+            Act::Drive { command, lasts } if faults.runs(Who::Drive) => {
+                let lets_go = self.mends.heirs;
+                let drive = Drive::new(now, command, lasts, lets_go, &mut self.judge);
+                self.drive = Some(drive);
+            }
+            Act::Stop => {
+                let stop = Stop::new(Role::Operator, StopCause::Ordered, moment(now).ns);
+                self.bus.stop = Some(stop);
+                self.judge.stops(now, stop.word());
+            }
+            Act::ResumeHere => {
+                if let Some(stop) = self.bus.stop {
+                    self.judge.resumes(stop.word());
+                    self.bus.ask(now, 0, resume_here(stop));
+                }
+            }
+            Act::Hold { .. } | Act::Press(_) | Act::Resume | Act::Say(_) | Act::Drive { .. } => {}
+        }
+    }
+
+    /// What a page says to end the stop that it shows.
+    fn resume(&mut self) -> Option<Action> {
+        let (_, health) = self.bus.health?;
+        if health.stopped != 0
+            && let Some(stop) = self.bus.stop
+        {
+            self.judge.resumes(stop.word());
+        }
+        Some(Action::Resume)
+    }
+
+    /// A turn of the station, with the panel in it.
+    fn serve(&mut self, now: u64, faults: Faults<'_>) {
+        self.station.turn(moment(now).robot);
+        for Said { said_ms, action } in self.to_panel.receive(now, faults.is_cut(Line::Page)) {
+            let late = self.late.hear(said_ms, moment(now).robot);
+            if let Some(action) = action {
+                self.panel(late, action);
+            }
+        }
+        if let Some(key) = self.key {
+            let _ = self.station.stay(&r1(), key);
+        }
+        for line in self.gag.receive(now, false) {
+            self.station.heard(Peer::Gag, Ok(&line));
+        }
+        for what in self.to_station.receive(now, faults.is_cut(Line::Link)) {
+            match what {
+                ToStation::Up(link) => self.station.connected(Peer::Robot(link)),
+                ToStation::Line(link, line) => {
+                    self.station.heard(Peer::Robot(link), Ok(line.trim_end()));
+                }
+                ToStation::Down(link) => self.station.disconnected(Peer::Robot(link)),
+            }
+        }
+        self.station.news();
+        for output in self.station.outputs() {
+            let slow = faults.slow(Line::Link);
+            match output {
+                Output::Say { to: Peer::Gag, line } => self.gag_hears(now, &line, faults),
+                Output::Say { line, .. } | Output::SayFirst { line, .. } => {
+                    self.to_comm.send(now, slow + 1, Some(line));
+                }
+                Output::Close { peer, .. } => {
+                    if peer != Peer::Gag {
+                        self.to_comm.send(now, slow + 1, None);
+                    }
+                }
+            }
+        }
+    }
+
+    /// What a page says, as the panel hands it on.
+    fn panel(&mut self, late: std::time::Duration, action: Action) {
+        if self.mends.aged && late.as_millis() > 200 {
+            return;
+        }
+        let Some(key) = self.key else { return };
+        let _ = match action {
+            Action::Drive { wheels, .. } => self.station.drive(&r1(), key, wheels),
+            Action::Arm(step) => self.station.arm(&r1(), key, step),
+            other => self.station.act(&r1(), other),
+        };
+    }
+
+    /// A GaG describes the floor when it is asked; what it commands it says by itself.
+    fn gag_hears(&mut self, now: u64, line: &str, faults: Faults<'_>) {
+        if !faults.runs(Who::Gag) {
+            return;
+        }
+        let answer = match line.trim_end() {
+            "sidelength" => "sidelength 50",
+            "karta" => "karta 2 2 0 0",
+            "prodlis" => "prodlis 1 1 0 0 left",
+            _ => return,
+        };
+        self.gag.send(now, 1, answer.to_owned());
+    }
+
+    /// A turn of comm, if it lives and runs.
+    fn talk(&mut self, now: u64, faults: Faults<'_>) {
+        if faults.is_killed(Who::Comm) {
+            if let Some(link) = self.comm.take().and_then(|comm| comm.link) {
+                self.to_station.send(now, 1, ToStation::Down(link));
+                self.to_comm.drop_all();
+            }
+            return;
+        }
+        let comm = self.comm.get_or_insert_with(|| Comm::new(now));
+        if !faults.runs(Who::Comm) {
+            return;
+        }
+        let is_cut = faults.is_cut(Line::Link);
+        let arrived = match comm.link {
+            Some(_) => self.to_comm.receive(now, is_cut),
+            None => Vec::new(),
+        };
+        let due = comm.conversation.due();
+        let is_due = due.is_some_and(|due| due <= moment(now).robot);
+        if arrived.is_empty() && !is_due && now < comm.looks {
+            return;
+        }
+        comm.looks = now + LOOK;
+        let at = comm_moment(now);
+        if comm.link.is_none() && now >= comm.connects && !is_cut {
+            comm.link = Some(now);
+            self.to_station.send(now, 1, ToStation::Up(now));
+            comm.conversation.connected(at);
+        }
+        if self.way != Way::ByHand && !self.mends.signs {
+            // Where logic drives a pause counted for nothing.
+            for between in (comm.turned + 1..now).step_by(20) {
+                comm.conversation.turn(comm_moment(between));
+            }
+        }
+        comm.turned = now;
+        comm.conversation.turn(at);
+        self.do_all(now, faults);
+        self.see(now);
+        let comm = self.comm.as_mut().expect("it lives");
+        let mut lines: Vec<Result<String, LineError>> = Vec::new();
+        for line in arrived {
+            match line {
+                Some(line) => lines.push(Ok(line.trim_end().to_owned())),
+                None => {
+                    comm.conversation.heard(at, &core::mem::take(&mut lines));
+                    comm.conversation.disconnected(at);
+                    (comm.link, comm.connects) = (None, now + AGAIN);
+                }
+            }
+        }
+        if !lines.is_empty() {
+            comm.conversation.heard(at, &lines);
+        }
+        self.do_all(now, faults);
+    }
+
+    /// What comm sees of the bus.
+    fn see(&mut self, now: u64) {
+        let comm = self.comm.as_mut().expect("it lives");
+        let at = comm_moment(now);
+        if let Some((published, health)) = self.bus.health.filter(|(at, _)| *at > comm.health) {
+            comm.health = published;
+            comm.conversation.health(at, &health);
+        }
+        let picks = self.way == Way::Picking;
+        if picks && now.is_multiple_of(50) {
+            let status = NavigatorStatus {
+                phase: Phase::Picking.into(),
+                ..NavigatorStatus::default()
+            };
+            comm.conversation.queue(at, &OrderQueue::default());
+            comm.conversation.status(at, &status, at.ns);
+        }
+        // Who never lets go takes the last report for a new one.
+        let is_new = |at: u64| at > comm.state || !self.mends.heirs;
+        if let Some((published, state)) = self.bus.state.filter(|(at, _)| is_new(*at)) {
+            comm.state = published;
+            comm.conversation.report(at, &state);
+        }
+        for (id, answer) in core::mem::take(&mut self.bus.answers) {
+            if comm.asked.iter().any(|(asked, _)| *asked == id) {
+                comm.asked.retain(|(asked, _)| *asked != id);
+                comm.conversation.answered_by_bridge(id, Ok(answer));
+            }
+        }
+        while let Some((id, _)) = comm.asked.pop_if(|(_, at)| now >= *at + ANSWER) {
+            comm.conversation
+                .answered_by_bridge(id, Err("the bridge does not answer".into()));
+        }
+        if comm.conversation.is_to_tell(at) {
+            comm.conversation.tell(at);
+        }
+    }
+
+    fn do_all(&mut self, now: u64, faults: Faults<'_>) {
+        let comm = self.comm.as_mut().expect("it lives");
+        for action in comm.conversation.actions() {
+            let line = match action {
+                Does::Say(line) => to_line(&line).ok(),
+                Does::Show(report) => to_line(&report).ok(),
+                Does::HangUp(why) => {
+                    self.thoughts.push(format!("at {now} ms: hung up, {why}"));
+                    self.hung_up += 1;
+                    if let Some(link) = comm.link.take() {
+                        self.to_station.send(now, 1, ToStation::Down(link));
+                    }
+                    self.to_comm.drop_all();
+                    comm.connects = now + AGAIN;
+                    None
+                }
+                Does::Steer(order) => {
+                    self.bus.order(now, order);
+                    None
+                }
+                Does::Ask { id, ask } => {
+                    comm.asked.push((id, now));
+                    self.bus.ask(now, id, ask);
+                    None
+                }
+                Does::Stop => {
+                    let stop = Stop::new(Role::Comm, StopCause::Ordered, moment(now).ns);
+                    self.bus.stop = Some(stop);
+                    None
+                }
+                Does::Map(_) | Does::Order(_) | Does::Press(_) | Does::AskWorld { .. } => None,
+            };
+            if let (Some(line), Some(link)) = (line, comm.link) {
+                let by_itself = self.way != Way::ByHand;
+                if line.starts_with("lager") && by_itself && !self.mends.signs {
+                    // Where logic drives it was said once a second.
+                    if now < comm.signed + 1_000 {
+                        continue;
+                    }
+                    comm.signed = now;
+                }
+                if line.starts_with("thought") || line.starts_with("refused") {
+                    self.thoughts.push(format!("at {now} ms: {}", line.trim_end()));
+                }
+                let slow = faults.slow(Line::Link);
+                self.to_station.send(now, slow + 1, ToStation::Line(link, line));
+            }
+        }
+    }
+}
+
+fn comm_moment(now: u64) -> lager_comm::Moment {
+    let moment = moment(now);
+    lager_comm::Moment {
+        robot: moment.robot,
+        ns: moment.ns,
+    }
+}
+
+/// As `lager resume` asks.
+fn resume_here(_stop: Stop) -> Ask {
+    Ask {
+        kind: AskKind::Resume.into(),
+        ..Ask::default()
+    }
+}
+
+/// A command as a GaG says it.
+fn written(command: OperatorCommand) -> String {
+    lager_lines::gag::Answer::Command(command).to_string()
+}
+
+/// What is wrong at a moment.
+#[derive(Clone, Copy)]
+struct Faults<'a>(u64, &'a [Fault]);
+
+impl Faults<'_> {
+    fn is_in(self, at: u64, lasts: u64) -> bool {
+        (at + READY..at + READY + lasts).contains(&self.0)
+    }
+
+    fn runs(self, process: Who) -> bool {
+        !self.1.iter().any(|fault| match *fault {
+            Fault::Freeze { who, at, lasts } => who == process && self.is_in(at, lasts),
+            Fault::Replace { at, lasts } => process == Who::Bridge && self.is_in(at, lasts),
+            _ => false,
+        })
+    }
+
+    fn is_killed(self, process: Who) -> bool {
+        self.1.iter().any(|fault| match *fault {
+            Fault::Kill { who, at, back } => who == process && self.is_in(at, back),
+            // Who was found silent is killed, and its successor takes a moment.
+            Fault::Replace { at, lasts } => {
+                process == Who::Bridge && self.is_in(at + lasts, REPLACED)
+            }
+            _ => false,
+        })
+    }
+
+    fn is_cut(self, wire: Line) -> bool {
+        self.1.iter().any(|fault| {
+            matches!(*fault, Fault::Cut { line, at, lasts } if line == wire && self.is_in(at, lasts))
+        })
+    }
+
+    fn slow(self, wire: Line) -> u64 {
+        let slow = self.1.iter().map(|fault| match *fault {
+            Fault::Slow {
+                line,
+                at,
+                lasts,
+                by,
+            } if line == wire && self.is_in(at, lasts) => by,
+            _ => 0,
+        });
+        slow.sum()
+    }
+}
+
+/// How long a killed bridge's successor takes at the least, in ms.
+const REPLACED: u64 = 60;
