@@ -433,29 +433,26 @@ fn a_board_that_does_not_report_is_not_driven_and_its_last_report_grows_old() {
         assert!(last.age_ms >= 200, "{}", last.age_ms);
 
         steering.with(|board| board.mute = false);
-        if logic_drives {
-            robot.hands.give_until(order, "logic's order goes on", |_| {
-                steering.with(|board| board.moves())
+        robot
+            .hands
+            .give_until(order, "its origin is told that it is over", |hands| {
+                hands.health.look().is_some_and(|health| {
+                    health.blocked.get() == Some(Refusal::None) && health.finished_id == 1
+                })
             });
+        let commands = steering.with(|board| board.commands);
+        robot.hands.give_until(order, "standby goes on", |_| {
+            steering.with(|board| board.commands > commands + 10)
+        });
+        assert!(!steering.with(|board| board.moves()));
+        let new = if logic_drives {
+            logic(2, FOLLOW)
         } else {
-            robot
-                .hands
-                .give_until(order, "the person is told that it is over", |hands| {
-                    hands.health.look().is_some_and(|health| {
-                        health.blocked.get() == Some(Refusal::None) && health.finished_id == 1
-                    })
-                });
-            let commands = steering.with(|board| board.commands);
-            robot.hands.give_until(order, "standby goes on", |_| {
-                steering.with(|board| board.commands > commands + 10)
-            });
-            assert!(!steering.with(|board| board.moves()));
-            robot
-                .hands
-                .give_until(operator(2, FORWARD), "a new order drives", |_| {
-                    steering.with(|board| board.moves())
-                });
-        }
+            operator(2, FORWARD)
+        };
+        robot.hands.give_until(new, "a new order drives", |_| {
+            steering.with(|board| board.moves())
+        });
     }
 }
 
@@ -501,7 +498,7 @@ fn a_clean_stop_leaves_the_robot_in_standby() {
 }
 
 #[test]
-fn a_setpoint_the_board_gave_up_is_taken_up_again() {
+fn a_setpoint_the_board_gave_up_does_not_set_it_off_again() {
     let mut robot = Robot::up();
     let steering = &robot.steering;
     let order = operator(1, FORWARD);
@@ -515,9 +512,14 @@ fn a_setpoint_the_board_gave_up_is_taken_up_again() {
     });
     robot
         .hands
-        .give_until(order, "the wheels turn again", |hands| {
-            hands.state.look().is_some_and(|state| {
-                state.left_duty == 100 && !SteerFlags(state.flags).contains(SteerFlags::FAILSAFE)
-            })
+        .give_until(order, "the person is told that it is over", |hands| {
+            let health = hands.health.look();
+            health.is_some_and(|health| health.finished_id == 1)
+        });
+    assert!(!steering.with(|board| board.moves()));
+    robot
+        .hands
+        .give_until(operator(2, FORWARD), "the wheels turn again", |_| {
+            steering.with(|board| board.moves())
         });
 }

@@ -249,7 +249,10 @@ impl Robot {
 
     pub(crate) fn reports(&mut self, report: &SteeringReport) -> Vec<String> {
         self.conversation.report(self.now, report);
-        self.board = self.board.map(|_| *report);
+        self.board = self.board.map(|_| SteeringReport {
+            age_ms: 0,
+            ..*report
+        });
         self.done()
     }
 
