@@ -3,11 +3,6 @@
 
 use std::time::Duration;
 
-use lager_ports::Stop;
-use lager_topics::{Ask, AskKind};
-
-use crate::robot::moment;
-
 /// Which of them are in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Mends {
@@ -49,15 +44,19 @@ impl Mends {
         }
     }
 
-    /// A request as the bridge is told it.
-    pub(crate) fn ask(self, now: u64, ask: Ask, _stop: Option<Stop>) -> Ask {
-        let resumes = ask.kind == AskKind::Resume;
-        Ask {
-            issued_ns: match resumes && !self.named {
-                true => moment(now).ns,
-                false => ask.issued_ns,
-            },
-            ..ask
+    /// What comm is told by the station: a resume that names no stop means the one that comm knows.
+    pub(crate) fn to_comm(self, line: &str, stop_word: u64) -> String {
+        match line.split_once(" resume ") {
+            Some((number, _)) if !self.named => format!("{number} resume {stop_word}"),
+            _ => line.to_owned(),
+        }
+    }
+
+    /// What the station is told by comm: a sign without the robot's clock tells no age.
+    pub(crate) fn to_station(self, line: &str) -> String {
+        match line.starts_with("lager ") && !self.aged {
+            true => line.split(' ').take(3).collect::<Vec<_>>().join(" "),
+            false => line.to_owned(),
         }
     }
 }

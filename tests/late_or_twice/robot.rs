@@ -187,7 +187,6 @@ impl Robot {
         if bridge.asked.is_none() && !bus.asks.is_empty() {
             let Asked { id, ask } = bus.asks.remove(0);
             bridge.asked = Some(id);
-            let ask = self.mends.ask(now, ask, bridge.heeded);
             bridge.core.ask(moment(now), &ask);
             self.act(now, bus, judge);
         }
@@ -259,8 +258,8 @@ impl Robot {
                     let stop = Stop::new(Role::Bridge, cause, moment(now).ns);
                     bus.stop.get_or_insert(stop);
                 }
-                Action::Release => {
-                    let is_clear = bus.stop == *heeded;
+                Action::Release(stop) => {
+                    let is_clear = bus.stop == Some(stop);
                     if is_clear {
                         (bus.stop, *heeded) = (None, None);
                     }

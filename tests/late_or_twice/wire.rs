@@ -32,6 +32,11 @@ impl<T> Wire<T> {
         arrived
     }
 
+    /// Whether nothing is under way.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.under_way.is_empty()
+    }
+
     /// The end that receives is closed: what is under way is lost.
     pub(crate) fn drop_all(&mut self) {
         self.under_way.clear();

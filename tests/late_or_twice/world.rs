@@ -2,12 +2,14 @@
 //! takes its turns as its shell does, unless it is frozen, and all of its code is the real one but
 //! for the shells.
 
+use std::time::Duration;
+
 use lager_comm::{Action as Does, Conversation, LinkLost};
 use lager_lines::extension::Action;
 use lager_lines::splitter::LineError;
 use lager_lines::{Name, to_line};
 use lager_ports::Stop;
-use lager_station::{Key, Output, Peer, Station, Warehouse};
+use lager_station::{Given, Key, Output, Peer, Station, Warehouse};
 use lager_topics::{Ask, AskKind, Mode, NavigatorStatus, OrderQueue, Phase, Role, StopCause};
 use lager_wire::OperatorCommand;
 
@@ -25,6 +27,8 @@ const READY: u64 = 1_500;
 const LOOK: u64 = 10;
 /// How long comm waits before it connects again, in ms.
 const AGAIN: u64 = 100;
+/// How often logic tells that it stands at goods, in ms.
+const STATUS: u64 = 50;
 /// How long the bridge may take to answer, in ms.
 const ANSWER: u64 = 500;
 
@@ -79,7 +83,11 @@ struct World {
     to_panel: Wire<Said>,
     late: Late,
     gag: Wire<String>,
+    to_gag: Wire<String>,
+    /// The GaG has been asked for a command.
+    gag_is_asked: bool,
     station: Station,
+    served: u64,
     key: Option<Key>,
     to_station: Wire<ToStation>,
     to_comm: Wire<ToComm>,
@@ -99,6 +107,7 @@ struct Comm {
     /// What it has seen of the bus.
     health: u64,
     state: u64,
+    status: u64,
     asked: Vec<(u32, u64)>,
     signed: u64,
 }
@@ -114,6 +123,7 @@ impl Comm {
             turned: now,
             health: 0,
             state: 0,
+            status: 0,
             asked: Vec::new(),
             signed: 0,
         }
@@ -146,7 +156,10 @@ impl World {
             to_panel: Wire::default(),
             late: Late::default(),
             gag: Wire::default(),
+            to_gag: Wire::default(),
+            gag_is_asked: false,
             station,
+            served: 0,
             key: None,
             to_station: Wire::default(),
             to_comm: Wire::default(),
@@ -171,6 +184,9 @@ impl World {
             }
         }
         if faults.runs(Who::Gag) {
+            for line in self.to_gag.receive(now, false) {
+                self.gag_hears(now, &line);
+            }
             // What turns the wheels by its word does so while it is there.
             if case.acts.iter().any(|(_, act)| matches!(act, Act::Say(_))) {
                 self.judge.is_there(now);
@@ -236,7 +252,9 @@ impl World {
                     self.page.press(action);
                 }
             }
-            Act::Say(command) if faults.runs(Who::Gag) => {
+            // It answers, as the document has it: what it says unasked would wait for its turn.
+            Act::Say(command) if faults.runs(Who::Gag) && self.gag_is_asked => {
+                self.gag_is_asked = false;
                 self.judge.gives(now, command.firmware());
                 self.gag.send(now, 0, written(command));
             }
@@ -262,17 +280,24 @@ impl World {
 
     /// What a page says to end the stop that it shows.
     fn resume(&mut self) -> Option<Action> {
-        let (_, health) = self.bus.health?;
-        if health.stopped != 0
-            && let Some(stop) = self.bus.stop
-        {
-            self.judge.resumes(stop.word());
-        }
-        Some(Action::Resume)
+        let shown = self.station.robot(&r1())?.shown();
+        let stop = shown.state.as_ref()?.value.stop?;
+        self.judge.resumes(stop);
+        Some(Action::Resume { stop })
     }
 
     /// A turn of the station, with the panel in it.
     fn serve(&mut self, now: u64, faults: Faults<'_>) {
+        let mut waited = 0;
+        match self.mends.aged {
+            // What waits may have come at any moment of a pause.
+            true if now - self.served > 200 => waited = now - self.served,
+            true => {}
+            // A pause counted for nothing.
+            false => (self.served + 1..now).for_each(|at| self.station.turn(moment(at).robot)),
+        }
+        self.served = now;
+        let waited = Duration::from_millis(waited);
         self.station.turn(moment(now).robot);
         for Said { said_ms, action } in self.to_panel.receive(now, faults.is_cut(Line::Page)) {
             let late = self.late.hear(said_ms, moment(now).robot);
@@ -284,13 +309,19 @@ impl World {
             let _ = self.station.stay(&r1(), key);
         }
         for line in self.gag.receive(now, false) {
-            self.station.heard(Peer::Gag, Ok(&line));
+            self.station.heard_late(Peer::Gag, waited, Ok(&line));
+        }
+        if self.station.watches_gag() {
+            let has_read = self.to_gag.is_empty() && self.gag.is_empty();
+            self.station.gag_has_read(has_read || !self.mends.seen);
         }
         for what in self.to_station.receive(now, faults.is_cut(Line::Link)) {
             match what {
                 ToStation::Up(link) => self.station.connected(Peer::Robot(link)),
                 ToStation::Line(link, line) => {
-                    self.station.heard(Peer::Robot(link), Ok(line.trim_end()));
+                    let line = self.mends.to_station(line.trim_end());
+                    self.station
+                        .heard_late(Peer::Robot(link), waited, Ok(&line));
                 }
                 ToStation::Down(link) => self.station.disconnected(Peer::Robot(link)),
             }
@@ -299,7 +330,10 @@ impl World {
         for output in self.station.outputs() {
             let slow = faults.slow(Line::Link);
             match output {
-                Output::Say { to: Peer::Gag, line } => self.gag_hears(now, &line, faults),
+                Output::Say {
+                    to: Peer::Gag,
+                    line,
+                } => self.to_gag.send(now, 0, line),
                 Output::Say { line, .. } | Output::SayFirst { line, .. } => {
                     self.to_comm.send(now, slow + 1, Some(line));
                 }
@@ -313,27 +347,23 @@ impl World {
     }
 
     /// What a page says, as the panel hands it on.
-    fn panel(&mut self, late: std::time::Duration, action: Action) {
-        if self.mends.aged && late.as_millis() > 200 {
-            return;
-        }
+    fn panel(&mut self, late: Duration, action: Action) {
+        let late = self.mends.age(late);
         let Some(key) = self.key else { return };
         let _ = match action {
-            Action::Drive { wheels, .. } => self.station.drive(&r1(), key, wheels),
-            Action::Arm(step) => self.station.arm(&r1(), key, step),
-            other => self.station.act(&r1(), other),
+            Action::Drive { wheels, .. } => self.station.drive(&r1(), key, Given { what: wheels, late }),
+            Action::Arm(step) => self.station.arm(&r1(), key, Given { what: step, late }),
+            what => self.station.act(&r1(), Given { what, late }),
         };
     }
 
     /// A GaG describes the floor when it is asked; what it commands it says by itself.
-    fn gag_hears(&mut self, now: u64, line: &str, faults: Faults<'_>) {
-        if !faults.runs(Who::Gag) {
-            return;
-        }
+    fn gag_hears(&mut self, now: u64, line: &str) {
         let answer = match line.trim_end() {
             "sidelength" => "sidelength 50",
             "karta" => "karta 2 2 0 0",
             "prodlis" => "prodlis 1 1 0 0 left",
+            "styrcomm" | "armcomm" => return self.gag_is_asked = true,
             _ => return,
         };
         self.gag.send(now, 1, answer.to_owned());
@@ -369,8 +399,8 @@ impl World {
             self.to_station.send(now, 1, ToStation::Up(now));
             comm.conversation.connected(at);
         }
-        if self.way != Way::ByHand && !self.mends.signs {
-            // Where logic drives a pause counted for nothing.
+        if !self.mends.aged || (self.way != Way::ByHand && !self.mends.signs) {
+            // A pause counted for nothing, or did where logic drives.
             for between in (comm.turned + 1..now).step_by(20) {
                 comm.conversation.turn(comm_moment(between));
             }
@@ -379,11 +409,16 @@ impl World {
         comm.conversation.turn(at);
         self.do_all(now, faults);
         self.see(now);
+        let stop_word = self.bus.health.map_or(0, |(_, health)| health.stop_word);
         let comm = self.comm.as_mut().expect("it lives");
+        if !self.mends.aged && !arrived.is_empty() {
+            // So did a silence of the link.
+            comm.conversation.heard(at, &[]);
+        }
         let mut lines: Vec<Result<String, LineError>> = Vec::new();
         for line in arrived {
             match line {
-                Some(line) => lines.push(Ok(line.trim_end().to_owned())),
+                Some(line) => lines.push(Ok(self.mends.to_comm(line.trim_end(), stop_word))),
                 None => {
                     comm.conversation.heard(at, &core::mem::take(&mut lines));
                     comm.conversation.disconnected(at);
@@ -405,8 +440,8 @@ impl World {
             comm.health = published;
             comm.conversation.health(at, &health);
         }
-        let picks = self.way == Way::Picking;
-        if picks && now.is_multiple_of(50) {
+        if self.way == Way::Picking && now >= comm.status + STATUS {
+            comm.status = now;
             let status = NavigatorStatus {
                 phase: Phase::Picking.into(),
                 ..NavigatorStatus::default()
@@ -495,9 +530,10 @@ fn comm_moment(now: u64) -> lager_comm::Moment {
 }
 
 /// As `lager resume` asks.
-fn resume_here(_stop: Stop) -> Ask {
+fn resume_here(stop: Stop) -> Ask {
     Ask {
         kind: AskKind::Resume.into(),
+        stop_word: stop.word(),
         ..Ask::default()
     }
 }
