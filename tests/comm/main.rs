@@ -6,6 +6,7 @@ mod by_arm;
 mod extended;
 mod full;
 mod gag;
+mod heir;
 mod late;
 mod lost;
 mod pace;
