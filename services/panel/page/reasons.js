@@ -83,6 +83,7 @@ const TABLE = [
   // The steering board, of a command.
   ["{command} is refused: {why}", "{command} nekas: {why}"],
   ["{command} is over: the robot was held up for {ms} ms; give it anew", "{command} är över: roboten hölls upp i {ms} ms; gör om det"],
+  ["{command} is over: the steering board has not reported for {ms} ms; give it anew", "{command} är över: styrkortet har inte rapporterat på {ms} ms; gör om det"],
   ["{command} does not come to its end", "{command} kommer inte till sitt slut"],
   ["{command} has not ended", "{command} är inte klart"],
   ["{command} is done", "{command} är klart"],
