@@ -72,9 +72,7 @@ fn lager_drive_moves_nothing_after_the_death_of_the_bridge() {
     for signal in ENDS {
         // A command that was held up on this machine is given anew.
         let mut drive = wait_for("the robot to drive", || {
-            let mut drive = scene
-                .domain
-                .start(&["drive", "left", "--seconds", "120"]);
+            let mut drive = scene.domain.start(&["drive", "left", "--seconds", "120"]);
             loop {
                 if !drive.is_running() {
                     return None;

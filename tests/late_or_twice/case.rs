@@ -54,7 +54,10 @@ pub(crate) enum Fault {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Act {
     /// A person holds a key of a page for so long, and lets go.
-    Hold { command: OperatorCommand, lasts: u64 },
+    Hold {
+        command: OperatorCommand,
+        lasts: u64,
+    },
     /// A person presses a key of a page for what runs once.
     Press(OperatorCommand),
     /// A person at a page wants the stop that he sees to be over.
@@ -62,7 +65,10 @@ pub(crate) enum Act {
     /// The GaG says a command, once.
     Say(OperatorCommand),
     /// Somebody at the robot runs `lager drive` for so long.
-    Drive { command: OperatorCommand, lasts: u64 },
+    Drive {
+        command: OperatorCommand,
+        lasts: u64,
+    },
     /// Somebody at the robot stops it.
     Stop,
     /// Somebody at the robot ends the stop that he sees.

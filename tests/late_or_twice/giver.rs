@@ -58,7 +58,11 @@ impl Page {
             } else {
                 judge.gives(now, command.firmware());
             }
-            actions.push(drive(if is_over { OperatorCommand::Stop } else { command }));
+            actions.push(drive(if is_over {
+                OperatorCommand::Stop
+            } else {
+                command
+            }));
         }
         if self.here <= now {
             self.here = now + HERE;
@@ -125,8 +129,8 @@ impl Drive {
             if report.age_ms == 0 {
                 self.reported = bus.state.map_or(0, |(at, _)| at);
             }
-            let is_own = report.finished_origin == Origin::Operator
-                && report.finished_id == self.order.id;
+            let is_own =
+                report.finished_origin == Origin::Operator && report.finished_id == self.order.id;
             if is_own && report.finish != Finish::None {
                 return false;
             }

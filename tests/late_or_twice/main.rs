@@ -11,6 +11,7 @@
 //! each mend is shown to be needed: without it the same search finds who breaks a law.
 
 mod case;
+mod faults;
 mod giver;
 mod judge;
 #[path = "../../services/panel/src/late.rs"]
@@ -25,9 +26,6 @@ use case::{Act, Case, Fault, LEFT, Line, TURN, Way, Who, cases, squeeze};
 use mends::Mends;
 use proptest::prelude::*;
 use world::run;
-
-
-
 
 fn case(way: Way, acts: &[(u64, Act)], faults: &[Fault]) -> Case {
     Case {
@@ -84,7 +82,10 @@ fn found() -> Vec<(&'static str, Case, fn(&mut Mends))> {
         ),
         (
             "a GaG's turn at a frozen station",
-            by_hand(&[(1_000, Act::Say(LEFT))], &[frozen(Who::Station, 900, 1_000)]),
+            by_hand(
+                &[(1_000, Act::Say(LEFT))],
+                &[frozen(Who::Station, 900, 1_000)],
+            ),
             |mends| mends.aged = false,
         ),
         (
@@ -169,7 +170,10 @@ fn without_its_mend_each_of_them_happens() {
             kept.push(name);
         }
     }
-    assert!(kept.is_empty(), "these happen no more without it: {kept:#?}");
+    assert!(
+        kept.is_empty(),
+        "these happen no more without it: {kept:#?}"
+    );
 }
 
 /// A model in which nothing ever moves would keep both laws.
@@ -199,7 +203,11 @@ fn a_step_of_the_arm_that_takes_long_comes_to_its_end() {
     for way in [Way::ByHand, Way::Picking] {
         let case = case(way, &[(500, Act::Say(squeeze()))], &[]);
         let whole = run(&case, Mends::ALL);
-        assert_eq!((whole.one_shots, whole.hung_up), (1, 0), "{way:?} {whole:?}");
+        assert_eq!(
+            (whole.one_shots, whole.hung_up),
+            (1, 0),
+            "{way:?} {whole:?}"
+        );
         assert!(whole.faults.is_empty(), "{way:?} {whole:?}");
         let mends = Mends {
             signs: false,
@@ -213,7 +221,8 @@ fn a_step_of_the_arm_that_takes_long_comes_to_its_end() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: std::env::var("LATE_CASES").map_or(128, |cases| cases.parse().unwrap()),
+        // Each joins seven seconds of everything.
+        cases: ProptestConfig::default().cases / 2,
         // A case that is found becomes one of `found`.
         failure_persistence: None,
         ..ProptestConfig::default()

@@ -13,7 +13,8 @@ use lager_station::{Given, Key, Output, Peer, Station, Warehouse};
 use lager_topics::{Ask, AskKind, Mode, NavigatorStatus, OrderQueue, Phase, Role, StopCause};
 use lager_wire::OperatorCommand;
 
-use crate::case::{Act, Case, Fault, LENGTH, Line, Way, Who};
+use crate::case::{Act, Case, LENGTH, Line, Way, Who};
+use crate::faults::{Faults, READY};
 use crate::giver::{Drive, Logic, Page, Said, drive};
 use crate::judge::Judge;
 use crate::late::Late;
@@ -21,8 +22,6 @@ use crate::mends::Mends;
 use crate::robot::{Bus, Robot, moment};
 use crate::wire::Wire;
 
-/// When the robot can be driven, in ms: its boards are up by then, and somebody has its wheel.
-const READY: u64 = 1_500;
 /// How often comm and station look around at least, in ms.
 const LOOK: u64 = 10;
 /// How long comm waits before it connects again, in ms.
@@ -245,7 +244,8 @@ impl World {
                     command => drive(command),
                 };
                 self.judge.gives(now, command.firmware());
-                self.page.press(action.expect("a command to the wheels or the arm"));
+                self.page
+                    .press(action.expect("a command to the wheels or the arm"));
             }
             Act::Resume if faults.runs(Who::Page) => {
                 if let Some(action) = self.resume() {
@@ -351,7 +351,9 @@ impl World {
         let late = self.mends.age(late);
         let Some(key) = self.key else { return };
         let _ = match action {
-            Action::Drive { wheels, .. } => self.station.drive(&r1(), key, Given { what: wheels, late }),
+            Action::Drive { wheels, .. } => {
+                self.station.drive(&r1(), key, Given { what: wheels, late })
+            }
             Action::Arm(step) => self.station.arm(&r1(), key, Given { what: step, late }),
             what => self.station.act(&r1(), Given { what, late }),
         };
@@ -512,10 +514,12 @@ impl World {
                     comm.signed = now;
                 }
                 if line.starts_with("thought") || line.starts_with("refused") {
-                    self.thoughts.push(format!("at {now} ms: {}", line.trim_end()));
+                    self.thoughts
+                        .push(format!("at {now} ms: {}", line.trim_end()));
                 }
                 let slow = faults.slow(Line::Link);
-                self.to_station.send(now, slow + 1, ToStation::Line(link, line));
+                self.to_station
+                    .send(now, slow + 1, ToStation::Line(link, line));
             }
         }
     }
@@ -542,54 +546,3 @@ fn resume_here(stop: Stop) -> Ask {
 fn written(command: OperatorCommand) -> String {
     lager_lines::gag::Answer::Command(command).to_string()
 }
-
-/// What is wrong at a moment.
-#[derive(Clone, Copy)]
-struct Faults<'a>(u64, &'a [Fault]);
-
-impl Faults<'_> {
-    fn is_in(self, at: u64, lasts: u64) -> bool {
-        (at + READY..at + READY + lasts).contains(&self.0)
-    }
-
-    fn runs(self, process: Who) -> bool {
-        !self.1.iter().any(|fault| match *fault {
-            Fault::Freeze { who, at, lasts } => who == process && self.is_in(at, lasts),
-            Fault::Replace { at, lasts } => process == Who::Bridge && self.is_in(at, lasts),
-            _ => false,
-        })
-    }
-
-    fn is_killed(self, process: Who) -> bool {
-        self.1.iter().any(|fault| match *fault {
-            Fault::Kill { who, at, back } => who == process && self.is_in(at, back),
-            // Who was found silent is killed, and its successor takes a moment.
-            Fault::Replace { at, lasts } => {
-                process == Who::Bridge && self.is_in(at + lasts, REPLACED)
-            }
-            _ => false,
-        })
-    }
-
-    fn is_cut(self, wire: Line) -> bool {
-        self.1.iter().any(|fault| {
-            matches!(*fault, Fault::Cut { line, at, lasts } if line == wire && self.is_in(at, lasts))
-        })
-    }
-
-    fn slow(self, wire: Line) -> u64 {
-        let slow = self.1.iter().map(|fault| match *fault {
-            Fault::Slow {
-                line,
-                at,
-                lasts,
-                by,
-            } if line == wire && self.is_in(at, lasts) => by,
-            _ => 0,
-        });
-        slow.sum()
-    }
-}
-
-/// How long a killed bridge's successor takes at the least, in ms.
-const REPLACED: u64 = 60;

@@ -27,12 +27,12 @@ use gpiocdev::line::{Bias, EdgeDetection, EdgeKind, Value};
 use lager_ports::Clock;
 use lager_topics::Mode;
 
+use crate::presses::LONGEST_NS;
+
 /// How often the wish to end is looked at.
 const LOOK: Duration = Duration::from_millis(100);
 /// How many looks pass before a chip that could not be had is tried again.
 const LOOKS: u32 = 20;
-/// A press that is older than this no longer counts, in real ns.
-const LONGEST_NS: u64 = 1_000_000_000;
 
 /// Which lines they are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -116,7 +116,7 @@ impl Contacts {
         counts.then_some(Touch::Switched(mode))
     }
 
-    /// The reset button has moved.
+    /// The reset button has moved; a press that is too old no longer counts.
     fn reset(is_closed: bool, moved_ns: u64, now_ns: u64) -> Option<Touch> {
         let is_fresh = moved_ns.abs_diff(now_ns) < LONGEST_NS;
         (is_closed && is_fresh).then_some(Touch::Reset)

@@ -9,7 +9,7 @@ use crate::arbiter::STALE;
 
 /// A press that is older than this no longer counts, in real ns: it lets the robot move, and the
 /// person who pressed has given it up.
-const LONGEST_NS: u64 = STALE.as_nanos() as u64 + 1;
+pub(crate) const LONGEST_NS: u64 = STALE.as_nanos() as u64 + 1;
 
 /// The presses taken last.
 #[derive(Clone, Copy, Debug, Default)]

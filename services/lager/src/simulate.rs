@@ -354,7 +354,8 @@ impl Whole {
         self.stirred |= self.bridge.next_due() <= self.now;
         while std::mem::take(&mut self.stirred) {
             for order in std::mem::take(&mut self.orders) {
-                self.bridge.order(self.now, self.now, Duration::ZERO, &order);
+                self.bridge
+                    .order(self.now, self.now, Duration::ZERO, &order);
             }
             self.bridge.decide(self.now);
             self.act();

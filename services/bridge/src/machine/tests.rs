@@ -96,7 +96,7 @@ fn step(core: &mut BridgeCore, millis: u64) -> Option<(&'static str, Option<u8>)
         Action::ShowReport(shown) if shown.proves_rest => ("at rest", None),
         Action::ShowReport(_) => ("report", None),
         Action::Stop(_) => ("stop", None),
-        Action::Release => ("release", None),
+        Action::Release(_) => ("release", None),
         Action::Say(News::Profile(ArmProfileState::Unanswered)) => ("no answer", None),
         Action::Say(_) => ("news", None),
     })
@@ -239,11 +239,7 @@ fn what_lets_the_robot_move_is_asked_for_at_once_or_not_at_all() {
         for (found, outcome) in [(1_202, Outcome::Done), (1_203, outcome)] {
             let mut core = core();
             core.ask(at(found), &ask);
-            for action in std::iter::from_fn(|| core.next(at(found))).collect::<Vec<_>>() {
-                if matches!(action, Action::Release) {
-                    core.released(true);
-                }
-            }
+            turn(&mut core, found);
             let answer = core.answer().expect("an answer at once");
             assert_eq!(answer.outcome, outcome, "{kind:?}, found at {found}");
         }
