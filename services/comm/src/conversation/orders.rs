@@ -79,10 +79,18 @@ impl Conversation {
     /// Carries an action out; it is answered when it is done or refused. `is_stopped`: a stop has
     /// come with it.
     pub(super) fn carry_out(&mut self, now: Moment, number: u32, wanted: Wanted, is_stopped: bool) {
-        let begun = match is_stopped && ends_a_stop(wanted) {
-            true => Err("a stop has come with it; give it anew".into()),
-            false => self.begin(now, number, wanted),
+        let last = self.last_number.filter(|last| number <= *last);
+        let begun = match last {
+            Some(last) => Err(format!(
+                "the last action on this connection had the number {last}, so number {number} may \
+                 have been carried out before; give it anew with a greater number"
+            )),
+            None if is_stopped && ends_a_stop(wanted) => {
+                Err("a stop has come with it; give it anew".into())
+            }
+            None => self.begin(now, number, wanted),
         };
+        self.last_number = self.last_number.max(Some(number));
         match begun {
             Ok(Begun::Waits) => {}
             Ok(Begun::Done) => self.reply(number, Ok(())),
