@@ -129,6 +129,71 @@ pub(crate) fn must_have_filled_its_disk(domain: &Domain, recorder: Child) {
 }
 
 #[test]
+fn a_file_that_may_not_become_longer_ends_whole_and_kills_nobody() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let mut noisy = Noisy::new(&bus);
+    // 8192 blocks of 512 bytes.
+    let mut recorder = Command::new("sh")
+        .args(["-c", "ulimit -f 8192 && exec \"$@\"", "sh"])
+        .arg(lager())
+        .arg("--bus")
+        .arg(domain.bus_folder())
+        .args(["bag", "record", "long.mcap", "--topic", "noise/now"])
+        .current_dir(domain.folder())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("a shell");
+    wait_for("the file to be as long as it may", || {
+        (0..4).for_each(|_| noisy.send());
+        recorder.try_wait().expect("a child")
+    });
+    let output = recorder.wait_with_output().expect("a child");
+    let told = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("may not become longer (`ulimit -f`"),
+        "{told}"
+    );
+    must_be_right(&domain, "long.mcap");
+    let long = fs::metadata(domain.folder().join("long.mcap")).expect("a file");
+    assert!(long.len() <= 4 << 20, "{}", long.len());
+    drop((noisy, bus));
+    domain.assert_clean();
+}
+
+#[test]
+fn a_file_that_somebody_removes_is_told_at_once_and_is_no_success() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let mut noisy = Noisy::new(&bus);
+    let mut recorder = recorder(&domain, &["--topic", "noise/now", "gone.mcap"]);
+    noisy.meet(&recorder);
+    let file = domain.folder().join("gone.mcap");
+    fs::remove_file(&file).expect("it records into it");
+    wait_for("another file, and a word of it", || {
+        noisy.send();
+        let is_told = recorder.log().contains("was removed while it was recorded");
+        (file.is_file() && is_told).then_some(())
+    });
+    (0..10).for_each(|_| noisy.send());
+    recorder.signal(Signal::TERM);
+    assert_eq!(recorder.wait(), Some(1), "{}", recorder.log());
+    assert!(
+        recorder
+            .log()
+            .contains("the recording goes on in gone.mcap"),
+        "{}",
+        recorder.log()
+    );
+    must_be_right(&domain, "gone.mcap");
+    drop((noisy, bus));
+    domain.assert_clean();
+}
+
+#[test]
 fn a_robot_delivers_while_the_disk_of_its_recorder_fills_up() {
     let domain = Domain::new();
     let mut recorder = record_on_a_small_disk(&domain, 1_536, &["--wait"]);

@@ -4,10 +4,12 @@ use std::fs;
 
 use lager_ports::{Bus, Cause};
 use lager_tests::{Domain, wait_for};
-use lager_topics::{DistanceFrame, LineFrame, Role, SensorDistance, SensorLine, Topic};
+use lager_topics::{
+    DistanceFrame, LineFrame, NavMap, Role, SensorDistance, SensorLine, Topic, WarehouseMap,
+};
 use rustix::process::Signal;
 
-use crate::{NoiseNow, Noisy, Seen, done, end, guest, read, recorder, said};
+use crate::{NoiseNow, Noisy, Seen, done, end, guest, info, must_be_right, read, recorder, said};
 
 /// Records three hundred lines of robot `r1`, which somebody sends who has gone afterwards.
 fn recorded(domain: &Domain) -> Seen {
@@ -284,6 +286,73 @@ fn somebodys_own_topic_is_played_to_those_who_have_it_open() {
     }
     assert_eq!(player.wait(), Some(0), "{}", player.log());
     assert_eq!(heard.lost(), 0);
+    drop((heard, bus));
+    domain.assert_clean();
+}
+
+#[test]
+fn every_part_and_every_later_begin_says_what_held_before() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let maps = bus.publisher::<NavMap>().expect("a topic");
+    let lines = bus.publisher::<SensorLine>().expect("a topic");
+    let args = ["--topic", "nav/map", "--topic", "sensor/line"];
+    let whole = recorder(&domain, &[&args[..], &["whole.mcap"]].concat());
+    let parts = recorder(
+        &domain,
+        &[&args[..], &["--split-time", "0.5", "part.mcap"]].concat(),
+    );
+    let mut map = WarehouseMap::default();
+    (map.width, map.height) = (7, 5);
+    maps.send(Cause::OWN, map).expect("a sample");
+    wait_for("the third file", || {
+        lines
+            .send(Cause::OWN, LineFrame::default())
+            .expect("a sample");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        let third = domain.folder().join("part-002.mcap");
+        third.is_file().then_some(())
+    });
+    let told = end(parts);
+    end(whole);
+    drop((maps, lines, bus));
+    for (part, file) in told["files"].as_array().expect("files").iter().enumerate() {
+        let file = file.as_str().expect("a name");
+        must_be_right(&domain, file);
+        let info = info(&domain, file);
+        let topics = info["topics"].as_array().expect("topics");
+        let map = topics.iter().find(|topic| topic["topic"] == NavMap::NAME);
+        let map = map.expect("the map");
+        assert_eq!(map["messages"], 1, "{info}");
+        assert_eq!(map["repeated"], u64::from(part > 0), "{info}");
+    }
+
+    let bus = Bus::open(&domain.bus("r2", 1.0), Role::Guest).expect("the bus opens");
+    let mut heard = bus.subscriber::<NavMap>().expect("a topic");
+    let play = ["--name", "r2", "bag", "play", "whole.mcap", "--from", "0.4"];
+    let mut player = domain.start(&play);
+    let map = wait_for("the map", || {
+        heard.receive().expect("readable").map(|map| *map)
+    });
+    assert_eq!((map.width, map.height), (7, 5));
+    assert_eq!(player.wait(), Some(0), "{}", player.log());
+    assert_eq!(heard.lost(), 0);
+    assert!(
+        heard.receive().expect("readable").is_none(),
+        "it comes once"
+    );
+    // Behind the recording's end nothing holds that it could know of.
+    let late = [
+        "--name",
+        "r2",
+        "bag",
+        "play",
+        "whole.mcap",
+        "--from",
+        "1000",
+    ];
+    let none = domain.run(&late);
+    assert_eq!(none.status.code(), Some(1), "{}", said(&none));
     drop((heard, bus));
     domain.assert_clean();
 }

@@ -134,7 +134,7 @@ fn rewrite(from: &Path, to: &Path, change: Change<'_>) {
                 return;
             }
             let schema = EnvelopeSchema {
-                name: message.topic.schema.clone(),
+                name: message.topic.schema.to_string(),
                 text: message.topic.schema_text.clone(),
             };
             let channel = *self.channels.entry(message.channel).or_insert_with(|| {

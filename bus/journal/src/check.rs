@@ -2,7 +2,8 @@
 //!
 //! Each topic's numbers must rise within each stream, and no more of them may be skipped than the
 //! file says were lost or dropped. That is exact in one direction only: of a stream that began
-//! before the recording nobody knows what came before its first sample.
+//! before the recording nobody knows what came before its first sample. A sample that is repeated
+//! from an earlier file is only read: its number is counted there.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
@@ -10,8 +11,9 @@ use std::fmt;
 use mcap::records::{ChunkIndex, Statistics};
 use serde::de::IgnoredAny;
 
+use crate::calendar::{self, Step};
 use crate::counts::{self, Count, Counts};
-use crate::envelope::Envelope;
+use crate::envelope::{Content, Envelope};
 use crate::numbers::Numbers;
 use crate::walk::{Damage, Message, Visit};
 use crate::write::{RECORDING, Start};
@@ -103,6 +105,8 @@ impl fmt::Display for Fault {
 pub struct TopicReport {
     /// Messages that are there.
     pub messages: u64,
+    /// Those of them that were sent before the file began, and stand in an earlier one as well.
+    pub repeated: u64,
     /// Numbers that were skipped between them.
     pub gaps: u64,
     /// What the file says.
@@ -118,6 +122,12 @@ pub struct Report {
     pub topics: BTreeMap<String, TopicReport>,
     /// Chunks that are whole.
     pub chunks: u64,
+    /// Whether messages stand outside of chunks.
+    pub has_loose: bool,
+    /// Log time of the first message, in ns since 1970; 0 without messages.
+    pub begin_ns: u64,
+    /// When the machine's calendar was set meanwhile.
+    pub steps: Vec<Step>,
     /// What is wrong, as far as it was kept.
     pub faults: Vec<Fault>,
     /// How much is wrong.
@@ -134,6 +144,8 @@ pub struct Check {
     /// Names and messages of the topics, by their numbers in the file.
     channels: HashMap<u16, (String, u64)>,
     chunks: HashSet<u64>,
+    in_chunks: u64,
+    begin_ns: Option<u64>,
     indexed: HashSet<u64>,
     statistics: Option<Statistics>,
 }
@@ -165,23 +177,37 @@ impl Check {
             self.fault(Fault::NoCounts);
         }
         self.compare_with_index();
+        let topics = self.report.topics.values();
+        let messages: u64 = topics.map(|topic| topic.messages).sum();
+        self.report.has_loose = messages > self.in_chunks;
+        self.report.begin_ns = self.begin_ns.unwrap_or_default();
         self.report
     }
 
-    /// An index that was not reached is not compared.
+    /// An index that was not reached is not compared. Each of its records is optional, and so are
+    /// the counts of the channels in it: what it does not say is not wrong.
     fn compare_with_index(&mut self) {
-        let Some(statistics) = self.statistics.take() else {
-            return;
-        };
-        for (id, (topic, there)) in std::mem::take(&mut self.channels) {
-            let told = statistics.channel_message_counts.get(&id).copied();
-            let told = told.unwrap_or_default();
-            if told != there {
-                self.fault(Fault::Statistics { topic, told, there });
+        if let Some(statistics) = self.statistics.take() {
+            let mut told = statistics.channel_message_counts;
+            let mut all = 0;
+            for (id, (topic, there)) in std::mem::take(&mut self.channels) {
+                all += there;
+                let has_none = told.is_empty() && statistics.message_count > 0;
+                let told = told.remove(&id).unwrap_or_default();
+                if told != there && !has_none {
+                    self.fault(Fault::Statistics { topic, told, there });
+                }
+            }
+            if all != statistics.message_count {
+                self.fault(Fault::Statistics {
+                    topic: "all topics".to_owned(),
+                    told: statistics.message_count,
+                    there: all,
+                });
             }
         }
         let chunks = self.chunks.symmetric_difference(&self.indexed).count();
-        if chunks > 0 {
+        if chunks > 0 && !self.indexed.is_empty() {
             self.fault(Fault::Index { chunks });
         }
     }
@@ -199,12 +225,18 @@ impl Visit for Check {
         let name = &message.topic.name;
         let topic = self.report.topics.entry(name.clone()).or_default();
         topic.messages += 1;
+        let log = message.times.log;
+        self.begin_ns = Some(self.begin_ns.map_or(log, |begin_ns| begin_ns.min(log)));
         let channel = self.channels.entry(message.channel);
         channel.or_insert_with(|| (name.clone(), 0)).1 += 1;
-        if !self.report.is_ours || message.topic.derived_from.is_some() {
+        let content = &message.topic.content;
+        let is_repeated = *content == Content::Repeated;
+        topic.repeated += u64::from(is_repeated);
+        if !self.report.is_ours || matches!(content, Content::Derived(_)) {
             return;
         }
         let fault = match serde_json::from_slice::<Envelope<IgnoredAny>>(message.data) {
+            Ok(_) if is_repeated => None,
             Ok(envelope) => {
                 let numbers = self.numbers.entry(name.clone()).or_default();
                 let noted = numbers.note(&envelope.stamp, envelope.lost, envelope.dropped);
@@ -230,12 +262,15 @@ impl Visit for Check {
             self.start = Some(Start::of_texts(texts));
         } else if name == counts::NAME {
             self.counts = Some(counts::of_texts(texts));
+        } else if self.report.steps.len() < calendar::MOST {
+            self.report.steps.extend(Step::of_note(name, texts));
         }
     }
 
-    fn chunk(&mut self, at: u64) {
+    fn chunk(&mut self, found: &ChunkIndex, messages: u64) {
         self.report.chunks += 1;
-        self.chunks.insert(at);
+        self.in_chunks += messages;
+        self.chunks.insert(found.chunk_start_offset);
     }
 
     fn chunk_index(&mut self, index: &ChunkIndex) {

@@ -1,6 +1,7 @@
 //! One message: a sample's stamp and payload, and what its topic lacks before it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use lager_topics::{Description, Field, Stamp, describe};
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ pub struct EnvelopeSchema {
     /// The payload's name, such as `LineFrame`.
     pub name: String,
     /// JSON Schema (2020-12).
-    pub text: Vec<u8>,
+    pub text: Arc<[u8]>,
 }
 
 impl EnvelopeSchema {
@@ -50,7 +51,7 @@ impl EnvelopeSchema {
         });
         Self {
             name: payload.name().to_owned(),
-            text: schema.to_string().into_bytes(),
+            text: schema.to_string().into_bytes().into(),
         }
     }
 
@@ -76,26 +77,50 @@ fn as_value(description: &Description) -> serde_json::Value {
     serde_json::to_value(description.json_schema()).expect("a schema is JSON")
 }
 
-/// What the metadata of a channel of derived messages has; the text says of what they are made.
-const DERIVED: &str = "lager.derived";
-
-/// The channel's metadata: what a stranger wants to know of the times in it, or that it is derived.
-pub(crate) fn channel_notes(derived_from: Option<&str>) -> BTreeMap<String, String> {
-    let note = match derived_from {
-        None => (
-            "times",
-            "stamp: ns of CLOCK_MONOTONIC; log and publish time: ns since 1970",
-        ),
-        Some(from) => (DERIVED, from),
-    };
-    [note]
-        .map(|(name, text)| (name.to_owned(), text.to_owned()))
-        .into()
+/// What the messages of a channel are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// Samples of the topic, as they came.
+    #[default]
+    Samples,
+    /// The last sample of the topic from before the file began, with the stamp that it had. It
+    /// stands at the file's beginning so that the file can be used alone, and is counted nowhere.
+    Repeated,
+    /// Made of the samples of these topics for viewers; they are no samples.
+    Derived(String),
 }
 
-/// Of what a channel with such metadata is derived.
-pub(crate) fn derived_from(notes: &BTreeMap<String, String>) -> Option<&str> {
-    notes.get(DERIVED).map(String::as_str)
+/// What the metadata of a channel of derived messages has; the text says of what they are made.
+const DERIVED: &str = "lager.derived";
+/// What the metadata of a channel of repeated samples has.
+const REPEATED: &str = "lager.repeated";
+
+impl Content {
+    /// The channel's metadata: what a stranger wants to know of the times in it, and what is not
+    /// recorded but repeated or derived.
+    pub(crate) fn to_notes(&self) -> BTreeMap<String, String> {
+        let times = (
+            "times",
+            "stamp: ns of CLOCK_MONOTONIC; log and publish time: ns since 1970",
+        );
+        let notes: &[(&str, &str)] = match self {
+            Self::Samples => &[times],
+            Self::Repeated => &[times, (REPEATED, "the last sample before this file began")],
+            Self::Derived(from) => &[(DERIVED, from)],
+        };
+        let notes = notes.iter();
+        notes
+            .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
+            .collect()
+    }
+
+    pub(crate) fn of_notes(notes: &BTreeMap<String, String>) -> Self {
+        match notes.get(DERIVED) {
+            Some(from) => Self::Derived(from.clone()),
+            None if notes.contains_key(REPEATED) => Self::Repeated,
+            None => Self::Samples,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -103,6 +128,15 @@ mod tests {
     use lager_topics::LineFrame;
 
     use super::*;
+
+    #[test]
+    fn a_channels_metadata_says_what_its_messages_are() {
+        let derived = Content::Derived("nav/map".to_owned());
+        for content in [Content::Samples, Content::Repeated, derived] {
+            assert_eq!(Content::of_notes(&content.to_notes()), content);
+        }
+        assert_eq!(Content::of_notes(&BTreeMap::new()), Content::Samples);
+    }
 
     #[test]
     fn a_schema_has_the_layout_in_its_comment_and_fits_one_without() {

@@ -1,9 +1,13 @@
 //! The messages of a file by their log time, found through its index.
 
-use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions};
+use mcap::sans_io::indexed_reader::{
+    IndexedReadEvent, IndexedReader, IndexedReaderOptions, ReadOrder,
+};
 
 use crate::overview::Overview;
 use crate::read::{Part, ReadError};
+use crate::unpack::Zstd;
+use crate::walk::LONGEST;
 use crate::write::Times;
 
 /// Which messages are read.
@@ -15,12 +19,15 @@ pub struct Selection {
     pub from_ns: Option<u64>,
     /// Only earlier log times, in ns since 1970.
     pub before_ns: Option<u64>,
+    /// The latest first.
+    pub is_backwards: bool,
 }
 
 /// Reads messages by their log time.
 pub struct Ordered<'file> {
     overview: &'file Overview,
-    reader: IndexedReader,
+    /// `None` if the file has none of the topics.
+    reader: Option<IndexedReader>,
     wanted: u64,
 }
 
@@ -30,24 +37,47 @@ pub enum Step<'a> {
     /// These bytes are wanted, all of them.
     Wants(Part),
     /// A message.
-    Message {
-        /// The topic's name.
-        topic: &'a str,
-        /// When it was.
-        times: Times,
-        /// The message.
-        message: &'a [u8],
-    },
+    Message(Placed<'a>),
+}
+
+/// A message where it stands in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Placed<'a> {
+    /// The topic's name.
+    pub topic: &'a str,
+    /// Whether it is the topic's last sample from before the file.
+    pub is_repeated: bool,
+    /// When it was.
+    pub times: Times,
+    /// The message.
+    pub message: &'a [u8],
 }
 
 impl<'file> Ordered<'file> {
     /// For the file that `overview` is of.
     ///
     /// # Errors
-    /// The index is damaged, or the selection ends before it begins.
+    /// The index is damaged, or the selection ends before it begins, or messages stand outside of
+    /// chunks, where none are found.
     pub fn new(overview: &'file Overview, selection: &Selection) -> Result<Self, ReadError> {
+        if overview.has_loose {
+            return Err(ReadError::Loose);
+        }
         let mut options = IndexedReaderOptions::new();
+        options.record_length_limit = Some(LONGEST);
+        if selection.is_backwards {
+            options = options.with_order(ReadOrder::ReverseLogTime);
+        }
         if let Some(topics) = &selection.topics {
+            let mut channels = overview.summary.channels.values();
+            if !channels.any(|channel| topics.contains(&channel.topic)) {
+                // The reader takes no channel at all for every channel.
+                return Ok(Self {
+                    overview,
+                    reader: None,
+                    wanted: 0,
+                });
+            }
             options = options.include_topics(topics.iter().map(String::as_str));
         }
         if let Some(from) = selection.from_ns {
@@ -56,9 +86,11 @@ impl<'file> Ordered<'file> {
         if let Some(before) = selection.before_ns {
             options = options.ending_before(before);
         }
+        let mut reader = IndexedReader::new_with_options(&overview.summary, options)?;
+        reader.add_decompressor(Zstd)?;
         Ok(Self {
             overview,
-            reader: IndexedReader::new_with_options(&overview.summary, options)?,
+            reader: Some(reader),
             wanted: 0,
         })
     }
@@ -68,21 +100,22 @@ impl<'file> Ordered<'file> {
     /// # Errors
     /// The file is damaged.
     pub fn step(&mut self) -> Option<Result<Step<'_>, ReadError>> {
-        let step = match self.reader.next_event()? {
+        let step = match self.reader.as_mut()?.next_event()? {
             Ok(IndexedReadEvent::ReadChunkRequest { offset, length }) => {
                 self.wanted = offset;
                 Step::Wants(Part { at: offset, length })
             }
             Ok(IndexedReadEvent::Message { header, data }) => {
                 let channel = self.overview.summary.channels.get(&header.channel_id);
-                Step::Message {
+                Step::Message(Placed {
                     topic: channel.map_or("", |channel| channel.topic.as_str()),
+                    is_repeated: self.overview.repeated.contains(&header.channel_id),
                     times: Times {
                         log: header.log_time,
                         publish: header.publish_time,
                     },
                     message: data,
-                }
+                })
             }
             Err(error) => return Some(Err(error.into())),
         };
@@ -94,6 +127,9 @@ impl<'file> Ordered<'file> {
     /// # Errors
     /// They are damaged, or not as many as were wanted.
     pub fn supply(&mut self, bytes: &[u8]) -> Result<(), ReadError> {
-        Ok(self.reader.insert_chunk_record_data(self.wanted, bytes)?)
+        match &mut self.reader {
+            Some(reader) => Ok(reader.insert_chunk_record_data(self.wanted, bytes)?),
+            None => Ok(()),
+        }
     }
 }

@@ -5,14 +5,22 @@
 //! with a [`crate::Check`] before it says that anything was saved.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
+use mcap::records::ChunkIndex;
 use serde::de::IgnoredAny;
 
+use crate::calendar::Step;
 use crate::counts::{self, Count, Counts};
-use crate::envelope::{Envelope, EnvelopeSchema};
+use crate::envelope::{Content, Envelope, EnvelopeSchema};
 use crate::numbers::Numbers;
-use crate::walk::{Damage, Message, Visit};
-use crate::write::{Channel, Journal, RECORDING, Start, WriteError};
+use crate::walk::{Damage, Message, Topic, Visit};
+use crate::write::{Channel, Journal, RECORDING, Schema, Start, WriteError};
+
+/// Messages that stand outside of chunks are put into chunks of so many bytes.
+const CHUNK: u64 = 1 << 20;
+/// So many faults of the old file are kept.
+const MOST: usize = 100;
 
 /// What was recovered.
 #[derive(Debug, Default)]
@@ -21,7 +29,7 @@ pub struct Recovered {
     pub messages: u64,
     /// Chunks that were copied.
     pub chunks: u64,
-    /// What is wrong with the old file; empty if nothing is.
+    /// What is wrong with the old file, as far as it was kept; empty if nothing is.
     pub damage: Vec<Damage>,
 }
 
@@ -32,6 +40,9 @@ pub struct Recovery {
     journal: Option<Journal>,
     start: Start,
     channels: HashMap<u16, Channel>,
+    /// The schemas that the new file has, each found by where the walk keeps it: many topics may
+    /// share a large one.
+    schemas: HashMap<usize, (Arc<[u8]>, Schema)>,
     numbers: BTreeMap<String, Numbers>,
     counts: Option<Counts>,
     recovered: Recovered,
@@ -80,29 +91,31 @@ impl Recovery {
             return Ok(());
         };
         // Whoever wrote another message than the recorder gets it back, and no number is counted.
+        let is_repeated = message.topic.content == Content::Repeated;
         let envelope = serde_json::from_slice::<Envelope<IgnoredAny>>(message.data);
         let stamp = envelope.map(|envelope| {
-            let numbers = self.numbers.entry(message.topic.name.clone()).or_default();
-            // A number that is not above the last one stays as it is; `check` tells.
-            let _ = numbers.note(&envelope.stamp, envelope.lost, envelope.dropped);
+            if !is_repeated {
+                let numbers = self.numbers.entry(message.topic.name.clone()).or_default();
+                // A number that is not above the last one stays as it is; `check` tells.
+                let _ = numbers.note(&envelope.stamp, envelope.lost, envelope.dropped);
+            }
             envelope.stamp.sequence
         });
         let channel = match self.channels.get(&message.channel) {
             Some(channel) => *channel,
             None => {
                 let topic = message.topic;
-                let schema = EnvelopeSchema {
-                    name: topic.schema.clone(),
-                    text: topic.schema_text.clone(),
-                };
-                let derived_from = topic.derived_from.as_deref();
-                let channel = journal.channel(&topic.name, &schema, derived_from)?;
+                let schema = schema(journal, &mut self.schemas, topic)?;
+                let channel = journal.channel(&topic.name, schema, &topic.content)?;
                 self.channels.insert(message.channel, channel);
                 channel
             }
         };
         let number = stamp.unwrap_or_default();
         journal.write(channel, message.times, number, message.data)?;
+        if journal.open() >= CHUNK && !message.is_in_chunk {
+            journal.flush()?;
+        }
         self.recovered.messages += 1;
         Ok(())
     }
@@ -123,6 +136,12 @@ impl Visit for Recovery {
     fn note(&mut self, name: &str, texts: &BTreeMap<String, String>) {
         if name == counts::NAME {
             self.counts = Some(counts::of_texts(texts));
+        } else if let Some(step) = Step::of_note(name, texts) {
+            let noted = self
+                .journal
+                .as_mut()
+                .map_or(Ok(()), |journal| journal.step(&step));
+            self.note_failure(noted);
         } else if name == RECORDING && self.journal.is_none() {
             self.start = Start::of_texts(texts);
             match Journal::begin(&self.start) {
@@ -132,13 +151,33 @@ impl Visit for Recovery {
         }
     }
 
-    fn chunk(&mut self, _at: u64) {
+    fn chunk(&mut self, _found: &ChunkIndex, _messages: u64) {
         let flushed = self.journal.as_mut().map_or(Ok(()), Journal::flush);
         self.note_failure(flushed);
         self.recovered.chunks += 1;
     }
 
     fn damage(&mut self, damage: Damage) {
-        self.recovered.damage.push(damage);
+        if self.recovered.damage.len() < MOST {
+            self.recovered.damage.push(damage);
+        }
     }
+}
+
+/// The topic's schema in the new file.
+fn schema(
+    journal: &mut Journal,
+    known: &mut HashMap<usize, (Arc<[u8]>, Schema)>,
+    topic: &Topic,
+) -> Result<Schema, WriteError> {
+    let place = topic.schema_text.as_ptr() as usize;
+    if let Some((_, schema)) = known.get(&place) {
+        return Ok(*schema);
+    }
+    let schema = journal.schema(&EnvelopeSchema {
+        name: topic.schema.to_string(),
+        text: Arc::clone(&topic.schema_text),
+    })?;
+    known.insert(place, (Arc::clone(&topic.schema_text), schema));
+    Ok(schema)
 }

@@ -9,16 +9,18 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::sync::Arc;
 
-use mcap::records::{ChunkIndex, MessageHeader, Record, Statistics, op};
+use mcap::records::{ChunkHeader, ChunkIndex, MessageHeader, Record, Statistics, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{MAGIC, McapError};
 
-use crate::envelope::derived_from;
+use crate::envelope::Content;
+use crate::unpack::{Budget, ZSTD, unpack};
 use crate::write::Times;
 
-/// Longer records are taken for damage.
-const LONGEST: usize = 256 << 20;
+/// Longer records and chunks are taken for damage.
+pub(crate) const LONGEST: usize = 256 << 20;
 /// Bytes of an operation code and a length in front of each record.
 const PREFIX: u64 = 9;
 
@@ -38,6 +40,13 @@ pub enum Damage {
         at: u64,
         /// Why.
         why: McapError,
+    },
+    /// A chunk is packed in a way that this program cannot open.
+    Packed {
+        /// Where it begins, in bytes.
+        at: u64,
+        /// What it is packed with.
+        with: String,
     },
     /// A chunk has messages of topics whose names stood in a chunk that is damaged.
     Nameless {
@@ -66,6 +75,10 @@ impl fmt::Display for Damage {
             Self::Chunk { at, why } => {
                 write!(formatter, "the chunk at byte {at} is damaged: {why}")
             }
+            Self::Packed { at, with } => write!(
+                formatter,
+                "the chunk at byte {at} is packed with `{with}`, which this program does not read"
+            ),
             Self::Nameless { at, messages } => write!(
                 formatter,
                 "the chunk at byte {at} has {messages} messages of topics whose names are lost"
@@ -83,11 +96,11 @@ pub struct Topic {
     /// Its name.
     pub name: String,
     /// The schema's name; empty without one.
-    pub schema: String,
-    /// The schema.
-    pub schema_text: Vec<u8>,
-    /// The topic of which its messages are made; `None` for the samples of a topic.
-    pub derived_from: Option<String>,
+    pub schema: Arc<str>,
+    /// The schema, which several topics may share.
+    pub schema_text: Arc<[u8]>,
+    /// What its messages are.
+    pub content: Content,
 }
 
 /// A message as it stands in a file.
@@ -99,6 +112,8 @@ pub struct Message<'a> {
     pub topic: &'a Topic,
     /// When it was.
     pub times: Times,
+    /// Whether it stands in a chunk.
+    pub is_in_chunk: bool,
     /// The message.
     pub data: &'a [u8],
 }
@@ -109,8 +124,9 @@ pub trait Visit {
     fn message(&mut self, message: &Message<'_>);
     /// A metadata record.
     fn note(&mut self, name: &str, texts: &BTreeMap<String, String>);
-    /// All messages of a chunk have been handed on.
-    fn chunk(&mut self, _at: u64) {}
+    /// So many messages of a chunk have been handed on, which are all. `found` is what an index
+    /// would say of it; it knows nothing of message indexes.
+    fn chunk(&mut self, _found: &ChunkIndex, _messages: u64) {}
     /// What the index says of a chunk.
     fn chunk_index(&mut self, _index: &ChunkIndex) {}
     /// What the index says of all.
@@ -132,10 +148,14 @@ pub struct Walk {
 /// The topics of a file, as far as a walk has met them.
 #[derive(Clone, Debug, Default)]
 pub struct Learnt {
-    schemas: HashMap<u16, (String, Vec<u8>)>,
+    schemas: HashMap<u16, (Arc<str>, Arc<[u8]>)>,
     topics: HashMap<u16, Topic>,
     /// Messages since the last chunk whose topic is not known.
     nameless: u64,
+    /// Messages since the last chunk, and the first and last of their times.
+    messages: u64,
+    times: Option<(u64, u64)>,
+    budget: Budget,
 }
 
 impl Default for Walk {
@@ -154,6 +174,11 @@ impl Walk {
             .with_record_length_limit(LONGEST);
         let mut crc = crc32fast::Hasher::new();
         crc.update(MAGIC);
+        // Each walk may unpack the file once.
+        let known = Learnt {
+            budget: Budget::default(),
+            ..known
+        };
         Self {
             reader: LinearReader::new_with_options(options),
             known,
@@ -189,11 +214,12 @@ impl Walk {
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
                     let at = self.at;
                     self.at += PREFIX + data.len() as u64;
-                    let saved = data_crc(opcode, data);
-                    let calculated = self.crc.clone().finalize();
-                    if let Some(saved) = saved.filter(|saved| ![0, calculated].contains(saved)) {
-                        let why = McapError::BadDataCrc { saved, calculated };
-                        visit.damage(Damage::Record { at, why });
+                    if let Some(saved) = data_crc(opcode, data) {
+                        let calculated = self.crc.clone().finalize();
+                        if ![0, calculated].contains(&saved) {
+                            let why = McapError::BadDataCrc { saved, calculated };
+                            visit.damage(Damage::Record { at, why });
+                        }
                     }
                     self.crc.update(&[opcode]);
                     self.crc.update(&(data.len() as u64).to_le_bytes());
@@ -224,17 +250,38 @@ impl Walk {
 }
 
 impl Learnt {
+    /// The topics, by their numbers in the file.
+    pub fn topics(&self) -> impl Iterator<Item = (u16, &Topic)> {
+        self.topics.iter().map(|(number, topic)| (*number, topic))
+    }
+
     /// Hands on the chunk that stands at `at`.
     fn tell_chunk(&mut self, at: u64, chunk: &[u8], visit: &mut impl Visit) {
-        if let Err(why) = self.open(chunk, visit) {
-            visit.damage(Damage::Chunk { at, why });
-            return;
-        }
+        (self.messages, self.times) = (0, None);
+        let header = match self.open(chunk, visit) {
+            Ok(header) => header,
+            Err(McapError::UnsupportedCompression(with)) => {
+                return visit.damage(Damage::Packed { at, with });
+            }
+            Err(why) => return visit.damage(Damage::Chunk { at, why }),
+        };
         let messages = std::mem::take(&mut self.nameless);
         if messages > 0 {
             visit.damage(Damage::Nameless { at, messages });
         }
-        visit.chunk(at);
+        let (first, last) = self.times.unwrap_or_default();
+        let found = ChunkIndex {
+            message_start_time: first,
+            message_end_time: last,
+            chunk_start_offset: at,
+            chunk_length: PREFIX + chunk.len() as u64,
+            message_index_offsets: BTreeMap::new(),
+            message_index_length: 0,
+            compression: header.compression,
+            compressed_size: header.compressed_size,
+            uncompressed_size: header.uncompressed_size,
+        };
+        visit.chunk(&found, self.messages);
     }
 
     /// Hands on a record outside of chunks.
@@ -243,7 +290,7 @@ impl Learnt {
             Record::Metadata(note) => visit.note(&note.name, &note.metadata),
             Record::ChunkIndex(index) => visit.chunk_index(&index),
             Record::Statistics(statistics) => visit.statistics(&statistics),
-            other => self.tell_content(&other, visit),
+            other => self.tell_content(&other, false, visit),
         }
     }
 
@@ -251,34 +298,46 @@ impl Learnt {
     ///
     /// A reader of its own opens it, since only one that compares the CRC beforehand takes no
     /// length of a damaged chunk at its word.
-    fn open(&mut self, chunk: &[u8], visit: &mut impl Visit) -> Result<(), McapError> {
+    fn open(&mut self, chunk: &[u8], visit: &mut impl Visit) -> Result<ChunkHeader, McapError> {
+        let Record::Chunk { header, data } = mcap::parse_record(op::CHUNK, chunk)? else {
+            unreachable!("a record is of the kind that was asked for");
+        };
+        self.budget.take(&header, data.len() as u64)?;
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(LONGEST);
         let mut reader = LinearReader::new_with_options(options);
-        let length = (chunk.len() as u64).to_le_bytes();
-        let record = [&[op::CHUNK][..], &length, chunk].concat();
+        let record = match header.compression == ZSTD {
+            false => {
+                let length = (chunk.len() as u64).to_le_bytes();
+                [&[op::CHUNK][..], &length, chunk].concat()
+            }
+            true => {
+                let size = usize::try_from(header.uncompressed_size).unwrap_or(usize::MAX);
+                unpacked_record(&header, &unpack(&data, size.min(LONGEST))?)
+            }
+        };
         reader.insert(record.len()).copy_from_slice(&record);
         reader.notify_read(record.len());
         loop {
             match reader.next_event() {
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                    self.tell_content(&mcap::parse_record(opcode, data)?, visit);
+                    self.tell_content(&mcap::parse_record(opcode, data)?, true, visit);
                 }
                 // All of the chunk is there, so a wish for more comes after its end.
-                Some(Ok(LinearReadEvent::ReadRequest(_))) | None => return Ok(()),
+                Some(Ok(LinearReadEvent::ReadRequest(_))) | None => return Ok(header),
                 Some(Err(error)) => return Err(error),
             }
         }
     }
 
     /// Hands on what may stand in a chunk, and in files of other programs outside of one.
-    fn tell_content(&mut self, record: &Record<'_>, visit: &mut impl Visit) {
+    fn tell_content(&mut self, record: &Record<'_>, is_in_chunk: bool, visit: &mut impl Visit) {
         match record {
             Record::Schema { header, data } => {
-                let schema = (header.name.clone(), data.to_vec());
+                let schema = (header.name.as_str().into(), data.as_ref().into());
                 self.schemas.insert(header.id, schema);
             }
             Record::Channel(channel) => {
@@ -288,20 +347,31 @@ impl Learnt {
                     name: channel.topic.clone(),
                     schema,
                     schema_text,
-                    derived_from: derived_from(&channel.metadata).map(str::to_owned),
+                    content: Content::of_notes(&channel.metadata),
                 };
                 self.topics.insert(channel.id, topic);
             }
-            Record::Message { header, data } => self.tell_message(header, data, visit),
+            Record::Message { header, data } => {
+                self.tell_message(header, data, is_in_chunk, visit);
+            }
             _ => {}
         }
     }
 
-    fn tell_message(&mut self, header: &MessageHeader, data: &[u8], visit: &mut impl Visit) {
+    fn tell_message(
+        &mut self,
+        header: &MessageHeader,
+        data: &[u8],
+        is_in_chunk: bool,
+        visit: &mut impl Visit,
+    ) {
         let Some(topic) = self.topics.get(&header.channel_id) else {
             self.nameless += 1;
             return;
         };
+        self.messages += 1;
+        let (first, last) = self.times.unwrap_or((header.log_time, header.log_time));
+        self.times = Some((first.min(header.log_time), last.max(header.log_time)));
         visit.message(&Message {
             channel: header.channel_id,
             topic,
@@ -309,9 +379,26 @@ impl Learnt {
                 log: header.log_time,
                 publish: header.publish_time,
             },
+            is_in_chunk,
             data,
         });
     }
+}
+
+/// The record of the same chunk without packing.
+fn unpacked_record(header: &ChunkHeader, data: &[u8]) -> Vec<u8> {
+    let mut body = Vec::with_capacity(40 + data.len());
+    body.extend(header.message_start_time.to_le_bytes());
+    body.extend(header.message_end_time.to_le_bytes());
+    body.extend(header.uncompressed_size.to_le_bytes());
+    body.extend(header.uncompressed_crc.to_le_bytes());
+    body.extend(0_u32.to_le_bytes());
+    body.extend((data.len() as u64).to_le_bytes());
+    body.extend(data);
+    let mut record = vec![op::CHUNK];
+    record.extend((body.len() as u64).to_le_bytes());
+    record.append(&mut body);
+    record
 }
 
 /// The CRC that the end of the data has of all before it; 0 means that it has none.

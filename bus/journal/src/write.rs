@@ -8,8 +8,9 @@ use std::rc::Rc;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions};
 
+use crate::calendar::{self, Step};
 use crate::counts::{self, Counts};
-use crate::envelope::{EnvelopeSchema, channel_notes};
+use crate::envelope::{Content, EnvelopeSchema};
 use crate::scene::View;
 
 /// The metadata record that says what a file is of.
@@ -25,6 +26,10 @@ const MESSAGE_ENCODING: &str = "json";
 const PREFIX: u64 = 9;
 /// Bytes of one topic in `lager.counts` besides its name: two lengths, and three numbers in JSON.
 const COUNT: u64 = 8 + 110;
+/// Bytes of what says that the calendar was set, at the most.
+const STEP: u64 = PREFIX + 128;
+/// Bytes of a metadata record's index at the end.
+const NOTE_INDEX: u64 = PREFIX + 40;
 
 /// What a file is of.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -101,10 +106,14 @@ pub struct Journal {
     /// Bytes of the names of all topics.
     names: u64,
     topics: u64,
-    /// Bytes of the chunks' indexes, which stand at the end.
+    /// Bytes of the indexes of chunks and steps of the calendar, which stand at the end.
     indexes: u64,
     chunk: Chunk,
 }
+
+/// A schema within one file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Schema(u16);
 
 /// The chunk that is open.
 #[derive(Default)]
@@ -148,7 +157,18 @@ impl Journal {
     /// # Errors
     /// There are too many.
     pub fn topic(&mut self, name: &str, schema: &EnvelopeSchema) -> Result<Channel, WriteError> {
-        self.channel(name, schema, None)
+        let id = self.schema(schema)?;
+        self.channel(name, id, &Content::Samples)
+    }
+
+    /// Adds a channel for a topic's last sample from before the file. [`Content::Repeated`] says
+    /// how it is read.
+    ///
+    /// # Errors
+    /// There are too many.
+    pub fn repeated(&mut self, name: &str, schema: &EnvelopeSchema) -> Result<Channel, WriteError> {
+        let id = self.schema(schema)?;
+        self.channel(name, id, &Content::Repeated)
     }
 
     /// Adds a channel for what viewers are shown. Its messages are no samples.
@@ -157,26 +177,34 @@ impl Journal {
     /// There are too many.
     pub fn view(&mut self, view: View) -> Result<Channel, WriteError> {
         let from = view.made_of().join(" ");
-        self.channel(view.topic(), &view.schema(), Some(&from))
+        let id = self.schema(&view.schema())?;
+        self.channel(view.topic(), id, &Content::Derived(from))
     }
 
-    /// Adds a channel, derived or not.
-    pub(crate) fn channel(
-        &mut self,
-        name: &str,
-        schema: &EnvelopeSchema,
-        derived_from: Option<&str>,
-    ) -> Result<Channel, WriteError> {
+    /// Adds a schema, if the file does not have it yet.
+    pub(crate) fn schema(&mut self, schema: &EnvelopeSchema) -> Result<Schema, WriteError> {
         let id = self
             .writer
             .add_schema(&schema.name, SCHEMA_ENCODING, &schema.text)?;
-        let notes = channel_notes(derived_from);
+        let described = PREFIX + 32 + (schema.name.len() + schema.text.len()) as u64;
+        self.described += described;
+        self.chunk.bytes += described;
+        Ok(Schema(id))
+    }
+
+    /// Adds a channel of whatever content.
+    pub(crate) fn channel(
+        &mut self,
+        name: &str,
+        schema: Schema,
+        content: &Content,
+    ) -> Result<Channel, WriteError> {
+        let notes = content.to_notes();
         let channel = self
             .writer
-            .add_channel(id, name, MESSAGE_ENCODING, &notes)?;
+            .add_channel(schema.0, name, MESSAGE_ENCODING, &notes)?;
         let notes: usize = notes.iter().map(|(a, b)| 8 + a.len() + b.len()).sum();
-        let described =
-            2 * PREFIX + 64 + (schema.name.len() + schema.text.len() + name.len() + notes) as u64;
+        let described = PREFIX + 32 + (name.len() + notes) as u64;
         self.described += described;
         self.chunk.bytes += described;
         self.names += name.len() as u64;
@@ -206,6 +234,22 @@ impl Journal {
         self.chunk.bytes += PREFIX + 22 + message.len() as u64;
         self.chunk.messages += 1;
         Ok(())
+    }
+
+    /// Notes that the calendar was set, and ends the chunk that is open.
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn step(&mut self, step: &Step) -> Result<(), WriteError> {
+        self.flush()?;
+        self.note(calendar::NAME, step.to_texts())?;
+        self.indexes += NOTE_INDEX;
+        Ok(())
+    }
+
+    /// How many bytes the file grows at the most by [`Journal::step`] besides its open chunk.
+    pub const fn room_for_a_step() -> u64 {
+        STEP + NOTE_INDEX
     }
 
     /// Ends the chunk that is open. Its bytes can then be taken, and survive whatever follows.
@@ -274,7 +318,7 @@ impl Journal {
         let counts = PREFIX + 32 + self.names + COUNT * self.topics;
         let statistics = PREFIX + 64 + 10 * self.topics;
         // Two metadata indexes, six offsets, end of data, footer and magic.
-        counts + self.described + statistics + 2 * (PREFIX + 40) + 6 * (PREFIX + 17) + 64
+        counts + self.described + statistics + 2 * NOTE_INDEX + 6 * (PREFIX + 17) + 64
     }
 }
 

@@ -166,14 +166,11 @@ fn ordered(bytes: &[u8], selection: &Selection) -> Vec<(String, u64, u64)> {
         let wanted = match ordered.step() {
             None => return found,
             Some(Ok(Step::Wants(part))) => part,
-            Some(Ok(Step::Message {
-                topic,
-                times,
-                message,
-            })) => {
+            Some(Ok(Step::Message(placed))) => {
                 let envelope: Envelope<serde_json::Value> =
-                    serde_json::from_slice(message).unwrap();
-                found.push((topic.to_owned(), times.log, envelope.stamp.sequence));
+                    serde_json::from_slice(placed.message).unwrap();
+                let number = envelope.stamp.sequence;
+                found.push((placed.topic.to_owned(), placed.times.log, number));
                 continue;
             }
             Some(Err(error)) => panic!("{error}"),
@@ -241,8 +238,20 @@ fn messages_come_by_their_time_and_as_selected() {
         topics: Some(vec!["sensor/line".to_owned()]),
         from_ns: Some(BEGIN + 2_000_000),
         before_ns: Some(BEGIN + 8_000_000),
+        is_backwards: false,
     };
     assert_eq!(times(&some), [2, 4]);
+    let backwards = Selection {
+        is_backwards: true,
+        ..some
+    };
+    assert_eq!(times(&backwards), [4, 2]);
+    // Topics that it does not have are not all of them.
+    let none = Selection {
+        topics: Some(vec!["nav/map".to_owned()]),
+        ..Selection::default()
+    };
+    assert!(times(&none).is_empty());
 }
 
 #[test]

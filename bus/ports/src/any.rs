@@ -51,6 +51,11 @@ impl AnyPublisher {
         &self.blank
     }
 
+    /// Whether the topic holds its last sample for those who come later.
+    pub fn holds(&self) -> bool {
+        self.end.holds()
+    }
+
     /// Sends a payload as of now, and rings those who act on the topic.
     ///
     /// # Errors
@@ -112,6 +117,8 @@ trait End {
     fn replay(&self, payload: &[u8], stamp: Stamp) -> Result<(), SendError>;
 
     fn tick(&self);
+
+    fn holds(&self) -> bool;
 }
 
 impl<T: Topic> End for Publisher<T> {
@@ -125,6 +132,10 @@ impl<T: Topic> End for Publisher<T> {
 
     fn tick(&self) {
         Self::tick(self);
+    }
+
+    fn holds(&self) -> bool {
+        T::QOS.history > 0
     }
 }
 
@@ -157,5 +168,9 @@ impl End for Foreign {
 
     fn tick(&self) {
         Self::tick(self);
+    }
+
+    fn holds(&self) -> bool {
+        self.holds
     }
 }

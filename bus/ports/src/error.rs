@@ -218,6 +218,16 @@ pub enum PortError {
         /// What there is too little of.
         shortage: Shortage,
     },
+    /// A part of the service that has a thread of its own could not be started.
+    #[error(
+        "there is no thread for {what} ({fault}); the limit of processes (ulimit -u) or of memory (ulimit -v) is reached"
+    )]
+    Thread {
+        /// What it would do.
+        what: &'static str,
+        /// What the system says.
+        fault: TransportFault,
+    },
     /// Only services that act on a topic may wait.
     #[error("{role} is not woken by any topic: observers poll on a timer")]
     NotAnActor {

@@ -64,6 +64,10 @@ impl Found {
         self.reader.streams().lost()
     }
 
+    pub(crate) fn holds(&self) -> bool {
+        self.reader.holds()
+    }
+
     pub(crate) fn queue(&self) -> usize {
         self.reader.queue()
     }

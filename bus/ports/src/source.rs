@@ -27,6 +27,9 @@ pub trait Source {
     /// Samples missed, as [`Subscriber::lost`] counts them.
     fn lost(&self) -> u64;
 
+    /// Whether the topic holds its last sample for those who come later.
+    fn holds(&self) -> bool;
+
     /// How many samples can wait for this end; one more overwrites the oldest.
     fn queue(&self) -> usize;
 }
@@ -39,6 +42,10 @@ impl<T: Topic> Source for Subscriber<T> {
 
     fn lost(&self) -> u64 {
         Self::lost(self)
+    }
+
+    fn holds(&self) -> bool {
+        T::QOS.history > 0
     }
 
     fn queue(&self) -> usize {
@@ -54,6 +61,10 @@ impl Source for Found {
 
     fn lost(&self) -> u64 {
         Self::lost(self)
+    }
+
+    fn holds(&self) -> bool {
+        Self::holds(self)
     }
 
     fn queue(&self) -> usize {

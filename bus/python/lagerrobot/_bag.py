@@ -19,6 +19,10 @@ from .layouts import Stamp
 
 P = TypeVar("P", bound=Layout)
 
+_REPEATED = "lager.repeated"
+"""What the metadata of a channel has whose samples were sent before the file began: each topic that
+holds begins with its last one, so that the file can be used alone."""
+
 
 class Bag(Open):
     """The recording in `path`, which `lager bag record` has made.
@@ -59,12 +63,12 @@ class Bag(Open):
         """What is added to a stamp's time to get ns since 1970."""
         self._is_first = start["part"] == "0"
         counts = summary.statistics.channel_message_counts
-        self.topics: Dict[str, int] = {
-            channel.topic: counts.get(number, 0)
-            for number, channel in summary.channels.items()
-            if "lager.derived" not in channel.metadata
-        }
-        """The samples of each topic that is in it."""
+        self.topics: Dict[str, int] = {}
+        """The samples of each topic that is in it; one that is repeated from before it is none."""
+        for number, channel in summary.channels.items():
+            if "lager.derived" not in channel.metadata:
+                own = 0 if _REPEATED in channel.metadata else counts.get(number, 0)
+                self.topics[channel.topic] = self.topics.get(channel.topic, 0) + own
         self._schemas = {
             channel.topic: summary.schemas[channel.schema_id].data
             for channel in summary.channels.values()
@@ -117,7 +121,7 @@ class FileReader(Reader[P], Generic[P]):
 
     @property
     def received(self) -> int:
-        """Samples read."""
+        """Samples read, without one that is repeated from before the file."""
         return self._messages.received
 
     @property
@@ -198,10 +202,11 @@ class _Port:
         stamp, payload = Stamp(), self._entry.payload()
         fill(stamp, envelope["stamp"], self._entry.name)
         fill(payload, envelope["payload"], self._entry.name)
-        self._last = envelope["lost"] + envelope["dropped"]
-        if self.received == 0:
-            self._first = self._last
-        self.received += 1
+        if _REPEATED not in found[1].metadata:
+            self._last = envelope["lost"] + envelope["dropped"]
+            if self.received == 0:
+                self._first = self._last
+            self.received += 1
         return _Raw(stamp, payload)
 
     def missing(self, is_first: bool) -> int:

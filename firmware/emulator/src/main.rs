@@ -137,6 +137,8 @@ fn serve(cli: Cli) -> Result<(), Box<dyn std::error::Error>> {
     ] {
         signal_hook::flag::register(signal, Arc::clone(&shutdown))?;
     }
+    // A file that may not become longer (`ulimit -f`) is an error of whoever writes it.
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     run(&images, config, &shutdown)?;
     Ok(())
 }

@@ -29,7 +29,7 @@ where
     /// Starts the thread. Each answer rings.
     ///
     /// # Errors
-    /// Its place on the bus cannot be had.
+    /// Its place on the bus cannot be had, or there is no thread.
     pub(crate) fn new(bus: &Bus, ringer: Ringer) -> Result<Self, PortError> {
         // There are never more under way than the conversation lets be.
         let (to, asked) = sync_channel::<(u32, R::Request)>(Tasks::MOST);
@@ -57,15 +57,19 @@ where
                 ringer.ring();
             }
         };
-        let thread = Builder::new().spawn(work).ok();
-        // Without a thread nobody is there who says so, and every request is refused.
+        let thread = Builder::new()
+            .spawn(work)
+            .map_err(|error| PortError::Thread {
+                what: "requests",
+                fault: error.into(),
+            })?;
         if let Ok(begun) = begun.recv() {
             begun?;
         }
         Ok(Self {
             to: Some(to),
             from,
-            thread,
+            thread: Some(thread),
         })
     }
 

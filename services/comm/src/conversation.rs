@@ -38,6 +38,8 @@
 //! - A `stop` is carried out before all other lines that have come with it, whoever sends it, and
 //!   commands among these are dropped. It is carried out even where comm was held up and has given
 //!   the link up before it was read.
+//! - The numbers of a connection's actions grow. An action whose number is not above the last one is
+//!   refused: it was heard before, or comes late.
 //! - What cannot be done is told in a `thought`, and asked again a little later.
 //! - A peer that answers at once is not asked without end: commands are asked for at most 1 000
 //!   times a second, anything else at most 5 times. An answer that took longer than that is
@@ -115,6 +117,8 @@ pub struct Conversation {
     is_extended: bool,
     /// Nothing has been heard on this connection.
     is_fresh: bool,
+    /// The number of the last action that has come on it.
+    last_number: Option<u32>,
     up_ns: u64,
     heard_ns: u64,
     signed_ns: u64,
@@ -155,6 +159,7 @@ impl Conversation {
             is_up: false,
             is_extended: false,
             is_fresh: false,
+            last_number: None,
             up_ns: 0,
             heard_ns: 0,
             signed_ns: 0,
@@ -199,6 +204,7 @@ impl Conversation {
         self.is_up = true;
         self.is_extended = false;
         self.is_fresh = true;
+        self.last_number = None;
         self.up_ns = now.ns;
         self.heard_ns = now.ns;
         self.freshness = Freshness::default();

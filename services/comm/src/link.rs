@@ -70,7 +70,10 @@ pub(crate) struct Link {
 
 impl Link {
     /// Connects to `station`, a host and a port, from now on.
-    pub(crate) fn new(station: String, ringer: Ringer) -> Self {
+    ///
+    /// # Errors
+    /// There is no thread for it.
+    pub(crate) fn new(station: String, ringer: Ringer) -> io::Result<Self> {
         let ends = Arc::new(AtomicBool::new(false));
         let (to, news) = sync_channel(PIECES);
         let thread = Thread {
@@ -79,14 +82,15 @@ impl Link {
             ringer,
             ends: Arc::clone(&ends),
         };
-        Self {
+        let work = move || thread.run();
+        Ok(Self {
             news,
             stream: None,
             unread: Vec::new(),
             shown: Default::default(),
             ends,
-            thread: Some(std::thread::spawn(move || thread.run())),
-        }
+            thread: Some(std::thread::Builder::new().spawn(work)?),
+        })
     }
 
     /// What has become of the connection since the last look.

@@ -143,7 +143,12 @@ impl Shell {
         let waiter = bus.waiter(Policy::Block)?;
         let shell = Self {
             clock: bus.clock(),
-            link: Link::new(config.station.clone(), waiter.ringer()?),
+            link: Link::new(config.station.clone(), waiter.ringer()?).map_err(|error| {
+                PortError::Thread {
+                    what: "the link to the station",
+                    fault: error.into(),
+                }
+            })?,
             bridge: opening.asking(&waiter)?,
             world: opening.asking(&waiter)?,
             waiter,

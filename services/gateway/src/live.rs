@@ -95,7 +95,7 @@ fn outlet(context: &Arc<Context>, name: &str, schema: &EnvelopeSchema, lasts: bo
     let channel = context
         .channel_builder(name)
         .message_encoding("json")
-        .schema(Schema::new(title, "jsonschema", text))
+        .schema(Schema::new(title, "jsonschema", text.to_vec()))
         .build_raw()
         .expect("its encoding is told");
     Outlet { channel, lasts }

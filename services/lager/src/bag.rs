@@ -5,10 +5,10 @@ mod verify;
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use anyhow::Result;
-use lager_ports::{Bus, Shutdown};
+use lager_ports::{Bus, Clock, Shutdown};
 use lager_recorder::{
     BagError, PlayConfig, PlayError, Progress, RecordConfig, Recorded, Split, Stamps,
 };
@@ -69,6 +69,7 @@ fn record(
         diagnose::must_be_up(config)?;
     }
     let wanted = RecordConfig {
+        or_another: args.file.is_none(),
         file: args.file.unwrap_or_else(|| named_after(&config.name)),
         topics: args.topic,
         split: Split {
@@ -95,8 +96,8 @@ fn record(
 
 /// `r1-20261123-154906.mcap`, in UTC.
 fn named_after(robot: &str) -> PathBuf {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    let now = lager_recorder::utc(now.map_or(0, |now| now.as_nanos() as u64));
+    let now = Clock::monotonic_ns().saturating_add_signed(Clock::unix_offset_ns());
+    let now = lager_recorder::utc(now);
     let digits: String = now.chars().filter(char::is_ascii_digit).collect();
     PathBuf::from(format!("{robot}-{}-{}.mcap", &digits[..8], &digits[8..14]))
 }
@@ -119,8 +120,8 @@ impl Live {
     }
 
     fn tell(&mut self, progress: &Progress) {
-        for refused in &progress.refused {
-            self.say(refused);
+        for news in &progress.news {
+            self.say(news);
         }
         let total = progress.total();
         if total.dropped > self.missing.1 {

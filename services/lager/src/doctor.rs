@@ -14,7 +14,7 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use lager_ports::NodeState;
+use lager_ports::{Clock, NodeState};
 use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
@@ -58,6 +58,7 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
         ("emulated boards", emulated(config)),
         ("session clean-up", remove_ipc()),
         ("versions", versions()),
+        ("calendar", calendar()),
     ];
     checks.extend(realtime::findings(config));
     // Whatever keeps the robot from running comes first.
@@ -91,6 +92,17 @@ impl Finding {
 fn count(checks: &[Check], mark: &str) -> usize {
     let of_that_mark = checks.iter().filter(|(_, finding)| finding.mark() == mark);
     of_that_mark.count()
+}
+
+/// Whether the dates of recordings can be believed; nothing else goes by the calendar.
+fn calendar() -> Finding {
+    let now_ns = Clock::monotonic_ns().saturating_add_signed(Clock::unix_offset_ns());
+    match lager_recorder::doubt(now_ns) {
+        Some(doubt) => Hint(format!(
+            "{doubt}; set it with `date -s`, or give the machine a network or a clock chip"
+        )),
+        None => Good(format!("it says {} UTC", lager_recorder::utc(now_ns))),
+    }
 }
 
 /// A line for each check, then what to do about those that are not well, then how it stands.
@@ -155,9 +167,14 @@ fn json(checks: &[Check]) -> String {
 fn bus_in_time(config: &Config, fix: bool) -> Finding {
     let (send, found) = mpsc::channel();
     let looked_at = config.clone();
-    std::thread::spawn(move || {
+    let look = move || {
         let _ = send.send(bus(&looked_at, fix));
-    });
+    };
+    if let Err(error) = std::thread::Builder::new().spawn(look) {
+        return Bad(format!(
+            "cannot start a thread ({error}); see `ulimit -u` and `ulimit -v`"
+        ));
+    }
     found
         .recv_timeout(if fix { MEND } else { LOOK })
         .unwrap_or_else(|_| {

@@ -32,6 +32,7 @@ mod runtime;
 mod services;
 mod signals;
 mod simulate;
+mod stack;
 mod station;
 mod steer;
 mod stop;
@@ -65,12 +66,17 @@ use crate::steer::{Obstacle, Operator};
 use crate::voice::Speaker;
 
 fn main() -> ExitCode {
+    if let Err(error) = stack::must_suffice() {
+        voice::say(&Speaker::Tool.line(&format!("{error:#}")));
+        return exit::code(&error);
+    }
     lager_benches::run_if_asked();
     let cli = Cli::from_arg_matches(&cli::help::command().get_matches())
         .unwrap_or_else(|error| error.exit());
     let mut speaker = Speaker::Tool;
     let mut looked_at = None;
-    let ended = configure(&cli.global).and_then(|config| {
+    let begun = signals::outlive_long_files().and_then(|()| configure(&cli.global));
+    let ended = begun.and_then(|config| {
         looked_at = Some(config.clone());
         let own = own_voice(&cli.command, &config);
         voice::begin(own, &config.log)?;

@@ -1,5 +1,6 @@
-//! The signals that end this program in order: Ctrl-C, SIGTERM and a closed terminal. A second
-//! Ctrl-C does not wait for that end, should it hang.
+//! The signals that end this program in order: Ctrl-C, SIGTERM, a closed terminal, and the machine's
+//! limit on processor time. A second Ctrl-C does not wait for that end, should it hang. The limit on
+//! the length of files ends nothing: whoever writes such a file is told ([`outlive_long_files`]).
 //!
 //! `lager up` waits for them ([`Signals`]): it sleeps in one place and must wake there, whichever
 //! thread gets the signal. For all other commands they set a flag ([`end_in_order`]).
@@ -13,13 +14,29 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use lager_ports::{Clock, Shutdown};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXCPU, SIGXFSZ};
 use signal_hook::low_level::{self, pipe};
 
 use crate::exit;
 
 /// A signal that comes sooner after a Ctrl-C is the same one: `timeout -s INT` sends each twice.
 const ONE_PRESS: Duration = Duration::from_millis(300);
+
+/// The signals that ask for an end. The kernel sends the last one when the processor time that
+/// `ulimit -t` or a service's `LimitRTTIME=` leaves is used up, and kills a little later.
+const ENDS: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGXCPU];
+
+/// What is said then; made beforehand, since a handler must not allocate.
+const USED_UP: &[u8] =
+    b"lager: the processor time of this process is used up (SIGXCPU; `ulimit -t`, \
+or LimitCPU= and LimitRTTIME= of a service), so it ends\n";
+
+/// From now on a file that may not become longer is an error of whoever writes it, and no end of
+/// this process (SIGXFSZ; `ulimit -f`).
+pub fn outlive_long_files() -> Result<()> {
+    let registered = signal_hook::flag::register(SIGXFSZ, Arc::default());
+    registered.map(drop).context("cannot listen to signals")
+}
 
 /// From now on the signals request `shutdown`, and a Ctrl-C while it is requested ends this process
 /// at once.
@@ -31,12 +48,25 @@ pub fn end_in_order(shutdown: &Shutdown) -> Result<()> {
                 low_level::exit(exit::INTERRUPTED);
             }
         })?;
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
+        say_used_up()?;
+        for signal in ENDS {
             signal_hook::flag::register(signal, shutdown.flag())?;
         }
         Ok(())
     };
     listen().context("cannot listen to signals")
+}
+
+/// Has the limit on processor time say why this process ends.
+#[allow(unsafe_code, reason = "a handler of signals has no safe binding")]
+fn say_used_up() -> std::io::Result<()> {
+    let say = || {
+        // SAFETY: the pointer and the length are those of a constant.
+        unsafe { libc::write(libc::STDERR_FILENO, USED_UP.as_ptr().cast(), USED_UP.len()) };
+    };
+    // SAFETY: it only calls `write`, which may be called in a handler.
+    unsafe { low_level::register(SIGXCPU, say) }?;
+    Ok(())
 }
 
 /// Has every Ctrl-C do what a handler of signals may do.
@@ -88,7 +118,8 @@ impl Signals {
             let interrupted = Arc::new(AtomicBool::new(false));
             let pressed = Arc::clone(&interrupted);
             on_press(move || pressed.store(true, Ordering::SeqCst))?;
-            for signal in [SIGINT, SIGTERM, SIGHUP] {
+            say_used_up()?;
+            for signal in ENDS {
                 pipe::register(signal, wake.try_clone()?)?;
             }
             Ok(Self {

@@ -50,13 +50,18 @@ pub fn run(config: &Config, args: &TopArgs, patience: &Patience) -> Result<()> {
 fn over(file: &Path, args: &TopArgs, patience: &Patience) -> Result<()> {
     let name = file.display().to_string();
     let mut recorded = None;
-    let layouts = lager_recorder::samples(file, &mut |robot, topic, envelope| {
-        let recorded = recorded.get_or_insert_with(|| Recorded::new(&name, robot, &args.filter));
+    let layouts = lager_recorder::samples(file, &mut |sample| {
+        let begin = || Recorded::new(&name, sample.robot, &args.filter);
+        let recorded = recorded.get_or_insert_with(begin);
+        let envelope = sample.envelope;
+        if sample.is_repeated {
+            return recorded.repeat(sample.topic, &envelope.stamp, envelope.payload);
+        }
         let lacking = Lacking {
             lost: envelope.lost,
             dropped: envelope.dropped,
         };
-        recorded.take(topic, &envelope.stamp, lacking, envelope.payload);
+        recorded.take(sample.topic, &envelope.stamp, lacking, envelope.payload);
     })?;
     let mut recorded = recorded.with_context(|| format!("{name} has no samples"))?;
     for (topic, layout) in &layouts {

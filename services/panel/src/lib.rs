@@ -162,7 +162,7 @@ impl Panel {
         let served = AtomicBool::new(true);
         std::thread::scope(|scope| {
             // The station's changes are waited for in a thread: it has no tasks.
-            scope.spawn(|| {
+            let wait = || {
                 while served.load(Ordering::Relaxed) {
                     let seen = *shared.changes.borrow();
                     let revision = shared.handle.wait(seen, LOOK);
@@ -170,7 +170,8 @@ impl Panel {
                         shared.changes.send_replace(revision);
                     }
                 }
-            });
+            };
+            std::thread::Builder::new().spawn_scoped(scope, wait)?;
             let result = self.serve(&runtime, end);
             served.store(false, Ordering::Relaxed);
             result

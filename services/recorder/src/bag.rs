@@ -6,8 +6,8 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use lager_journal::{
-    Learnt, Ordered, Overview, OverviewReader, Part, ReadError, Selection, Step, Times, Visit,
-    Walk, WriteError,
+    Learnt, Ordered, Overview, OverviewReader, Part, Placed, ReadError, Scan, Selection, Step,
+    Times, Visit, Walk, WriteError,
 };
 
 /// Bytes that are read at a time.
@@ -144,13 +144,50 @@ impl Bag {
         }
     }
 
-    /// What its end says.
+    /// What its end says, or all of it, should its end not say enough.
     pub(crate) fn overview(&self) -> Result<Overview, BagError> {
+        let overview = match self.end()? {
+            Err(ReadError::NoIndex) => {
+                let mut scan = Scan::default();
+                let learnt = self.walk(Learnt::default(), &mut scan)?;
+                scan.finish(&learnt)
+            }
+            told => told,
+        };
+        overview.map_err(|error| self.unreadable(error))
+    }
+
+    /// What its end says.
+    fn end(&self) -> Result<Result<Overview, ReadError>, BagError> {
         let mut reader = OverviewReader::new(self.length()?);
-        while let Some(part) = reader.wants().map_err(|error| self.unreadable(error))? {
-            reader.supply(&self.part(part)?);
+        loop {
+            match reader.wants() {
+                Ok(Some(part)) => reader.supply(&self.part(part)?),
+                Ok(None) => return Ok(reader.finish()),
+                Err(error) => return Ok(Err(error)),
+            }
         }
-        reader.finish().map_err(|error| self.unreadable(error))
+    }
+
+    /// The last message of a topic before a moment, in ns since 1970.
+    pub(crate) fn last_before(
+        &self,
+        overview: &Overview,
+        topic: &str,
+        unix_ns: u64,
+    ) -> Result<Option<(Times, Vec<u8>)>, BagError> {
+        let selection = Selection {
+            topics: Some(vec![topic.to_owned()]),
+            before_ns: Some(unix_ns),
+            is_backwards: true,
+            ..Selection::default()
+        };
+        let mut last = None;
+        self.ordered(overview, &selection, |placed| {
+            last = Some((placed.times, placed.message.to_vec()));
+            Ok::<bool, BagError>(false)
+        })?;
+        Ok(last)
     }
 
     /// The messages that are selected, by their time. `each` says whether to go on.
@@ -158,18 +195,14 @@ impl Bag {
         &self,
         overview: &Overview,
         selection: &Selection,
-        mut each: impl FnMut(&str, Times, &[u8]) -> Result<bool, E>,
+        mut each: impl FnMut(Placed<'_>) -> Result<bool, E>,
     ) -> Result<(), E> {
         let unreadable = |error| E::from(self.unreadable(error));
         let mut ordered = Ordered::new(overview, selection).map_err(unreadable)?;
         while let Some(step) = ordered.step() {
             let part = match step.map_err(unreadable)? {
                 Step::Wants(part) => part,
-                Step::Message {
-                    topic,
-                    times,
-                    message,
-                } => match each(topic, times, message)? {
+                Step::Message(placed) => match each(placed)? {
                     true => continue,
                     false => break,
                 },

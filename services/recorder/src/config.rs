@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+/// So many names are tried.
+const MOST_NAMES: u32 = 1_000;
+
 /// When a file is ended and the next one begun.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Split {
@@ -27,6 +30,8 @@ impl Split {
 pub struct RecordConfig {
     /// The file; it must not be there yet. If files are split, each gets a number.
     pub file: PathBuf,
+    /// Take another name if the file is there already: nobody has asked for this one.
+    pub or_another: bool,
     /// Names of topics; empty for all, those included that are opened later.
     pub topics: Vec<String>,
     /// When a new file is begun.
@@ -45,5 +50,20 @@ impl RecordConfig {
         }
         let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
         self.file.with_file_name(format!("{stem}-{part:03}.mcap"))
+    }
+
+    /// The names that it may have, the first one as it was asked for: `tour.mcap`, `tour-2.mcap`.
+    pub(crate) fn names(&self) -> impl Iterator<Item = Self> {
+        (1..=MOST_NAMES).map(|number| {
+            let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
+            let file = match number {
+                1 => self.file.clone(),
+                _ => self.file.with_file_name(format!("{stem}-{number}.mcap")),
+            };
+            Self {
+                file,
+                ..self.clone()
+            }
+        })
     }
 }

@@ -2,14 +2,23 @@
 //!
 //! Room is reserved with `fallocate`, which takes blocks of the file system without making the file
 //! longer; so what is written into it later cannot fail for want of room. A file system that cannot
-//! do that is written to without a reserve.
+//! do that is written to without a reserve. A limit to the length of files (`ulimit -f`) is no limit
+//! to such a reserve, so it is looked at beforehand.
+//!
+//! Somebody may remove the file or move it while it is written, or take its disk away. All writing
+//! succeeds then as before, so [`Disk::fate`] looks whether the file is still where it was made.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
+use std::os::fd::AsRawFd;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{FallocateFlags, fallocate};
 use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
+
+use crate::error::Fate;
 
 /// What is reserved at a time beyond what is needed, in bytes.
 const AHEAD: u64 = 4 << 20;
@@ -51,7 +60,11 @@ impl Disk {
         if length <= self.reserved {
             return Ok(());
         }
-        let more = length.saturating_add(AHEAD);
+        let most = getrlimit(Resource::Fsize).current.unwrap_or(u64::MAX);
+        if length > most {
+            return Err(Errno::FBIG.into());
+        }
+        let more = length.saturating_add(AHEAD).min(most);
         let reserved = self.allocate(more).map(|()| more);
         // The last few MiB of a disk are used as well.
         let reserved = reserved.or_else(|_| self.allocate(length).map(|()| length));
@@ -79,6 +92,35 @@ impl Disk {
         Ok(())
     }
 
+    /// What has become of the file, if it is no longer where it was made.
+    pub(crate) fn fate(&self) -> Option<Fate> {
+        let own = self.file.metadata().ok()?;
+        if own.nlink() == 0 {
+            return Some(Fate::Removed);
+        }
+        match fs::metadata(&self.path) {
+            Ok(there) if is_same(&own, &there) => None,
+            Err(error) if !is_nothing(&error) => None,
+            _ => {
+                let now = fs::read_link(format!("/proc/self/fd/{}", self.file.as_raw_fd()));
+                let now = now
+                    .ok()
+                    .filter(|now| fs::metadata(now).is_ok_and(|there| is_same(&own, &there)));
+                Some(Fate::Moved(now))
+            }
+        }
+    }
+
+    /// Whether `folder` is on the same disk as the file.
+    pub(crate) fn is_on_disk_of(&self, folder: &Path) -> bool {
+        let folder = match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        };
+        let device = |found: io::Result<fs::Metadata>| found.ok().map(|found| found.dev());
+        device(fs::metadata(folder)) == device(self.file.metadata())
+    }
+
     /// Waits until what was written is on the disk.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.file.sync_data()
@@ -96,10 +138,44 @@ impl Disk {
     }
 }
 
+fn is_same(one: &fs::Metadata, other: &fs::Metadata) -> bool {
+    (one.dev(), one.ino()) == (other.dev(), other.ino())
+}
+
+/// Whether there is nothing of that name.
+fn is_nothing(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
+}
+
 /// Whether there is no room, for this user or at all.
 pub(crate) fn is_full(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_taken_away_is_missed() {
+        let folder = std::env::temp_dir().join(format!("lager-disk-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        let path = folder.join("tour.mcap");
+        let mut disk = Disk::create(&path).expect("a file");
+        disk.write(b"some").expect("room");
+        assert_eq!(disk.fate(), None);
+        assert!(disk.is_on_disk_of(&folder) && !disk.is_on_disk_of(Path::new("/proc")));
+
+        let elsewhere = folder.join("elsewhere.mcap");
+        fs::rename(&path, &elsewhere).expect("our own file");
+        assert_eq!(disk.fate(), Some(Fate::Moved(Some(elsewhere.clone()))));
+        // Another file of that name is not this one.
+        fs::write(&path, "").expect("a file");
+        assert_eq!(disk.fate(), Some(Fate::Moved(Some(elsewhere))));
+        fs::remove_dir_all(&folder).expect("our own folder");
+        assert_eq!(disk.fate(), Some(Fate::Removed));
+    }
 }

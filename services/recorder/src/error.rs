@@ -1,5 +1,6 @@
 //! Why a recording ends.
 
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,32 @@ use lager_journal::WriteError;
 use lager_ports::{IntrospectError, PortError, ReceiveError};
 
 use crate::disk::is_full;
+
+/// What has become of a file that is no longer where it was made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It has no name any more.
+    Removed,
+    /// It has another name, if that is known.
+    Moved(Option<PathBuf>),
+}
+
+impl fmt::Display for Fate {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Removed => write!(
+                formatter,
+                "was removed while it was recorded, and what it had is lost"
+            ),
+            Self::Moved(Some(to)) => write!(
+                formatter,
+                "was moved to {} while it was recorded, and ends there",
+                to.display()
+            ),
+            Self::Moved(None) => write!(formatter, "was moved away while it was recorded"),
+        }
+    }
+}
 
 /// Why a recording ended early or did not begin.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +65,42 @@ pub enum RecordError {
     )]
     Full {
         /// The file.
+        path: PathBuf,
+    },
+    /// The file may not become longer.
+    #[error(
+        "{} may not become longer (`ulimit -f`, or the file system's own limit); it ends here and \
+         is whole. Record into several files with --split-size, or raise the limit",
+        path.display()
+    )]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Somebody took the file away, and the recording went on in another one.
+    #[error("{} {fate}; the recording goes on in {}", path.display(), next.display())]
+    Gone {
+        /// The file.
+        path: PathBuf,
+        /// What has become of it.
+        fate: Fate,
+        /// The next file.
+        next: PathBuf,
+    },
+    /// Somebody took the file away, and no other one can be made in its place.
+    #[error("{} {fate}; the recording ends here: {why}", path.display())]
+    GoneForGood {
+        /// The file.
+        path: PathBuf,
+        /// What has become of it.
+        fate: Fate,
+        /// Why there is no other file.
+        why: Box<RecordError>,
+    },
+    /// The folder is now on another disk than the recording's first file.
+    #[error("its disk is no longer at {}", path.display())]
+    OtherDisk {
+        /// The folder.
         path: PathBuf,
     },
     /// The file cannot be written.
@@ -79,8 +142,18 @@ impl RecordError {
         let path = path.to_owned();
         match error.kind() {
             io::ErrorKind::AlreadyExists => Self::Exists { path },
+            io::ErrorKind::FileTooLarge => Self::Create { path, error },
             _ if is_full(&error) => Self::NoRoom { path },
             _ => Self::Create { path, error },
+        }
+    }
+
+    /// There was no room for more of a file, which can still be ended.
+    pub(crate) fn full(path: &Path, error: &io::Error) -> Self {
+        let path = path.to_owned();
+        match error.kind() {
+            io::ErrorKind::FileTooLarge => Self::TooLong { path },
+            _ => Self::Full { path },
         }
     }
 }

@@ -1,7 +1,8 @@
 //! `bag export --csv`: a table for each topic, for spreadsheets and scripts.
 //!
 //! A row is a message. Fields within fields are joined by dots, as in `failure.kind`; a list is one
-//! cell, as JSON. The first columns are the stamp's.
+//! cell, as JSON. The first columns are the stamp's. A state's row that repeats the last sample from
+//! before the file comes first, with the number and the times that the sample had.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -41,7 +42,8 @@ pub fn export_csv(
     };
     let mut tables: BTreeMap<String, Table<BufWriter<File>>> = BTreeMap::new();
     fs::create_dir_all(to).map_err(|error| failed(to, error))?;
-    bag.ordered(&overview, &selection, |topic, times, message| {
+    bag.ordered(&overview, &selection, |placed| {
+        let topic = placed.topic;
         if !tables.contains_key(topic) {
             let path = to.join(format!("{}.csv", topic.replace('/', "-")));
             let file = File::create(&path).map_err(|error| failed(&path, error))?;
@@ -53,7 +55,7 @@ pub fn export_csv(
             tables.insert(topic.to_owned(), table);
         }
         let table = tables.get_mut(topic).expect("just made");
-        let written = table.row(times, message);
+        let written = table.row(placed.times, placed.message);
         written.map_err(|error| failed(to, error))?;
         Ok::<bool, BagError>(true)
     })?;

@@ -3,19 +3,21 @@
 //! It sleeps for a flush period and then writes all that has come. So it costs few wake-ups, and a
 //! disk that is slow for a while fills the queue and nothing else. What it takes at once it sorts
 //! by time, so that a file is in order except across two flushes.
+//!
+//! It looks at each flush whether its file is still where it was made. One that somebody has
+//! removed or moved it ends, says so, and goes on in a new one in the same folder. If the folder is
+//! gone, or is on another disk now, the recording ends: nobody wants it on a disk that was not meant.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use lager_journal::{Scene, Start};
+use lager_journal::{CalendarStep, Scene, Start};
 
 use crate::config::RecordConfig;
-use crate::error::RecordError;
-use crate::part::{Part, Refused};
-use crate::tally::{Item, QueueOut, Topics};
+use crate::error::{Fate, RecordError};
+use crate::part::{Earlier, Part, Refused};
+use crate::tally::{Held, Item, Notes, QueueOut, Topics};
 
 /// So many samples are taken at a time.
 const BATCH: usize = 20_000;
@@ -31,7 +33,7 @@ struct Missing {
 pub(crate) struct Kept {
     /// Its files.
     pub(crate) files: Vec<PathBuf>,
-    /// What ended the recording early.
+    /// What ended the recording early, or what became of one of its files.
     pub(crate) result: Result<(), RecordError>,
     /// Its end of the queue, into which the listener may still have put samples.
     pub(crate) from: QueueOut,
@@ -43,7 +45,7 @@ pub(crate) struct Keeper {
     start: Start,
     topics: Topics,
     from: QueueOut,
-    bytes: Arc<AtomicU64>,
+    notes: Notes,
     part: Part,
     ended: Vec<PathBuf>,
     /// Bytes of the files that are ended.
@@ -51,6 +53,14 @@ pub(crate) struct Keeper {
     missing: HashMap<usize, Missing>,
     /// What viewers are shown.
     scene: Scene,
+    /// The last sample of each topic that holds, by the topic's place.
+    held: BTreeMap<usize, Held>,
+    /// When the calendar was set.
+    steps: Vec<CalendarStep>,
+    /// Log time of the last sample.
+    log: u64,
+    /// What became of files that are gone.
+    gone: Option<RecordError>,
 }
 
 impl Keeper {
@@ -60,19 +70,30 @@ impl Keeper {
         start: Start,
         topics: &Topics,
         from: QueueOut,
-        bytes: &Arc<AtomicU64>,
+        notes: &Notes,
     ) -> Result<Self, RecordError> {
+        let begin = |config: &RecordConfig| {
+            Part::begin(&config.path(0), &start, topics, Earlier::default())
+        };
+        let (config, part) = match config.or_another {
+            true => first_free(config.names(), begin)?,
+            false => (config.clone(), begin(config)?),
+        };
         Ok(Self {
-            part: Part::begin(&config.path(0), &start, topics)?,
-            config: config.clone(),
+            part,
+            config,
             start,
             topics: topics.clone(),
             from,
-            bytes: Arc::clone(bytes),
+            notes: notes.clone(),
             ended: Vec::new(),
             ended_bytes: 0,
             missing: HashMap::new(),
             scene: Scene::default(),
+            held: BTreeMap::new(),
+            steps: Vec::new(),
+            log: 0,
+            gone: None,
         })
     }
 
@@ -93,8 +114,9 @@ impl Keeper {
             }
         };
         let mut files = std::mem::take(&mut self.ended);
-        files.push(self.part.path().to_owned());
+        files.extend(place_of(&self.part, self.part.fate().as_ref()));
         self.topics.drop_waiting(&self.from);
+        let gone = self.gone.take();
         // What could not be written cannot be ended either.
         let (from, ended) = match &result {
             Err(RecordError::Write { .. }) => (self.from, Ok(())),
@@ -102,33 +124,44 @@ impl Keeper {
         };
         Kept {
             files,
-            result: result.and(ended),
+            result: result.and(ended).and(gone.map_or(Ok(()), Err)),
             from,
         }
     }
 
     fn write(&mut self, mut items: Vec<Item>) -> Result<(), RecordError> {
+        if let Some(fate) = self.part.fate() {
+            self.go_on(fate)?;
+        }
+        for step in self.notes.steps() {
+            match self.part.step(&step) {
+                // A disk that is full is told by the next sample.
+                Ok(()) | Err(Refused::Full(_)) => self.steps.push(step),
+                Err(Refused::Failed(error)) => return Err(error),
+            }
+        }
         items.sort_by_key(|item| item.times.log);
         for (place, item) in items.iter().enumerate() {
             match self.part.write(item, &mut self.scene) {
                 Ok(()) => {}
                 Err(Refused::Failed(error)) => return Err(error),
-                Err(Refused::Full) => {
+                Err(Refused::Full(why)) => {
                     for item in &items[place..] {
                         self.topics.at(item.topic).drop_one();
                     }
-                    return Err(RecordError::Full {
-                        path: self.part.path().to_owned(),
-                    });
+                    return Err(why);
                 }
+            }
+            self.log = item.times.log;
+            if self.topics.at(item.topic).holds {
+                self.held.insert(item.topic, Held::of(item));
             }
             let missing = self.missing.entry(item.topic).or_default();
             missing.now = (item.lost, item.dropped);
         }
         self.part.flush()?;
         let length = self.part.length();
-        self.bytes
-            .store(self.ended_bytes + length, Ordering::Relaxed);
+        self.notes.set_bytes(self.ended_bytes + length);
         if self.config.split.is_due(length, self.part.age()) {
             self.next_part()?;
         }
@@ -138,10 +171,61 @@ impl Keeper {
     /// Ends this file and begins the next one. The queue holds what comes meanwhile.
     fn next_part(&mut self) -> Result<(), RecordError> {
         self.start.part += 1;
-        let next = self.config.path(self.start.part);
-        let next = Part::begin(&next, &self.start, &self.topics)?;
+        let next = self.begin(&self.config.path(self.start.part))?;
+        self.go_on_in(next, None)
+    }
+
+    /// Goes on after somebody has taken the file away.
+    fn go_on(&mut self, fate: Fate) -> Result<(), RecordError> {
+        let path = self.part.path().to_owned();
+        self.start.part += 1;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let next = match self.part.is_on_disk_of(folder) {
+            // A file of a number follows one of a number; else it has the same name, if that is free.
+            true => {
+                let name = RecordConfig {
+                    file: self.config.path(self.start.part),
+                    ..self.config.clone()
+                };
+                first_free(name.names(), |config| self.begin(&config.file))
+            }
+            false => Err(RecordError::OtherDisk {
+                path: folder.to_owned(),
+            }),
+        };
+        let next = match next {
+            Ok((_, next)) => next,
+            Err(why) => {
+                let why = Box::new(why);
+                return Err(RecordError::GoneForGood { path, fate, why });
+            }
+        };
+        let gone = RecordError::Gone {
+            path,
+            fate: fate.clone(),
+            next: next.path().to_owned(),
+        };
+        self.notes.tell(gone.to_string());
+        self.gone.get_or_insert(gone);
+        self.go_on_in(next, Some(&fate))
+    }
+
+    /// Begins the next file, which has what still holds.
+    fn begin(&self, path: &Path) -> Result<Part, RecordError> {
+        let mut held: Vec<Held> = self.held.values().cloned().collect();
+        held.sort_by_key(|held| held.publish);
+        let earlier = Earlier {
+            held,
+            steps: self.steps.clone(),
+            log: self.log,
+        };
+        Part::begin(path, &self.start, &self.topics, earlier)
+    }
+
+    /// Ends this file and goes on in the next one.
+    fn go_on_in(&mut self, next: Part, fate: Option<&Fate>) -> Result<(), RecordError> {
         let part = std::mem::replace(&mut self.part, next);
-        self.ended.push(part.path().to_owned());
+        self.ended.extend(place_of(&part, fate));
         let told = self.missing.iter();
         let told = told.map(|(place, missing)| (*place, since(missing.before, missing.now)));
         self.ended_bytes += part.end(&told.collect())?;
@@ -161,10 +245,32 @@ impl Keeper {
         });
         let told = told.collect();
         let ended = self.part.end(&told).map(|length| {
-            self.bytes
-                .store(self.ended_bytes + length, Ordering::Relaxed);
+            self.notes.set_bytes(self.ended_bytes + length);
         });
         (self.from, ended)
+    }
+}
+
+/// Begins with the first of the names that is not taken.
+fn first_free(
+    mut names: impl Iterator<Item = RecordConfig>,
+    begin: impl Fn(&RecordConfig) -> Result<Part, RecordError>,
+) -> Result<(RecordConfig, Part), RecordError> {
+    let mut name = names.next().expect("one name");
+    loop {
+        match (begin(&name), names.next()) {
+            (Err(RecordError::Exists { .. }), Some(next)) => name = next,
+            (begun, _) => return begun.map(|part| (name, part)),
+        }
+    }
+}
+
+/// Where a file is, if it is anywhere.
+fn place_of(part: &Part, fate: Option<&Fate>) -> Option<PathBuf> {
+    match fate {
+        None => Some(part.path().to_owned()),
+        Some(Fate::Moved(to)) => to.clone(),
+        Some(Fate::Removed) => None,
     }
 }
 
@@ -176,73 +282,4 @@ fn since(before: (u64, u64), now: (u64, u64)) -> (u64, u64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use lager_journal::{Envelope, EnvelopeSchema, Times};
-    use lager_topics::{Description, LineFrame, Stamp};
-
-    use super::*;
-    use crate::Split;
-    use crate::tally::{Topic, queue};
-
-    #[test]
-    fn what_waits_when_no_next_file_can_be_made_is_counted_as_dropped() {
-        let folder = std::env::temp_dir().join(format!("lager-keeper-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        // The second file is there already.
-        std::fs::write(folder.join("tour-001.mcap"), "").expect("a file");
-        let config = RecordConfig {
-            file: folder.join("tour.mcap"),
-            topics: Vec::new(),
-            split: Split {
-                bytes: Some(1),
-                time: None,
-            },
-            queue: 0,
-            flush: Duration::ZERO,
-        };
-        let topics = Topics::default();
-        let schema = EnvelopeSchema::of(&Description::of::<LineFrame>());
-        let (_, topic) = topics.add(Topic::new("sensor/line", schema));
-        let (to, from) = queue(BATCH + 7);
-        for number in 0..BATCH as u64 + 7 {
-            let envelope = Envelope {
-                stamp: Stamp {
-                    sequence: number,
-                    ..Stamp::default()
-                },
-                lost: 0,
-                dropped: 0,
-                payload: LineFrame::default(),
-            };
-            let item = Item {
-                topic: 0,
-                times: Times { log: 0, publish: 0 },
-                sequence: number,
-                lost: 0,
-                dropped: 0,
-                message: serde_json::to_vec(&envelope).expect("JSON"),
-            };
-            topic.receive();
-            assert!(to.put(item));
-        }
-        let bytes = Arc::new(AtomicU64::new(0));
-        let keeper = Keeper::new(&config, Start::default(), &topics, from, &bytes);
-        let kept = keeper.expect("a file").run();
-        assert!(
-            matches!(kept.result, Err(RecordError::Exists { .. })),
-            "{:?}",
-            kept.result
-        );
-        assert_eq!(
-            (topic.count().received, topic.count().dropped),
-            (BATCH as u64 + 7, 7)
-        );
-        let mut said = Vec::new();
-        let is_right = crate::check(&kept.files[0], false, &mut said).expect("a file");
-        let said = String::from_utf8(said).expect("text");
-        assert!(is_right && said.contains("7 dropped by it"), "{said}");
-        std::fs::remove_dir_all(folder).expect("our own folder");
-    }
-}
+mod tests;

@@ -19,6 +19,13 @@
 //! that is killed loses at most what came since, and its file needs `lager bag recover`. On a full
 //! disk the file is ended in room that was reserved beforehand, so it is whole.
 //!
+//! **Each file can be used alone.** It begins with the last sample of every topic that holds, which
+//! stands in an earlier file as well and is in no count. A player that begins later than the
+//! recording publishes them, too.
+//!
+//! **A date is only as good as the machine's calendar.** One from before 2024 is called doubtful,
+//! and when the calendar is set meanwhile, that is told and stands in the file.
+//!
 //! **A player moves nothing.** See `play.rs`.
 
 mod bag;
@@ -39,14 +46,14 @@ mod verify;
 
 pub use bag::BagError;
 pub use config::{RecordConfig, Split};
-pub use error::RecordError;
+pub use error::{Fate, RecordError};
 pub use export::export_csv;
 pub use lager_journal::utc;
-pub use look::{check, info};
+pub use look::{check, doubt, info};
 pub use play::{PlayConfig, PlayError, Stamps, play};
 pub use record::{LiveCount, Progress, Recorded, record};
 pub use recover::recover;
-pub use samples::samples;
+pub use samples::{FileSample, samples};
 pub use verify::{
     Compared, Did, Difference, Gap, OfTopic, Rerun, SampleDifference, Verified, VerifyError, Why,
     verify,

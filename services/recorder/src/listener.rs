@@ -153,7 +153,8 @@ impl Listener<'_> {
         name: &str,
         schema: EnvelopeSchema,
     ) -> Box<dyn Feed> {
-        let (place, topic) = self.topics.add(Topic::new(name, schema));
+        let topic = Topic::new(name, schema, from.holds());
+        let (place, topic) = self.topics.add(topic);
         Box::new(FeedOf {
             from,
             place,

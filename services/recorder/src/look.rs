@@ -3,7 +3,9 @@
 use std::io::Write;
 use std::path::Path;
 
-use lager_journal::{Check, Count, Learnt, Overview, Report, TopicOverview, utc};
+use lager_journal::{
+    CalendarStep, Check, Count, Learnt, Overview, Report, TopicOverview, is_doubtful, utc,
+};
 use serde_json::json;
 
 use crate::bag::{Bag, BagError};
@@ -25,7 +27,8 @@ pub fn info(file: &Path, as_json: bool, out: &mut impl Write) -> Result<(), BagE
             .map(|topic| {
                 json!({
                     "topic": topic.name, "type": topic.schema, "messages": topic.messages,
-                    "hz": rate(topic.messages, seconds), "received": topic.count.map(|c| c.received),
+                    "repeated": topic.repeated,
+                    "hz": rate(topic, seconds), "received": topic.count.map(|c| c.received),
                     "lost": topic.count.map(|c| c.lost), "dropped": topic.count.map(|c| c.dropped),
                 })
             })
@@ -34,6 +37,8 @@ pub fn info(file: &Path, as_json: bool, out: &mut impl Write) -> Result<(), BagE
             "file": file.display().to_string(), "bytes": bytes, "chunks": overview.chunks,
             "robot": robot, "part": overview.start.as_ref().map(|start| start.part),
             "begin_unix_ns": overview.begin_ns, "end_unix_ns": overview.end_ns,
+            "dates_are_doubtful": is_doubtful(overview.begin_ns) && overview.messages > 0,
+            "calendar_steps": steps(&overview.steps),
             "seconds": seconds, "messages": overview.messages, "topics": topics,
         });
         writeln!(out, "{value}")?;
@@ -61,6 +66,18 @@ pub fn info(file: &Path, as_json: bool, out: &mut impl Write) -> Result<(), BagE
     writeln!(out, "end       {} UTC", utc(overview.end_ns))?;
     writeln!(out, "duration  {seconds:.3} s")?;
     writeln!(out, "messages  {}", overview.messages)?;
+    let repeated: u64 = overview.topics.iter().map(|topic| topic.repeated).sum();
+    if repeated > 0 {
+        writeln!(
+            out,
+            "repeated  {repeated} of them, from before this file, so that it says what held"
+        )?;
+    }
+    if overview.messages > 0 {
+        for line in dates(overview.begin_ns, &overview.steps) {
+            writeln!(out, "calendar  {line}")?;
+        }
+    }
     table(&overview, seconds, out)
 }
 
@@ -86,7 +103,7 @@ fn table(overview: &Overview, seconds: f64, out: &mut impl Write) -> Result<(), 
             topic.name,
             topic.schema,
             topic.messages,
-            rate(topic.messages, seconds),
+            rate(topic, seconds),
             shown(topic.count.map(|count| count.lost)),
             shown(topic.count.map(|count| count.dropped)),
         )?;
@@ -94,10 +111,43 @@ fn table(overview: &Overview, seconds: f64, out: &mut impl Write) -> Result<(), 
     Ok(())
 }
 
-/// Messages a second over the whole file.
-fn rate(messages: u64, seconds: f64) -> f64 {
+/// What is to be said of a file's dates: whether they are doubtful, and when the calendar was set.
+fn dates(begin_ns: u64, steps: &[CalendarStep]) -> Vec<String> {
+    let set = steps.iter().map(|step| set(step, begin_ns));
+    doubt(begin_ns).into_iter().chain(set).collect()
+}
+
+/// That a date, in ns since 1970, cannot be believed, if it cannot.
+pub fn doubt(unix_ns: u64) -> Option<String> {
+    is_doubtful(unix_ns).then(|| {
+        let date = utc(unix_ns);
+        format!(
+            "the dates are doubtful: the machine's calendar says {date} UTC, so its clock was not set"
+        )
+    })
+}
+
+/// That the calendar was set while something went on that began at `begin_ns`.
+pub(crate) fn set(step: &CalendarStep, begin_ns: u64) -> String {
+    let after = step.at_ns.saturating_sub(begin_ns) as f64 / 1e9;
+    let begin = utc(step.corrected(begin_ns));
+    format!(
+        "the machine's calendar was set {after:.1} s after the recording began; by the new one it \
+         began {begin} UTC. The recording's dates go on as they began"
+    )
+}
+
+fn steps(steps: &[CalendarStep]) -> Vec<serde_json::Value> {
+    let steps = steps.iter();
+    steps
+        .map(|step| json!({"at_unix_ns": step.at_ns, "by_ns": step.by_ns}))
+        .collect()
+}
+
+/// Samples a second over the whole file.
+fn rate(topic: &TopicOverview, seconds: f64) -> f64 {
     if seconds > 0.0 {
-        messages as f64 / seconds
+        (topic.messages - topic.repeated) as f64 / seconds
     } else {
         0.0
     }
@@ -111,6 +161,7 @@ fn rate(messages: u64, seconds: f64) -> f64 {
 pub fn check(file: &Path, as_json: bool, out: &mut impl Write) -> Result<bool, BagError> {
     let report = report(&Bag::open(file)?)?;
     let messages: u64 = report.topics.values().map(|topic| topic.messages).sum();
+    let repeated: u64 = report.topics.values().map(|topic| topic.repeated).sum();
     let counts = report.topics.values().filter_map(|topic| topic.count);
     let total = counts.fold(Count::default(), |total, count| Count {
         received: total.received + count.received,
@@ -124,6 +175,8 @@ pub fn check(file: &Path, as_json: bool, out: &mut impl Write) -> Result<bool, B
             "file": name.to_string(), "whole": faults.is_empty(), "messages": messages,
             "chunks": report.chunks, "lost": total.lost, "dropped": total.dropped,
             "faults": faults, "faults_found": report.faults_found,
+            "repeated": repeated, "dates_are_doubtful": is_doubtful(report.begin_ns) && messages > 0,
+            "calendar_steps": steps(&report.steps),
         });
         writeln!(out, "{value}")?;
     } else if faults.is_empty() {
@@ -152,6 +205,11 @@ pub fn check(file: &Path, as_json: bool, out: &mut impl Write) -> Result<bool, B
             "{name}: {messages} messages in {} chunks are whole",
             report.chunks
         )?;
+    }
+    if !as_json && messages > 0 {
+        for line in dates(report.begin_ns, &report.steps) {
+            writeln!(out, "{name}: {line}")?;
+        }
     }
     Ok(faults.is_empty())
 }

@@ -4,11 +4,13 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use lager_journal::{Channel, Count, Counts, Journal, Scene, Shown, Start, View};
+use lager_journal::{
+    CalendarStep, Channel, Count, Counts, Journal, Scene, Shown, Start, Times, View,
+};
 
 use crate::disk::{Disk, is_full};
-use crate::error::RecordError;
-use crate::tally::{Item, Topics};
+use crate::error::{Fate, RecordError};
+use crate::tally::{Held, Item, Topic, Topics};
 
 /// A chunk is ended when it has so many bytes, flush or not.
 const CHUNK: u64 = 1 << 20;
@@ -23,10 +25,21 @@ pub(crate) struct Part {
     topics: Topics,
     channels: HashMap<usize, Kept>,
     views: BTreeMap<View, Channel>,
-    /// Whether this file has what viewers were shown before it began.
-    has_lasting: bool,
+    /// What was before this file and still holds; it has it after its first sample has come.
+    earlier: Option<Earlier>,
     begun: Instant,
     bytes: Vec<u8>,
+}
+
+/// What was before a file.
+#[derive(Clone, Default)]
+pub(crate) struct Earlier {
+    /// The last sample of each topic that holds.
+    pub(crate) held: Vec<Held>,
+    /// When the calendar was set.
+    pub(crate) steps: Vec<CalendarStep>,
+    /// Log time of the last sample.
+    pub(crate) log: u64,
 }
 
 /// What the file has of one topic.
@@ -38,13 +51,18 @@ struct Kept {
 /// Why a sample is not in the file.
 pub(crate) enum Refused {
     /// There is no room for it, and there is room for the file's end.
-    Full,
+    Full(RecordError),
     /// The file cannot be written.
     Failed(RecordError),
 }
 
 impl Part {
-    pub(crate) fn begin(path: &Path, start: &Start, topics: &Topics) -> Result<Self, RecordError> {
+    pub(crate) fn begin(
+        path: &Path,
+        start: &Start,
+        topics: &Topics,
+        earlier: Earlier,
+    ) -> Result<Self, RecordError> {
         let journal = Journal::begin(start)?;
         let mut disk = Disk::create(path).map_err(|error| RecordError::create(path, error))?;
         let room = journal.length() + journal.room(DESCRIBED);
@@ -58,7 +76,7 @@ impl Part {
             topics: topics.clone(),
             channels: HashMap::new(),
             views: BTreeMap::new(),
-            has_lasting: false,
+            earlier: Some(earlier),
             begun: Instant::now(),
             bytes: Vec::new(),
         })
@@ -81,8 +99,8 @@ impl Part {
     /// Adds a sample, and what `scene` makes of it.
     pub(crate) fn write(&mut self, item: &Item, scene: &mut Scene) -> Result<(), Refused> {
         let mut shown = Vec::new();
-        if !self.has_lasting {
-            self.has_lasting = true;
+        if self.earlier.is_some() {
+            self.begin_with_earlier(Some(item.times.log))?;
             shown.extend_from_slice(scene.lasting());
         }
         let topic = self.topics.at(item.topic);
@@ -90,14 +108,71 @@ impl Part {
         let bytes = shown.iter().map(|shown| shown.message.len());
         let bytes = bytes.sum::<usize>() + item.message.len();
         let more = bytes as u64 + 2 * DESCRIBED;
-        let room = self.journal.length() + self.journal.room(more);
-        match self.disk.reserve(room) {
-            Ok(()) => {}
-            Err(error) if is_full(&error) => return Err(Refused::Full),
-            Err(error) => return Err(Refused::Failed(self.failed(error))),
-        }
+        self.reserve(more)?;
         let kept = self.keep(item).and_then(|()| self.show(item, &shown));
         kept.map_err(Refused::Failed)
+    }
+
+    /// Makes room for so many bytes more than those of the file that is ended now.
+    fn reserve(&mut self, more: u64) -> Result<(), Refused> {
+        let room = self.journal.length() + self.journal.room(more);
+        match self.disk.reserve(room) {
+            Ok(()) => Ok(()),
+            Err(error) if is_full(&error) => {
+                Err(Refused::Full(RecordError::full(self.path(), &error)))
+            }
+            Err(error) => Err(Refused::Failed(self.failed(error))),
+        }
+    }
+
+    /// Puts what was before this file at its beginning: when it begins with a sample, at `log`.
+    fn begin_with_earlier(&mut self, log: Option<u64>) -> Result<(), Refused> {
+        let Some(Earlier {
+            held,
+            steps,
+            log: last,
+        }) = self.earlier.take()
+        else {
+            return Ok(());
+        };
+        for step in &steps {
+            self.step(step)?;
+        }
+        let log = log.unwrap_or(last);
+        for held in &held {
+            let topic = self.topics.at(held.topic);
+            self.reserve(held.message.len() as u64 + 2 * described(&topic))?;
+            self.repeat(&topic, held, log).map_err(Refused::Failed)?;
+        }
+        Ok(())
+    }
+
+    fn repeat(&mut self, topic: &Topic, held: &Held, log: u64) -> Result<(), RecordError> {
+        let channel = self.journal.repeated(&topic.name, &topic.schema)?;
+        let times = Times {
+            log,
+            publish: held.publish,
+        };
+        self.journal
+            .write(channel, times, held.sequence, &held.message)?;
+        Ok(())
+    }
+
+    /// Notes that the calendar was set.
+    pub(crate) fn step(&mut self, step: &CalendarStep) -> Result<(), Refused> {
+        self.reserve(Journal::room_for_a_step())?;
+        let noted = self.journal.step(step);
+        noted.map_err(|error| Refused::Failed(error.into()))
+    }
+
+    /// What has become of the file, if it is no longer where it was made.
+    pub(crate) fn fate(&self) -> Option<Fate> {
+        self.disk.fate()
+    }
+
+    /// Whether `folder` is on the same disk.
+    pub(crate) fn is_on_disk_of(&self, folder: &Path) -> bool {
+        self.disk.is_on_disk_of(folder)
     }
 
     /// What is derived stands beside the samples and is counted as none.
@@ -156,6 +231,9 @@ impl Part {
     /// Ends the file. `missing` says of each topic, by its place, how many of its samples were lost
     /// and dropped while this file was written.
     pub(crate) fn end(mut self, missing: &HashMap<usize, (u64, u64)>) -> Result<u64, RecordError> {
+        if let Err(Refused::Failed(error)) = self.begin_with_earlier(None) {
+            return Err(error);
+        }
         self.journal.flush()?;
         self.write_out()?;
         let mut counts = Counts::new();
@@ -186,4 +264,9 @@ impl Part {
         let path = self.disk.path().to_owned();
         RecordError::Write { path, error }
     }
+}
+
+/// Bytes of what describes one topic.
+fn described(topic: &Topic) -> u64 {
+    (topic.schema.text.len() + topic.schema.name.len() + 2 * topic.name.len()) as u64 + 512
 }

@@ -11,6 +11,9 @@
 //! machine's clock since its start: after a restart of the machine they may lie ahead, and readers
 //! count no losses in such a stream.
 //!
+//! Where it begins later than the recording, it first publishes the last sample before that moment
+//! of every topic that holds, so that readers know the warehouse, the orders and the mode of then.
+//!
 //! A user's own topic is played onto the bus of those who have it open, laid out as its creator
 //! says. One that nobody has open when the player starts is not played: nobody would hear it, and a
 //! recording does not say how many may write and read it, nor how many samples may wait there.
@@ -157,6 +160,7 @@ pub fn play(
     let left_out: Vec<String> = wanted.iter().filter(is_left_out).cloned().collect();
     begun(&left_out);
 
+    let held = held(&bag, &overview, &selection, &writers)?;
     let mut played = Played::default();
     let pace = Pace {
         shutdown,
@@ -169,26 +173,32 @@ pub fn play(
         let begun = Instant::now();
         let mut first = None;
         let mut is_done = true;
-        bag.ordered(&overview, &selection, |topic, times, message| {
-            let first = *first.get_or_insert(times.log);
-            let after = Duration::from_nanos(times.log.saturating_sub(first));
-            is_done = pace.rest_until(begun + after.div_f64(config.rate));
-            if !is_done {
-                return Ok(false);
-            }
+        let mut publish = |topic: &str, message: &[u8]| {
             if let Some(writer) = pace.writers.get(topic) {
                 let send = || send(writer, message, config.stamps);
                 watchdog.over("publishing a sample", send)?;
                 played.samples += 1;
             }
-            Ok::<bool, PlayError>(true)
+            Ok::<(), PlayError>(())
+        };
+        for (topic, message) in &held {
+            publish(topic, message)?;
+        }
+        bag.ordered(&overview, &selection, |placed| {
+            let first = *first.get_or_insert(placed.times.log);
+            let after = Duration::from_nanos(placed.times.log.saturating_sub(first));
+            is_done = pace.rest_until(begun + after.div_f64(config.rate));
+            if is_done {
+                publish(placed.topic, placed.message)?;
+            }
+            Ok::<bool, PlayError>(is_done)
         })?;
-        if first.is_none() {
+        if first.is_none() && held.is_empty() {
             let why = "no sample lies between --from and --to".to_owned();
             return Err(PlayError::Nothing { why });
         }
         played.is_done = is_done;
-        if !is_done || !config.repeat {
+        if !is_done || !config.repeat || first.is_none() {
             break;
         }
     }
@@ -230,7 +240,30 @@ fn select(
         topics: Some(writers.keys().cloned().collect()),
         from_ns: Some(at(config.from)),
         before_ns: config.to.map(at),
+        is_backwards: false,
     })
+}
+
+/// The last sample before the selection begins of each topic that holds, the oldest first: who
+/// looks at a state then sees what it was.
+fn held(
+    bag: &Bag,
+    overview: &Overview,
+    selection: &Selection,
+    writers: &Writers,
+) -> Result<Vec<(String, Vec<u8>)>, BagError> {
+    let Some(from_ns) = selection.from_ns.filter(|from| *from <= overview.end_ns) else {
+        return Ok(Vec::new());
+    };
+    let mut held = Vec::new();
+    for (name, _) in writers.iter().filter(|(_, writer)| writer.holds()) {
+        if let Some((times, message)) = bag.last_before(overview, name, from_ns)? {
+            held.push((times, name.clone(), message));
+        }
+    }
+    held.sort_by_key(|(times, ..)| times.publish);
+    let held = held.into_iter();
+    Ok(held.map(|(_, name, message)| (name, message)).collect())
 }
 
 fn must_be_free(bus: &Bus, wanted: &[String]) -> Result<(), PlayError> {

@@ -2,20 +2,19 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use lager_journal::{Count, Start};
+use lager_journal::{Calendar, Count, Start};
 use lager_ports::{Bus, BusWatch, Clock, Pace, Shutdown, Watchdog};
 
 use crate::config::RecordConfig;
 use crate::error::RecordError;
 use crate::keeper::Keeper;
 use crate::listener::{Listener, Timing};
-use crate::tally::{Topics, queue};
+use crate::look::{doubt, set};
+use crate::tally::{Notes, Topics, queue};
 
 /// How often it tells how things stand, and looks for topics that have come.
 const TELL: Duration = Duration::from_secs(1);
@@ -38,8 +37,9 @@ pub struct Progress {
     pub bytes: u64,
     /// In the order in which they were found.
     pub topics: Vec<LiveCount>,
-    /// Topics that cannot be recorded, with the reason; told once.
-    pub refused: Vec<String>,
+    /// What a person should know: topics that cannot be recorded, a file that somebody has taken
+    /// away, dates that are doubtful. Each is told once.
+    pub news: Vec<String>,
 }
 
 impl Progress {
@@ -92,12 +92,16 @@ pub fn record(
         unix_offset_ns: times.offset_ns,
     };
     let (to, from) = queue(config.queue);
-    let bytes = Arc::new(AtomicU64::new(0));
+    let notes = Notes::default();
+    let began_unix_ns = times.began_ns.saturating_add_signed(times.offset_ns);
+    if let Some(doubt) = doubt(began_unix_ns) {
+        notes.tell(doubt);
+    }
     let keeper = {
-        let (config, topics, bytes) = (config.clone(), topics.clone(), Arc::clone(&bytes));
+        let (config, topics, notes) = (config.clone(), topics.clone(), notes.clone());
         // A journal stays in its thread, so that thread makes it and says whether it could.
         let (ready, is_ready) = sync_channel(1);
-        let run = move || match Keeper::new(&config, start, &topics, from, &bytes) {
+        let run = move || match Keeper::new(&config, start, &topics, from, &notes) {
             Ok(keeper) => {
                 let _ = ready.send(None);
                 Some(keeper.run())
@@ -126,12 +130,20 @@ pub fn record(
         known: BTreeSet::new(),
         services: BusWatch::of_services(),
     };
-    let mut stands = |refused| {
+    let mut calendar = Calendar::new(times.offset_ns);
+    let mut stands = |refused: Vec<String>| {
+        let stamp_ns = Clock::monotonic_ns();
+        if let Some(step) = calendar.look(stamp_ns, Clock::unix_offset_ns()) {
+            notes.step(step);
+            notes.tell(set(&step, began_unix_ns));
+        }
+        let mut news = refused;
+        news.append(&mut notes.news());
         let progress = Progress {
             time: began.elapsed(),
-            bytes: bytes.load(Ordering::Relaxed),
+            bytes: notes.bytes(),
             topics: live(&topics),
-            refused,
+            news,
         };
         tell(&progress);
         progress

@@ -27,7 +27,8 @@ pub fn recover(
     let mut check = Check::default();
     let learnt = bag.walk(Learnt::default(), &mut check)?;
     let found = check.finish();
-    if found.faults.is_empty() {
+    // Messages outside of chunks are whole, and can be neither played nor exported.
+    if found.faults.is_empty() && !(found.is_ours && found.has_loose) {
         if !found.is_ours {
             return Err(BagError::Foreign { path });
         }
@@ -40,7 +41,7 @@ pub fn recover(
         }
         return Ok(());
     }
-    if found.chunks == 0 || !found.is_ours {
+    if (found.chunks == 0 && !found.has_loose) || !found.is_ours {
         let why = found.faults.first().map(ToString::to_string);
         let why = why.unwrap_or_default();
         return Err(BagError::Nothing { path, why });

@@ -1,10 +1,12 @@
-//! What listener and keeper share: the topics with their counts, and the queue between them.
+//! What listener and keeper share: the topics with their counts, the queue between them, and what
+//! they tell each other.
 
+use std::mem;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use lager_journal::{Count, EnvelopeSchema, Times};
+use lager_journal::{CalendarStep, Count, EnvelopeSchema, Times};
 
 /// Messages may wait with so many bytes together.
 const QUEUE_BYTES: u64 = 64 << 20;
@@ -14,16 +16,19 @@ const QUEUE_BYTES: u64 = 64 << 20;
 pub(crate) struct Topic {
     pub(crate) name: String,
     pub(crate) schema: EnvelopeSchema,
+    /// Whether its last sample holds for those who come later, and so for later files.
+    pub(crate) holds: bool,
     received: AtomicU64,
     lost: AtomicU64,
     dropped: AtomicU64,
 }
 
 impl Topic {
-    pub(crate) fn new(name: &str, schema: EnvelopeSchema) -> Self {
+    pub(crate) fn new(name: &str, schema: EnvelopeSchema, holds: bool) -> Self {
         Self {
             name: name.to_owned(),
             schema,
+            holds,
             received: AtomicU64::new(0),
             lost: AtomicU64::new(0),
             dropped: AtomicU64::new(0),
@@ -77,8 +82,54 @@ impl Topics {
     }
 
     pub(crate) fn all(&self) -> MutexGuard<'_, Vec<Arc<Topic>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0)
     }
+}
+
+/// What both tell each other besides samples; clones share it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Notes(Arc<Told>);
+
+#[derive(Debug, Default)]
+struct Told {
+    /// On the disk, in all files.
+    bytes: AtomicU64,
+    /// What a person should know.
+    news: Mutex<Vec<String>>,
+    /// When the calendar was set.
+    steps: Mutex<Vec<CalendarStep>>,
+}
+
+impl Notes {
+    pub(crate) fn set_bytes(&self, bytes: u64) {
+        self.0.bytes.store(bytes, Ordering::Relaxed);
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.0.bytes.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn tell(&self, news: String) {
+        locked(&self.0.news).push(news);
+    }
+
+    /// What has been told; it is then no longer here.
+    pub(crate) fn news(&self) -> Vec<String> {
+        mem::take(&mut locked(&self.0.news))
+    }
+
+    pub(crate) fn step(&self, step: CalendarStep) {
+        locked(&self.0.steps).push(step);
+    }
+
+    /// Steps that have come; they are then no longer here.
+    pub(crate) fn steps(&self) -> Vec<CalendarStep> {
+        mem::take(&mut locked(&self.0.steps))
+    }
+}
+
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A sample on its way to the file.
@@ -90,6 +141,27 @@ pub(crate) struct Item {
     pub(crate) lost: u64,
     pub(crate) dropped: u64,
     pub(crate) message: Vec<u8>,
+}
+
+/// The last sample of a topic that holds.
+#[derive(Clone, Debug)]
+pub(crate) struct Held {
+    pub(crate) topic: usize,
+    /// When its writer published it, in ns since 1970.
+    pub(crate) publish: u64,
+    pub(crate) sequence: u64,
+    pub(crate) message: Vec<u8>,
+}
+
+impl Held {
+    pub(crate) fn of(item: &Item) -> Self {
+        Self {
+            topic: item.topic,
+            publish: item.times.publish,
+            sequence: item.sequence,
+            message: item.message.clone(),
+        }
+    }
 }
 
 /// The listener's end of the queue.

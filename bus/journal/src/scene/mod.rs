@@ -108,7 +108,7 @@ impl View {
     pub fn schema(self) -> EnvelopeSchema {
         EnvelopeSchema {
             name: self.kind().name().to_owned(),
-            text: self.kind().schema().to_string().into_bytes(),
+            text: self.kind().schema().to_string().into_bytes().into(),
         }
     }
 

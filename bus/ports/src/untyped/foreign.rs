@@ -3,6 +3,7 @@
 
 use core::cell::{Cell, OnceCell};
 
+use iceoryx2::prelude::PortFactory;
 use lager_topics::{Description, Role, Stamp, id};
 
 use super::outlet::Outlet;
@@ -22,6 +23,8 @@ pub(crate) struct Foreign {
     /// The actors' service, since somebody has it open.
     actors: OnceCell<Outlet>,
     size: usize,
+    /// Whether the topic holds its last sample for those who come later.
+    pub(crate) holds: bool,
     ringer: RoleRinger,
     pub(crate) next_sequence: Cell<u64>,
     pub(crate) epoch: u64,
@@ -38,6 +41,7 @@ impl Foreign {
         let writer = Self {
             bus: bus.clone(),
             name: name.to_owned(),
+            holds: service.static_config().history_size() > 0,
             outlet: Outlet::on(bus, name, service)?,
             actors: OnceCell::new(),
             size: description.size(),

@@ -26,6 +26,7 @@ use crate::transport::Ipc;
 pub(crate) struct Reader {
     port: Here<Port>,
     payload_align: usize,
+    holds: bool,
     streams: Streams,
     newest: Newest,
     /// Writers that could not be connected to.
@@ -93,6 +94,7 @@ impl Reader {
         Ok(Self {
             port: Here::new(port),
             payload_align: limits.message_type_details().payload.alignment(),
+            holds: limits.history_size() > 0,
             // Taken after the port exists: a publisher that is younger has seen the port from its
             // start.
             streams: Streams::new(Clock::monotonic_ns()),
@@ -100,6 +102,11 @@ impl Reader {
             unreached,
             _public: None,
         })
+    }
+
+    /// Whether the topic holds its last sample for those who come later.
+    pub(crate) fn holds(&self) -> bool {
+        self.holds
     }
 
     /// How many samples can wait for this end.

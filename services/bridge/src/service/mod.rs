@@ -119,8 +119,8 @@ pub fn run_with(
                     urgency::step_back(2, config.waiting);
                     Reader::new(place, port, bus, events, ringer, (counts, end)).run();
                 })
-                .map_err(|error| PortError::Transport {
-                    topic: "link/health".to_owned(),
+                .map_err(|error| PortError::Thread {
+                    what: "a serial port",
                     fault: error.into(),
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;
@@ -137,8 +137,8 @@ pub fn run_with(
             std::thread::Builder::new()
                 .name("buttons".to_owned())
                 .spawn_scoped(scope, watch)
-                .map_err(|error| PortError::Transport {
-                    topic: "operator/input".to_owned(),
+                .map_err(|error| PortError::Thread {
+                    what: "the buttons",
                     fault: error.into(),
                 })
                 .inspect_err(|_| end.store(true, Ordering::Release))?;

@@ -89,13 +89,19 @@ impl Conversation {
         wanted: Wanted,
         is_stopped: bool,
     ) {
-        let begun = match TooLate::check(late, wanted.latest()) {
+        let last = self.last_number.filter(|last| number <= *last);
+        let begun = match (last, TooLate::check(late, wanted.latest())) {
+            (Some(last), _) => Err(format!(
+                "the last action on this connection had the number {last}, so number {number} may \
+                 have been carried out before; give it anew with a greater number"
+            )),
             _ if is_stopped && ends_a_stop(wanted) => {
                 Err("a stop has come with it; give it anew".into())
             }
-            Err(why) => Err(why.to_string()),
-            Ok(()) => self.begin(now, late, number, wanted),
+            (None, Err(why)) => Err(why.to_string()),
+            (None, Ok(())) => self.begin(now, late, number, wanted),
         };
+        self.last_number = self.last_number.max(Some(number));
         match begun {
             Ok(Begun::Waits) => {}
             Ok(Begun::Done) => self.reply(number, Ok(())),

@@ -33,7 +33,7 @@ pub struct BagArgs {
 pub enum BagCommand {
     /// Record topics into a file until Ctrl-C or SIGTERM
     Record(RecordArgs),
-    /// Size, times, topics and losses, from the file's end alone
+    /// Size, times, topics and losses, from the file's end if that says so
     Info {
         /// The recording
         file: PathBuf,
@@ -70,7 +70,7 @@ pub enum BagCommand {
 /// `lager bag record`.
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// The file, which must not be there yet [default: ROBOT-DATE.mcap]
+    /// The file, which must not be there yet [default: ROBOT-DATE.mcap, or -2 if that is there]
     pub file: Option<PathBuf>,
     /// Only this topic; may be given again [default: all, also those that come later]
     #[arg(long, value_name = "TOPIC", value_parser = values::TopicName, hide_possible_values = true)]

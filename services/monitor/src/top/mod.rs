@@ -161,7 +161,18 @@ impl Recorded {
         let dropped = lacking.dropped.saturating_sub(known.dropped);
         model.row(topic).lack(lost, dropped, published);
         *known = lacking;
-        let head = &mut model.head;
+        self.show_state(topic, stamp, begun_ns, payload);
+    }
+
+    /// Takes a state that was told before the file began. It says how things stood, and is no
+    /// sample of the file.
+    pub fn repeat(&mut self, topic: &str, stamp: &Stamp, payload: Value) {
+        self.show_state(topic, stamp, stamp.publish_time_ns, payload);
+    }
+
+    fn show_state(&mut self, topic: &str, stamp: &Stamp, begun_ns: u64, payload: Value) {
+        let published = stamp.publish_time_ns;
+        let head = &mut self.model.head;
         match topic {
             LinkHealth::NAME => {
                 if let Some(health) = of(payload) {

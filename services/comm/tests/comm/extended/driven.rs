@@ -57,8 +57,8 @@ fn a_drive_ends_with_the_link_and_is_refused_where_logic_steers() {
     robot.mode(Mode::Manual);
     robot.health.blocked = Refusal::BoardSilent.into();
     robot.told();
-    let said = robot.hears(&["do 2 drive 2 100"]);
-    let why = "refused 2 forward is not possible now: the steering board";
+    let said = robot.hears(&["do 4 drive 2 100"]);
+    let why = "refused 4 forward is not possible now: the steering board";
     assert!(said[0].starts_with(why), "{said:?}");
 }
 

@@ -92,21 +92,21 @@ fn orders_are_cancelled_moved_and_cleared() {
     // Each press takes it one place further.
     robot.queue(&queue(&[4, 6, 8]));
     let press = ["[presses OrderMovedUp]"];
-    assert_eq!(robot.hears(&["do 4 first 8"]), press);
+    assert_eq!(robot.hears(&["do 9 first 8"]), press);
     let first = robot.pressed.expect("a press").id;
     assert_eq!(robot.queue(&queue(&[4, 8, 6])), press);
     assert_ne!(robot.pressed.expect("a press").id, first);
-    assert_eq!(robot.queue(&queue(&[8, 4, 6])), ["done 4"]);
-    assert_eq!(robot.hears(&["do 5 first 8"]), ["done 5"]);
-    assert_eq!(robot.hears(&["do 7 up 6"]), press);
+    assert_eq!(robot.queue(&queue(&[8, 4, 6])), ["done 9"]);
+    assert_eq!(robot.hears(&["do 10 first 8"]), ["done 10"]);
+    assert_eq!(robot.hears(&["do 11 up 6"]), press);
     assert_eq!(
         robot.queue(&queue(&[8, 6, 4])),
-        ["done 7"],
+        ["done 11"],
         "one place, not to the front"
     );
 
-    assert_eq!(robot.hears(&["do 6 clear"]), ["[presses QueueCleared]"]);
-    assert_eq!(robot.queue(&queue(&[])), ["done 6"]);
+    assert_eq!(robot.hears(&["do 12 clear"]), ["[presses QueueCleared]"]);
+    assert_eq!(robot.queue(&queue(&[])), ["done 12"]);
 }
 
 #[test]
@@ -175,4 +175,34 @@ fn what_cannot_be_read_is_refused_by_its_number_and_too_much_is_refused() {
         refused,
         Some("refused 17 16 actions are under way; wait for their end")
     );
+}
+
+#[test]
+fn a_number_that_was_heard_before_carries_nothing_out_again() {
+    let mut robot = extended(Mode::Autonomous);
+    assert_eq!(robot.hears(&["do 7 order 70 7"]), ["[orders 7]"]);
+    // The same line again, an older number, and both behind a newer one in one read.
+    for (line, number) in [
+        ("do 7 order 70 7", 7),
+        ("do 6 clear", 6),
+        ("do 7 order 71 7", 7),
+    ] {
+        let said = robot.hears(&[line]);
+        assert_eq!(said.len(), 1, "{line}: {said:?}");
+        let refused =
+            format!("refused {number} the last action on this connection had the number 7");
+        assert!(said[0].starts_with(&refused), "{line}: {said:?}");
+    }
+    let said = robot.hears(&["do 9 order 72 7", "do 8 order 73 7", "do 9 order 72 7"]);
+    let orders = |said: &[String]| said.iter().filter(|line| *line == "[orders 7]").count();
+    assert_eq!(orders(&said), 1, "{said:?}");
+    let refused = said.iter().filter_map(|line| line.get(..10));
+    let refused = refused.filter(|line| line.starts_with("refused"));
+    assert!(refused.eq(["refused 8 ", "refused 9 "]), "{said:?}");
+    // A new connection begins its own numbers.
+    robot.disconnect();
+    robot.connect();
+    robot.hears(&["lager 1 station"]);
+    let said = robot.hears(&["do 1 order 74 7"]);
+    assert_eq!(orders(&said), 1, "{said:?}");
 }
