@@ -519,13 +519,14 @@ class CalibratedSensor(Layout):
 
 class Health(Layout):
     _type_name_ = "lager::Health"
-    _hash_ = 0x8CD167B01CDA725F
+    _hash_ = 0xA23DD5E510609C23
     _fields_ = [
         ("sensor", BoardHealth),
         ("steering", BoardHealth),
         ("bus_lost", ctypes.c_uint64),
         ("driven_by_hand", ctypes.c_uint64),
         ("stopped_at_ns", ctypes.c_uint64),
+        ("stop_word", ctypes.c_uint64),
         ("current_id", ctypes.c_uint32),
         ("finished_id", ctypes.c_uint32),
         ("orders_refused", ctypes.c_uint32),
@@ -557,10 +558,10 @@ class Health(Layout):
     ]
     _enums_ = {"mode": Mode, "current_origin": Origin, "finished_origin": Origin, "finish": Finish, "refused_origin": Origin, "refusal": Refusal, "blocked": Refusal, "arm_profile": ArmProfileState, "calibration": Calibration, "stop_cause": StopCause, "stop_origin": Role}
     _dtype_ = {
-        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
-        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", ("<u1", (1,))],
-        "offsets": [0, 48, 96, 104, 112, 120, 124, 128, 132, 136, 140, 156, 158, 160, 162, 163, 164, 165, 166, 167, 168, 169, 170, 171, 172, 173, 174, 175, 176, 220, 221, 222, 223],
-        "itemsize": 224,
+        "names": ["sensor", "steering", "bus_lost", "driven_by_hand", "stopped_at_ns", "stop_word", "current_id", "finished_id", "orders_refused", "leases_expired", "refused_id", "switch_ids", "next_lease_ms", "gain_p", "gain_d", "mode", "stopped", "current_origin", "finished_origin", "current_code", "wire_seq", "finish", "refused_origin", "refusal", "blocked", "arm_profile", "calibration", "calibrated_sensors", "calibrations_ended", "calibrated", "stop_cause", "stop_origin", "mode_chosen", "reserved"],
+        "formats": [BoardHealth._dtype_, BoardHealth._dtype_, "<u8", "<u8", "<u8", "<u8", "<u4", "<u4", "<u4", "<u4", "<u4", ("<u4", (4,)), "<u2", "<i2", "<i2", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", "<u1", (CalibratedSensor._dtype_, (11,)), "<u1", "<u1", "<u1", ("<u1", (1,))],
+        "offsets": [0, 48, 96, 104, 112, 120, 128, 132, 136, 140, 144, 148, 164, 166, 168, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179, 180, 181, 182, 183, 184, 228, 229, 230, 231],
+        "itemsize": 232,
     }
 
 

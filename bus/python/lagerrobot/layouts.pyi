@@ -412,6 +412,7 @@ class Health(Layout):
     bus_lost: int
     driven_by_hand: int
     stopped_at_ns: int
+    stop_word: int
     current_id: int
     finished_id: int
     orders_refused: int
