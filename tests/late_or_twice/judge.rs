@@ -46,6 +46,9 @@ pub(crate) struct Judge {
     /// How much was moved, in ms, and how many one-shots began.
     pub(crate) motion: u64,
     pub(crate) one_shots: u32,
+    /// When the last of them began, and how long the longest was in force, in ms.
+    began: Option<u64>,
+    pub(crate) longest: u64,
     pub(crate) faults: Vec<String>,
 }
 
@@ -81,12 +84,16 @@ impl Judge {
         let Some(command) = Command::from_code(code).filter(|_| before != Some((code, seq))) else {
             return;
         };
+        if let Some(began) = self.began.take() {
+            self.longest = self.longest.max(now - began);
+        }
         if code == STANDBY {
             return;
         }
         let is_same = before.is_some_and(|(before, _)| before == code);
         if command.is_one_shot() {
             self.one_shots += 1;
+            self.began = Some(now);
             self.begins(now, true, &format!("{command:?}"));
         } else if !is_same {
             self.begins(now, false, &format!("{command:?}"));

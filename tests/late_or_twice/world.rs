@@ -50,6 +50,8 @@ pub(crate) struct Run {
     /// How long something moved, in ms, and how many one-shots began.
     pub(crate) motion: u64,
     pub(crate) one_shots: u32,
+    /// How long the longest of them was in force, in ms.
+    pub(crate) longest: u64,
     /// Links that comm gave up, and what comm said of what it could not do.
     pub(crate) hung_up: u32,
     pub(crate) thoughts: Vec<String>,
@@ -65,6 +67,7 @@ pub(crate) fn run(case: &Case, mends: Mends) -> Run {
         faults: world.judge.faults,
         motion: world.judge.motion,
         one_shots: world.judge.one_shots,
+        longest: world.judge.longest,
         hung_up: world.hung_up,
         thoughts: world.thoughts,
     }
@@ -108,7 +111,8 @@ struct Comm {
     state: u64,
     status: u64,
     asked: Vec<(u32, u64)>,
-    signed: u64,
+    /// When it said its sign last.
+    signed: Option<u64>,
 }
 
 impl Comm {
@@ -124,7 +128,7 @@ impl Comm {
             state: 0,
             status: 0,
             asked: Vec::new(),
-            signed: 0,
+            signed: None,
         }
     }
 }
@@ -508,10 +512,10 @@ impl World {
                 let by_itself = self.way != Way::ByHand;
                 if line.starts_with("lager") && by_itself && !self.mends.signs {
                     // Where logic drives it was said once a second.
-                    if now < comm.signed + 1_000 {
+                    if comm.signed.is_some_and(|signed| now < signed + 1_000) {
                         continue;
                     }
-                    comm.signed = now;
+                    comm.signed = Some(now);
                 }
                 if line.starts_with("thought") || line.starts_with("refused") {
                     self.thoughts
