@@ -128,24 +128,31 @@ pub(crate) fn must_have_filled_its_disk(domain: &Domain, recorder: Child) {
     must_be_right(domain, "full.mcap");
 }
 
-#[test]
-fn a_file_that_may_not_become_longer_ends_whole_and_kills_nobody() {
-    let domain = Domain::new();
-    let bus = guest(&domain);
-    let mut noisy = Noisy::new(&bus);
-    // 8192 blocks of 512 bytes.
-    let mut recorder = Command::new("sh")
-        .args(["-c", "ulimit -f 8192 && exec \"$@\"", "sh"])
+/// Starts `lager bag record` with `args` where no file may have more than so many blocks of 512
+/// bytes.
+fn record_with_short_files(domain: &Domain, blocks: u32, args: &[&str]) -> Child {
+    Command::new("sh")
+        .args(["-c", &format!("ulimit -f {blocks} && exec \"$@\""), "sh"])
         .arg(lager())
         .arg("--bus")
         .arg(domain.bus_folder())
-        .args(["bag", "record", "long.mcap", "--topic", "noise/now"])
+        .args(["bag", "record"])
+        .args(args)
         .current_dir(domain.folder())
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .expect("a shell");
+        .expect("a shell")
+}
+
+#[test]
+fn a_file_that_may_not_become_longer_ends_whole_and_kills_nobody() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let mut noisy = Noisy::new(&bus);
+    let args = ["long.mcap", "--topic", "noise/now"];
+    let mut recorder = record_with_short_files(&domain, 8_192, &args);
     wait_for("the file to be as long as it may", || {
         (0..4).for_each(|_| noisy.send());
         recorder.try_wait().expect("a child")
@@ -160,6 +167,16 @@ fn a_file_that_may_not_become_longer_ends_whole_and_kills_nobody() {
     must_be_right(&domain, "long.mcap");
     let long = fs::metadata(domain.folder().join("long.mcap")).expect("a file");
     assert!(long.len() <= 4 << 20, "{}", long.len());
+
+    // Where not even the bus's own files may be as long as they are, nothing is begun.
+    let none = record_with_short_files(&domain, 16, &["--wait", "none.mcap"]);
+    let none = none.wait_with_output().expect("a child");
+    let told = said(&none);
+    assert_eq!(none.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("files of this process may have 8 KiB"),
+        "{told}"
+    );
     drop((noisy, bus));
     domain.assert_clean();
 }

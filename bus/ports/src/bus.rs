@@ -53,6 +53,10 @@ impl Bus {
     /// # Errors
     /// The configuration is not usable, or the bus's files or the body's clock are not.
     pub fn open(config: &BusConfig, role: Role) -> Result<Self, OpenError> {
+        // Half a bus would be made, which looks damaged to everybody else.
+        if let Some(shortage) = Shortage::of_any_port() {
+            return Err(OpenError::Short(shortage));
+        }
         let place = config.place()?;
         let transport = config.transport(&place)?;
         let clock = clock::Source::new(config.speed, config.clock.as_deref())?;

@@ -14,6 +14,8 @@ pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 const FILES_LEFT: u64 = 8;
 /// A segment of a topic needs up to so much, in bytes.
 const SEGMENT: u64 = 1024 * 1024;
+/// The longest segment of a robot is shorter, in bytes.
+const LONGEST: u64 = 16 * 1024 * 1024;
 
 /// What there is too little of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +24,11 @@ pub enum Shortage {
     Files {
         /// How many it may open.
         limit: u64,
+    },
+    /// This process may make no files as long as the bus has them.
+    Lengths {
+        /// How long they may be, in KiB.
+        limit_kib: u64,
     },
     /// `/dev/shm` is full.
     Memory {
@@ -35,6 +42,17 @@ pub enum Shortage {
 }
 
 impl Shortage {
+    /// Whether files may not become long enough for any port.
+    pub(crate) fn of_any_port() -> Option<Self> {
+        Self::of_lengths(SEGMENT)
+    }
+
+    fn of_lengths(needed: u64) -> Option<Self> {
+        let limit = getrlimit(Resource::Fsize).current?;
+        let limit_kib = limit / 1024;
+        (limit < needed).then_some(Self::Lengths { limit_kib })
+    }
+
     /// What is short now, if anything is.
     pub fn now() -> Option<Self> {
         let files = getrlimit(Resource::Nofile).current;
@@ -44,6 +62,9 @@ impl Shortage {
             && open.map_or(true, |open| open + FILES_LEFT > limit)
         {
             return Some(Self::Files { limit });
+        }
+        if let Some(lengths) = Self::of_lengths(LONGEST) {
+            return Some(lengths);
         }
         let write = rustix::fs::Access::WRITE_OK | rustix::fs::Access::EXEC_OK;
         if rustix::fs::access(SHARED_MEMORY, write).is_err() {
@@ -66,6 +87,10 @@ impl fmt::Display for Shortage {
             Self::Files { limit } => write!(
                 formatter,
                 "this process may open {limit} files and has as good as all of them open (EMFILE); `ulimit -n 4096` or LimitNOFILE= in the unit allows more"
+            ),
+            Self::Lengths { limit_kib } => write!(
+                formatter,
+                "files of this process may have {limit_kib} KiB (EFBIG), and those of the bus are longer; `ulimit -f unlimited` or LimitFSIZE= in the unit allows more"
             ),
             Self::Memory { free_kib } => write!(
                 formatter,

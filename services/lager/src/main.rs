@@ -66,6 +66,7 @@ use crate::steer::{Obstacle, Operator};
 use crate::voice::Speaker;
 
 fn main() -> ExitCode {
+    voice::say_of_faults(Speaker::Tool);
     if let Err(error) = stack::must_suffice() {
         voice::say(&Speaker::Tool.line(&format!("{error:#}")));
         return exit::code(&error);
@@ -80,6 +81,7 @@ fn main() -> ExitCode {
         looked_at = Some(config.clone());
         let own = own_voice(&cli.command, &config);
         voice::begin(own, &config.log)?;
+        voice::say_of_faults(own);
         // `up` has no robot to speak for as long as it can end with an error.
         if !matches!(cli.command, Command::Up(_)) {
             speaker = own;

@@ -219,9 +219,47 @@ pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
+/// From now on a fault of the program itself is a sentence as well; with `RUST_BACKTRACE` set, what
+/// led there follows. The process or its thread ends all the same.
+pub fn say_of_faults(speaker: Speaker) {
+    // The one that is there now, which tells what led to a fault.
+    let _ = std::panic::take_hook();
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |fault| {
+        let payload = fault.payload();
+        let text = payload.downcast_ref::<&str>().copied();
+        let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+        let place = fault.location().map(ToString::to_string);
+        say(&speaker.line(&fault_sentence(
+            text.unwrap_or("nothing is said"),
+            &place.unwrap_or_default(),
+        )));
+        if std::env::var_os("RUST_BACKTRACE").is_some() {
+            usual(fault);
+        }
+    }));
+}
+
+fn fault_sentence(what: &str, place: &str) -> String {
+    format!(
+        "something that must not happen has happened: {what} (at {place}); if the machine is not \
+         short of anything (`lager doctor`), it is a fault of this program: please report it"
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_fault_of_the_program_is_told_with_its_place_and_what_to_do() {
+        let said = fault_sentence("the directory stream is invalid", "directory.rs:278:13");
+        assert!(said.contains("the directory stream is invalid (at directory.rs:278:13)"));
+        assert!(
+            said.contains("`lager doctor`") && said.contains("report it"),
+            "{said}"
+        );
+    }
 
     #[test]
     fn what_is_asked_for_is_levels_and_targets() {
