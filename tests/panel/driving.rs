@@ -371,13 +371,18 @@ pub(crate) fn a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centre
             page.moves();
             page.value("pads[0].axes[1] = -1; pads[0].timestamp = performance.now()");
             std::thread::sleep(std::time::Duration::from_millis(300));
-            page.moves().contains(&"drive 2 200".to_owned()).then_some(())
+            page.moves()
+                .contains(&"drive 2 200".to_owned())
+                .then_some(())
         });
     };
     let ends: [(&str, &str); 4] = [
         ("it is gone", "pads = []"),
         ("it is not connected", "pads[0].connected = false"),
-        ("it has come back beside itself", "pads[1] = entry('a', 1, 0)"),
+        (
+            "it has come back beside itself",
+            "pads[1] = entry('a', 1, 0)",
+        ),
         (
             "it is frozen while another one tells",
             "pads[1] = entry('b', 1, 0); pads[1].timestamp += 1000",
@@ -408,9 +413,14 @@ pub(crate) fn a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it(
         press(page, &["ArrowLeft"]);
         page.pause();
         page.value("dispatchEvent(new KeyboardEvent('keyup', { key: 'ArrowLeft' }))");
-        page.text("#drive-said").contains("the robot is stopped").then_some(())
+        page.text("#drive-said")
+            .contains("the robot is stopped")
+            .then_some(())
     });
-    assert!(!page.text("#drive-said").contains("lager"), "no command of a terminal");
+    assert!(
+        !page.text("#drive-said").contains("lager"),
+        "no command of a terminal"
+    );
     page.wait_until("!document.querySelector('#drive-resume').hidden");
     let at = page.middle("#drive-resume");
     page.mouse("mousePressed", at);

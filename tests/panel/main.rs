@@ -204,6 +204,8 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
     page.wait_for("#stop-said", "r1 stands after");
     page.wait_for("#stop-said", "r2 stands after");
     assert_eq!((stopped("r1"), stopped("r2")), (1, 1));
+    scene.domain.done(&["--name", "r2", "resume"]);
+    scene.resume();
     drop((page, second));
     scene.end();
 }

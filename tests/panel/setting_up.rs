@@ -455,7 +455,10 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
         page.wait_for("#setup-said", why.split(':').nth(1).expect("a range"));
     }
     page.fill("#map-string", "100,2,0,2");
-    page.wait_for("#setup-said", "the robot knows up to 99 squares along a side; here are 100");
+    page.wait_for(
+        "#setup-said",
+        "the robot knows up to 99 squares along a side; here are 100",
+    );
     page.value("document.querySelector('#setup-said').textContent = ''");
 }
 
@@ -472,6 +475,11 @@ fn what_the_page_lets_set_up_is_what_a_robot_drives_in() {
     ] {
         assert!(script.contains(&line), "{line}");
     }
-    assert_eq!(form.matches(&format!("max=\"{}\"", crossings - 1)).count(), 2);
-    assert!(form.contains(&format!("name=\"side\" placeholder=\"40\" type=\"number\" min=\"{side}\"")));
+    assert_eq!(
+        form.matches(&format!("max=\"{}\"", crossings - 1)).count(),
+        2
+    );
+    assert!(form.contains(&format!(
+        "name=\"side\" placeholder=\"40\" type=\"number\" min=\"{side}\""
+    )));
 }

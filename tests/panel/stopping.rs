@@ -27,7 +27,10 @@ pub(crate) fn stop_works_before_any_script_and_without_a_socket(
     page.call("Network.enable", &json!({}));
     // A module that does not load, and no script at all.
     for (blocked, press) in [
-        (json!(["*/main.js"]), (|page| page.click("#stop")) as fn(&mut Page)),
+        (
+            json!(["*/main.js"]),
+            (|page| page.click("#stop")) as fn(&mut Page),
+        ),
         (json!(["*/main.js"]), |page| page.key_down("Escape")),
         (json!(["*.js"]), |page| page.click("#stop")),
     ] {
@@ -74,12 +77,18 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
         page.key_down("Escape");
         page.key_up("Escape");
         page.wait_for("#stop-said", "NOT SENT: r77 is not here");
-        assert_eq!(page.value("document.body.textContent.includes('AUTONOMOUS')"), false);
+        assert_eq!(
+            page.value("document.body.textContent.includes('AUTONOMOUS')"),
+            false
+        );
         // Nobody else was stopped in its place.
         scene.wait_to_move();
     }
     // The display forgets a stop that somebody has ended.
-    page.call("Page.navigate", &json!({ "url": format!("{here}/screen?r1") }));
+    page.call(
+        "Page.navigate",
+        &json!({ "url": format!("{here}/screen?r1") }),
+    );
     page.wait_until("document.querySelector('.screen #figures')?.textContent.length > 0");
     page.key_down("Escape");
     page.key_up("Escape");
@@ -123,12 +132,17 @@ pub(crate) fn what_happens_to_the_robot_is_in_the_log_and_survives_the_station(
     kill_process(station, Signal::KILL).expect("it runs");
     page.wait_for("#entries", "does not reach the station");
     // What the robot has told the station before is told again, with its time, and once.
-    for sentence in ["STOPPED: it was ordered", "the stop is released", "its service logic"] {
+    for sentence in [
+        "STOPPED: it was ordered",
+        "the stop is released",
+        "its service logic",
+    ] {
         wait_for(sentence, || {
             let now = page.value(entries);
             let count = |all: &serde_json::Value| {
                 let all = all.as_array().expect("a list").iter();
-                all.filter(|line| line.as_str().is_some_and(|line| line.contains(sentence))).count()
+                all.filter(|line| line.as_str().is_some_and(|line| line.contains(sentence)))
+                    .count()
             };
             (count(&now) == count(&before)).then_some(())
         });
@@ -149,7 +163,9 @@ fn a_stop_that_cannot_reach_its_robot_says_so() {
     page.call("Network.enable", &json!({}));
     page.call("Network.setBlockedURLs", &json!({ "urls": ["*.js"] }));
     page.call("Page.reload", &json!({}));
-    page.wait_until("document.readyState !== 'loading' && document.querySelector('#stop') !== null");
+    page.wait_until(
+        "document.readyState !== 'loading' && document.querySelector('#stop') !== null",
+    );
     page.click("#stop");
     page.wait_for(".stop-answer [role=alert]", "NOT SENT: r1 is not heard");
     drop(page);

@@ -264,7 +264,10 @@ fn the_warehouse_is_asked_for_where_the_extension_is_spoken_and_nobody_drives() 
     robot.connect();
     // What happened before is all that it tells.
     let said = robot.hears(&["lager 1 station"]);
-    assert!(said.iter().all(|line| line.starts_with("past ")), "{said:?}");
+    assert!(
+        said.iter().all(|line| line.starts_with("past ")),
+        "{said:?}"
+    );
 }
 
 #[test]

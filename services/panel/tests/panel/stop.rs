@@ -53,7 +53,11 @@ fn what_the_robot_does_not_confirm_is_not_said_to_stand() {
     writeln!(robot, "lager 1 r1").unwrap();
     let mut page = panel.own_page();
     page.line("about r1 connected=1 speaks=1").unwrap();
-    assert!(panel.stop("robot=r1", &origin).ends_with("r1 unconfirmed\n"));
+    assert!(
+        panel
+            .stop("robot=r1", &origin)
+            .ends_with("r1 unconfirmed\n")
+    );
     drop(robot);
     page.line("about r1 connected=0").unwrap();
     assert!(panel.stop("robot=r1", &origin).ends_with("r1 unheard\n"));
@@ -94,5 +98,8 @@ fn the_form_of_somebody_else_stops_nothing_and_a_viewers_does() {
     }
     assert_eq!(stops(), 2);
     // A page that is asked by another method is none.
-    assert_eq!(status(&panel.ask("/stop", &[("Host", &panel.host()), cookie])), 405);
+    assert_eq!(
+        status(&panel.ask("/stop", &[("Host", &panel.host()), cookie])),
+        405
+    );
 }

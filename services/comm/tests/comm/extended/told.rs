@@ -315,17 +315,20 @@ fn what_happens_to_the_robot_is_told_and_told_again_to_a_station_that_comes_late
     let now = robot.now;
     robot.conversation.lives(now, Role::Logic, 1);
     robot.conversation.lives(now, Role::Logic, 1);
-    assert_eq!(happened(&robot.done()), [""; 0], "it has not been seen before");
-    robot.conversation.lives(now, Role::Logic, 2);
     assert_eq!(
         happened(&robot.done()),
-        ["event restarted 0 0 - - logic"]
+        [""; 0],
+        "it has not been seen before"
     );
+    robot.conversation.lives(now, Role::Logic, 2);
+    assert_eq!(happened(&robot.done()), ["event restarted 0 0 - - logic"]);
     robot.disconnect();
     robot.leap(2_000);
     robot.connect();
     let said = happened(&robot.hears(&["lager 1 station"]));
-    let words = said.iter().map(|line| line.splitn(3, ' ').collect::<Vec<_>>());
+    let words = said
+        .iter()
+        .map(|line| line.splitn(3, ' ').collect::<Vec<_>>());
     let words: Vec<_> = words.collect();
     let events: Vec<_> = words.iter().map(|words| words[2]).collect();
     assert_eq!(
@@ -340,7 +343,10 @@ fn what_happens_to_the_robot_is_told_and_told_again_to_a_station_that_comes_late
         ]
     );
     assert!(words.iter().all(|words| words[0] == "past"));
-    let ages: Vec<u64> = words.iter().map(|words| words[1].parse().unwrap()).collect();
+    let ages: Vec<u64> = words
+        .iter()
+        .map(|words| words[1].parse().unwrap())
+        .collect();
     assert!(ages[..5].iter().all(|age| *age >= 2_000), "{ages:?}");
     assert!(ages.is_sorted_by(|before, after| before >= after));
 }
