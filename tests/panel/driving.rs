@@ -210,8 +210,15 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
 ) {
     scene.arm(page);
     // A nudge is no drive.
+    page.wait_until("document.querySelector('#map .unsure').r.baseVal.value > 0");
     scene.hold(page, "ArrowLeft");
     page.wait_for("#map-text", "not known where");
+    // It stays where it was seen last, in a circle that grows with what it is driven.
+    page.wait_for("#map text.lost", "place unknown");
+    page.wait_until("!document.querySelector('#map .robot').hasAttribute('hidden')");
+    let radius = "document.querySelector('#map .unsure').r.baseVal.value";
+    let before = page.value(radius).as_f64().expect("a radius");
+    page.wait_until(&format!("{radius} > {before} + 20"));
     page.key_up("ArrowLeft");
     scene.wait_to_stand();
     page.click("#autonomous");
@@ -239,6 +246,10 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
         page.wait_until("document.querySelector('#resume').hidden");
     }
 
+    // What is wrong is said in the reader's language, beside it.
+    page.fill("#where [name=x]", "99");
+    page.click("#where [type=submit]");
+    page.wait_for("#where-said", "column: a number from 0 to 2");
     // A simulated robot is put where it is said to be.
     page.value(
         "(() => { const { x, y, looks } = document.querySelector('#where-form').elements; \
@@ -253,6 +264,194 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
         let truth = scene.truth.latest().expect("readable")?;
         ((truth.x_mm - 500.0).abs() < 400.0 && (truth.y_mm - 500.0).abs() < 400.0).then_some(())
     });
+
+    // A field that is not used does not block, whatever stands in it.
+    scene.by_hand(page);
+    page.click("#where-ask");
+    page.fill("#where [name=x]", "99");
+    page.value("document.querySelector('#where-form').elements.at.value = 'delivery'");
+    page.click("#where [type=submit]");
+    page.wait_until("!document.querySelector('#where').open");
+}
+
+pub(crate) fn by_hand_needs_the_wheel_and_asks_during_a_mission(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    // It drives by itself again, and fetches something.
+    page.wait_until("document.querySelector('#map-text').textContent.includes('It goes to')");
+    page.listen_in();
+    page.click("#tab-drive");
+    page.click("#manual");
+    page.wait_for("#drive-said", "take the wheel first");
+    page.click("#control");
+    page.wait_for("#control", "You drive");
+    page.click("#manual");
+    page.wait_for("#hand-said", "The robot is fetching");
+    page.click("#hand-leave");
+    page.wait_until("document.querySelector('#hand').hidden");
+    std::thread::sleep(std::time::Duration::from_secs(6));
+    let said = "sent.filter((line) => line.includes(' mode manual')).length";
+    assert_eq!(page.value(said), 0, "it is left to the robot");
+    page.click("#manual");
+    page.click("#hand-now");
+    page.wait_for("#mode", "BY HAND");
+    assert_eq!(page.value(said), 1);
+    scene.wait_to_stand();
+}
+
+/// What is held, newest last, by the keys that were pressed.
+pub(crate) fn of_two_keys_the_newer_counts_and_then_the_older_again(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
+    page.listen_in();
+    let key = |page: &mut Page, kind: &str, key: &str| {
+        page.value(&format!(
+            "dispatchEvent(new KeyboardEvent('{kind}', {{ key: '{key}' }}))"
+        ));
+    };
+    let said = |page: &mut Page| page.moves().pop().unwrap_or_default();
+    // A command that was held up is refused, which ends all that is held: a person begins anew.
+    wait_for("both keys to be heard", || {
+        page.moves();
+        let mut heard = Vec::new();
+        for (kind, name) in [
+            ("keydown", "ArrowUp"),
+            ("keydown", "ArrowLeft"),
+            ("keyup", "ArrowLeft"),
+            ("keydown", "ArrowRight"),
+            ("keyup", "ArrowUp"),
+            ("keyup", "ArrowRight"),
+        ] {
+            key(page, kind, name);
+            heard.push(said(page));
+        }
+        let right = [
+            "drive 2 200",
+            "drive 6 200",
+            "drive 2 200",
+            "drive 7 200",
+            "",
+            "drive 1 200",
+        ];
+        // While a key is held its command may be given again at any moment.
+        let is_same = |(heard, right): (&String, &str)| {
+            heard == right || (right.is_empty() && heard == "drive 7 200")
+        };
+        let all = heard.iter().zip(right).all(is_same);
+        assert!(all || !page.text("#drive-said").is_empty(), "{heard:?}");
+        all.then_some(())
+    });
+    scene.wait_to_stand();
+}
+
+/// A gamepad's entries, as the browser has them: identity, place, and how far the stick is bent.
+const PADS: &str = "window.pads = []; navigator.getGamepads = () => pads; \
+    window.entry = (id, index, y) => ({ id, index, connected: true, mapping: 'standard', \
+      timestamp: performance.now(), axes: [0, y], buttons: [] })";
+
+pub(crate) fn a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centred(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
+    page.listen_in();
+    page.value(PADS);
+    let rest = || std::thread::sleep(std::time::Duration::from_millis(800));
+    // One that appears with its stick at its end.
+    page.value("pads = [entry('a', 0, -1)]");
+    rest();
+    assert_eq!(page.moves(), [""; 0], "it was never centred");
+    let hold = |page: &mut Page| {
+        wait_for("a hold", || {
+            page.value("pads = [entry('a', 0, 0)]");
+            std::thread::sleep(std::time::Duration::from_millis(800));
+            page.moves();
+            page.value("pads[0].axes[1] = -1; pads[0].timestamp = performance.now()");
+            std::thread::sleep(std::time::Duration::from_millis(300));
+            page.moves()
+                .contains(&"drive 2 200".to_owned())
+                .then_some(())
+        });
+    };
+    let ends: [(&str, &str); 4] = [
+        ("it is gone", "pads = []"),
+        ("it is not connected", "pads[0].connected = false"),
+        (
+            "it has come back beside itself",
+            "pads[1] = entry('a', 1, 0)",
+        ),
+        (
+            "it is frozen while another one tells",
+            "pads[1] = entry('b', 1, 0); pads[1].timestamp += 1000",
+        ),
+    ];
+    for (why, end) in ends {
+        hold(page);
+        page.value(end);
+        // What was given until the next picture has its end.
+        page.pause();
+        let said = page.moves();
+        let is_over = said.last().is_none_or(|last| last == "drive 1 200");
+        assert!(is_over, "{why}: {said:?}");
+        rest();
+        assert_eq!(page.moves(), [""; 0], "{why}");
+    }
+    page.value("pads = []");
+}
+
+pub(crate) fn a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it(
+    scene: &mut Scene,
+    page: &mut Page,
+) {
+    scene.arm(page);
+    scene.domain.done(&["stop"]);
+    page.wait_until("!document.querySelector('#halt').hidden");
+    wait_for("a refusal", || {
+        press(page, &["ArrowLeft"]);
+        page.pause();
+        page.value("dispatchEvent(new KeyboardEvent('keyup', { key: 'ArrowLeft' }))");
+        page.text("#drive-said")
+            .contains("the robot is stopped")
+            .then_some(())
+    });
+    assert!(
+        !page.text("#drive-said").contains("lager"),
+        "no command of a terminal"
+    );
+    page.wait_until("!document.querySelector('#drive-resume').hidden");
+    let at = page.middle("#drive-resume");
+    page.mouse("mousePressed", at);
+    page.wait_until("document.querySelector('#halt').hidden");
+    page.mouse("mouseReleased", at);
+    page.wait_until("document.querySelector('#drive-resume').hidden");
+}
+
+pub(crate) fn in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants(
+    _scene: &mut Scene,
+    page: &mut Page,
+) {
+    page.dress("light", 390, 844, true);
+    page.click("#tab-drive");
+    page.value("scrollTo(0, 0)");
+    page.pause();
+    let inside = "['#stop', '#map', '#pad'].map((part) => { \
+        const box = document.querySelector(part).getBoundingClientRect(); \
+        return box.top >= 0 && box.bottom <= innerHeight && box.height > 50; })";
+    assert_eq!(page.value(inside), json!([true, true, true]));
+    for tab in ["missions", "drive", "setup", "line", "log"] {
+        page.click(&format!("#tab-{tab}"));
+        page.pause();
+        let small = page.value(
+            "[...document.querySelectorAll('button, select, input, label.button')].filter((part) => { \
+               const box = (part.closest('label') ?? part).getBoundingClientRect(); \
+               return box.width > 1 && (box.height < 44 || box.width < 44); \
+             }).map((part) => part.id || part.name || part.textContent)",
+        );
+        assert_eq!(small, json!([]), "{tab}");
+    }
 }
 
 pub(crate) fn whoever_lets_go_whatever_way_the_robot_stands(scene: &mut Scene, page: &mut Page) {

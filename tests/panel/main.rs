@@ -11,6 +11,7 @@ mod reasons;
 mod releases;
 mod scene;
 mod setting_up;
+mod stopping;
 mod watched;
 
 use lager_tests::wait_for;
@@ -71,6 +72,11 @@ fn while_it_drives_by_itself() {
         manners::a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button,
         manners::somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_none,
         manners::the_display_on_the_robot_stops_it,
+        stopping::stop_works_before_any_script_and_without_a_socket,
+        stopping::a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_not_shown,
+        stopping::one_press_on_fetch_is_one_order,
+        driving::by_hand_needs_the_wheel_and_asks_during_a_mission,
+        stopping::what_happens_to_the_robot_is_in_the_log_and_survives_the_station,
         manners::stop_is_apart_from_all_else_and_nothing_scrolls_on_a_laptop,
         manners::the_words_are_swedish_for_who_reads_swedish,
         setting_up::goods_and_obstacles_are_put_by_a_click_and_taken_back,
@@ -87,6 +93,10 @@ fn while_it_is_driven_by_hand() {
         driving::what_runs_once_is_not_cut_short_but_by_the_command_to_stand,
         driving::each_key_says_what_the_document_says_once_and_nothing_in_text_fields,
         driving::what_is_old_is_grey_with_its_time_and_drives_nothing,
+        driving::of_two_keys_the_newer_counts_and_then_the_older_again,
+        driving::a_gamepad_drives_only_while_its_entry_lives_and_once_it_was_centred,
+        driving::a_stop_that_refuses_a_key_is_ended_by_the_button_beside_it,
+        driving::in_the_hand_map_and_pad_are_seen_together_and_a_finger_hits_what_it_wants,
         driving::after_driving_by_hand_the_page_asks_where_the_robot_stands_and_stops_meanwhile,
     ]);
 }
@@ -167,6 +177,11 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
          list.dispatchEvent(new Event('change')); })()",
     );
     page.wait_for("#link", " ms");
+    // The address keeps which one is shown, and STOP says whom it stops.
+    page.call("Page.reload", &serde_json::json!({}));
+    page.wait_for("#link", " ms");
+    page.wait_until("document.querySelector('#stop-whom').textContent === 'r2'");
+    assert_eq!(page.value("document.querySelector('#robot').value"), "r2");
     page.click("#stop");
     page.wait_for("#stop-said", "both wheels stand");
     let stopped = |name: &str| {
@@ -184,6 +199,13 @@ fn two_robots_are_shown_one_at_a_time_and_each_is_stopped_by_itself() {
     };
     assert_eq!((stopped("r1"), stopped("r2")), (0, 1));
     scene.domain.done(&["--name", "r2", "resume"]);
+    // One press for all of them.
+    page.click("#stop-all");
+    page.wait_for("#stop-said", "r1 stands after");
+    page.wait_for("#stop-said", "r2 stands after");
+    assert_eq!((stopped("r1"), stopped("r2")), (1, 1));
+    scene.domain.done(&["--name", "r2", "resume"]);
+    scene.resume();
     drop((page, second));
     scene.end();
 }

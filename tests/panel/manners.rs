@@ -9,6 +9,15 @@ use serde_json::{Value, json};
 use crate::Scene;
 use crate::browser::{Browser, Page};
 
+/// Whether headline, chip, banner and the robot's colour and shape say that it is stopped.
+const LOOKS_STOPPED: &str = "(() => { const at = (part) => document.querySelector(part); \
+    const red = getComputedStyle(at('#stop')).backgroundColor; \
+    const style = (part) => getComputedStyle(at(part)); \
+    return at('#doing').textContent.startsWith('STOPPED') && at('#mode').textContent === 'STOPPED' && \
+      at('#halt-said').textContent.startsWith('STOPPED') && !at('#halt').hidden && \
+      at('#halt').getBoundingClientRect().width === innerWidth && \
+      style('#map .robot path').fill === red && style('#map .robot .bars').visibility === 'visible'; })()";
+
 const TABS: [&str; 5] = ["missions", "drive", "setup", "line", "log"];
 
 /// Where STOP is nearer than 16 px to what can be pressed, to the screen's edge or to what it is
@@ -90,7 +99,7 @@ pub(crate) fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_
     scene.domain.done(&["stop"]);
     // An alert: a screen reader says it at once.
     page.wait_for("#stop-said[role=alert]", "STOPPED: it was ordered");
-    page.wait_for("#resume", "it was ordered");
+    page.wait_for("#halt-said", "it was ordered");
     let blinks = "getComputedStyle(document.querySelector('#resume')).animationName";
     assert_eq!(page.value(blinks), "none");
     media(page, "no-preference");
@@ -118,7 +127,7 @@ pub(crate) fn somebody_else_s_stop_is_told_and_motion_is_left_out_for_who_wants_
 pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, page: &mut Page) {
     page.click("#tab-setup");
     page.click("#language");
-    assert_eq!(page.text("#stop"), "STOPP");
+    assert_eq!(page.text("#stop-word"), "STOPP");
     // What was there before is told anew.
     let shown = "['#products option', '#map .robot title', '#map .ghost title'].map((part) => \
                  document.querySelector(part).textContent).join()";
@@ -164,9 +173,11 @@ pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
     page.key_up("Escape");
     page.wait_for("#stop-said", "both wheels stand");
     scene.assert_stands();
-    // A click is too short for it.
+    // The whole page says it: headline, chip, banner and the robot on the map.
+    page.wait_until(LOOKS_STOPPED);
+    // A click is too short for it, which is told.
     page.click("#resume");
-    page.pause();
+    page.wait_for("#resume-said", "hold it for a second");
     scene.assert_stands();
     let at = page.middle("#resume");
     page.mouse("mousePressed", at);
@@ -178,7 +189,7 @@ pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
     page.key_down("Escape");
     page.key_up("Escape");
     page.wait_until(
-        "!document.querySelector('#resume').hidden && !document.querySelector('#resume').disabled",
+        "!document.querySelector('#resume').hidden && document.querySelector('#resume').ariaDisabled === 'false'",
     );
     let at = page.middle("#resume");
     page.mouse("mousePressed", at);
@@ -280,11 +291,16 @@ fn the_tokens_that_a_station_prints_let_a_driver_drive_and_a_viewer_look_and_sto
     looks.wait_for("#drive-said", "this page may look and stop");
     looks.click("#stop");
     looks.wait_for("#stop-said", "both wheels stand");
-    looks.wait_until("document.querySelector('#resume').disabled");
+    looks.wait_until("document.querySelector('#resume').ariaDisabled === 'true'");
+    // Whoever holds it is told why nothing comes of it.
+    let at = looks.middle("#resume");
+    looks.mouse("mousePressed", at);
+    looks.wait_for("#resume-said", "you may look and stop");
+    looks.mouse("mouseReleased", at);
 
     // The cookie is the browser's, so whoever opens the driver's address drives from then on.
     let mut drives = open(&driver);
-    drives.wait_until("!document.querySelector('#resume').disabled");
+    drives.wait_until("document.querySelector('#resume').ariaDisabled === 'false'");
     let at = drives.middle("#resume");
     drives.mouse("mousePressed", at);
     drives.wait_until("document.querySelector('#resume').hidden");

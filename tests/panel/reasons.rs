@@ -28,8 +28,9 @@ const SOURCES: [&str; 9] = [
     include_str!("../../services/panel/src/visit.rs"),
 ];
 /// First words of lines between panel and page, which are no sentences.
-const LINES: [&str; 11] = [
+const LINES: [&str; 12] = [
     "you",
+    "asked",
     "answer",
     "refused",
     "stopped",
@@ -176,11 +177,14 @@ fn every_reason_that_is_told_is_told_in_swedish() {
     assert!(reasons.len() > before + 30, "{:#?}", &reasons[before..]);
     let stage = Stage::new(None, false);
     let mut page = stage.page(&stage.url);
-    assert_eq!(
-        told(&mut page, &reasons),
-        json!(reasons),
-        "in English it is as it was said"
-    );
+    let english = told(&mut page, &reasons);
+    for (told, said) in english.as_array().expect("a list").iter().zip(&reasons) {
+        // But a page has buttons, where a terminal has commands.
+        match said.contains("`lager ") {
+            false => assert_eq!(told, said, "in English it is as it was said"),
+            true => assert!(!told.as_str().expect("a text").contains("`lager resume`")),
+        }
+    }
     page.click("#language");
     let swedish = told(&mut page, &reasons);
     // Words that only English has.
@@ -198,7 +202,7 @@ fn every_reason_that_is_told_is_told_in_swedish() {
     let stopped = format!("forward is not possible now: {}", Refusal::StopLatched);
     assert_eq!(
         told(&mut page, &[stopped]),
-        json!(["framåt går inte nu: roboten är stoppad; `lager resume` häver stoppet"])
+        json!(["framåt går inte nu: roboten är stoppad"])
     );
     drop(page);
     stage.end();

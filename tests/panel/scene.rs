@@ -101,9 +101,20 @@ impl Scene {
         page.click("#tab-drive");
         page.click("#control");
         page.wait_for("#control", "You drive");
-        page.click("#manual");
-        page.wait_for("#mode", "BY HAND");
+        self.by_hand(page);
         self.wait_to_stand();
+    }
+
+    /// Turns it over to the hand of a page that has the wheel.
+    pub(crate) fn by_hand(&self, page: &mut Page) {
+        page.click("#manual");
+        // One that is on its way is asked about first.
+        wait_for("the mode to be the hand's", || {
+            if page.value("document.querySelector('#hand').hidden") == false {
+                page.click("#hand-now");
+            }
+            page.text("#mode").contains("BY HAND").then_some(())
+        });
     }
 
     /// Takes the wheel, and lets keys and buttons drive.
@@ -140,15 +151,21 @@ impl Scene {
             // The browser makes the file before it fills it.
             text.ends_with('\n').then_some(text)
         });
-        assert!(table.starts_with("time,x,y,line_error,"), "{table}");
+        // What has a unit says which.
+        let units = "time,x_mm,y_mm,line_error_half_sensors,left_duty_of_255,right_duty_of_255,";
+        assert!(table.starts_with(units), "{table}");
+        // No page knows more than it has seen, and it says how much that is.
+        page.wait_until("/^Save CSV \\d/.test(document.querySelector('#save-csv').textContent)");
         let (head, lines) = table.split_once('\n').expect("lines");
         for key in [
             "heading_deg",
             "mode",
             "next",
             "line_bits",
-            "servos",
-            "loads",
+            "servos_of_1023",
+            "loads_of_1023",
+            "battery_V",
+            "path_p99_us",
         ] {
             assert!(head.split(',').any(|name| name == key), "{key}: {head}");
         }

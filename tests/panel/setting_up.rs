@@ -436,6 +436,50 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
     page.click("#tab-missions");
     page.click_at_mm(750.0, 1_000.0);
     page.wait_for("#map-said", "obstacle put");
+    // It is drawn at once, in another way than what the robot finds blocked.
+    let placed = "document.querySelectorAll('#map .placed').length";
+    page.wait_until(&format!("{placed} === 1"));
+    page.wait_for("#map-text", "Obstacles stand at:");
     page.click("#map-undo");
     page.wait_for("#map-said", "obstacle taken away");
+    page.wait_until(&format!("{placed} === 0"));
+
+    // No warehouse is saved that no robot drives in.
+    page.click("#tab-setup");
+    for (field, value, why) in [
+        ("width", "255", "Squares × : a number from 1 to 99"),
+        ("side", "1", "Side cm: a number from 40 to 65535"),
+    ] {
+        page.fill(&format!("#warehouse [name={field}]"), value);
+        page.click("#warehouse [type=submit]");
+        page.wait_for("#setup-said", why.split(':').nth(1).expect("a range"));
+    }
+    page.fill("#map-string", "100,2,0,2");
+    page.wait_for(
+        "#setup-said",
+        "the robot knows up to 99 squares along a side; here are 100",
+    );
+    page.value("document.querySelector('#setup-said').textContent = ''");
+}
+
+/// The page's limits are the robot's.
+#[test]
+fn what_the_page_lets_set_up_is_what_a_robot_drives_in() {
+    let script = include_str!("../../services/panel/page/setup.js");
+    let form = include_str!("../../services/panel/page/index.html");
+    let (crossings, side) = (lager_logic::map::MAX_SIDE, lager_logic::map::MIN_SIDE_CM);
+    for line in [
+        format!("const MOST_CROSSINGS = {crossings};"),
+        format!("const LEAST_SIDE_CM = {side};"),
+        format!("const MOST_GOODS = {};", lager_logic::map::MAX_STATIONS),
+    ] {
+        assert!(script.contains(&line), "{line}");
+    }
+    assert_eq!(
+        form.matches(&format!("max=\"{}\"", crossings - 1)).count(),
+        2
+    );
+    assert!(form.contains(&format!(
+        "name=\"side\" placeholder=\"40\" type=\"number\" min=\"{side}\""
+    )));
 }

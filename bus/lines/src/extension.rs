@@ -85,8 +85,11 @@
 //! blocked <int> {<edge> <int>}         ways that are not taken, likewise, and since when, in s of
 //!                                      the robot's clock
 //! queue <int> {<order> <prodid>}       what is fetched next, likewise
+//! obstacles <int> {<edge>}             what stands on ways of a simulated world, likewise
 //! event <event> <coord> <order> <prodid> [<text>]
 //!                                      at that node; `-` where there is no order or product
+//! past <int> <report>                  an `event` or `thinks` of so many ms ago, when a station
+//!                                      has announced itself: it may have missed it
 //! latency <int> {<int> <int>}          how long sensor frames took to logic's decision: the longest
 //!                                      in microseconds, and for each bucket that is not empty its
 //!                                      number from 0 to 89 and how many frames it holds; see below
@@ -100,7 +103,8 @@
 //! thought <text>                       as in the document
 //!
 //! <event> ::= in_position | getting_item | item_delivered | next_node | refused
-//!           | pickup_refused | failed | way_blocked
+//!           | pickup_refused | failed | way_blocked | stopped | resumed | mode | restarted
+//!           | link_lost | link_back
 //! ```
 //!
 //! Bucket 0 of `latency` holds times up to 256 ns, and bucket i from 1 to 88 times up to
@@ -108,8 +112,8 @@
 //! is divided into four equal parts. Bucket 89 holds what took longer than 2^30 ns. A bucket
 //! counts the frames since the robot made such a line before, at most 999999.
 //!
-//! Here a list may be empty, and `route`, `blocked`, `queue` and `sensors` are sent when they have
-//! changed. A line that cannot be read changes nothing; if it has a number the robot answers
+//! Here a list may be empty, and `route`, `blocked`, `queue`, `obstacles` and `sensors` are sent when
+//! they have changed. A line that cannot be read changes nothing; if it has a number the robot answers
 //! `refused`.
 //!
 //! ```

@@ -52,13 +52,14 @@
 
 use core::ops::Range;
 use core::time::Duration;
+use std::collections::HashMap;
 
 use lager_lines::conversation::{Held, RobotLine, StationLine, StationLineError};
-use lager_lines::extension::{self, Hello};
+use lager_lines::extension::{self, EventKind, Hello};
 use lager_lines::gag::{Answer, Query, Request};
 use lager_lines::splitter::LineError;
 use lager_lines::{LATEST, LATEST_MOVE, Name, ProductId, TooLate};
-use lager_topics::{Mode, Order, Phase, WarehouseMap};
+use lager_topics::{Mode, Order, Phase, Role, WarehouseMap};
 use lager_wire::OperatorCommand;
 
 use crate::action::Action;
@@ -67,6 +68,7 @@ use crate::ids::Ids;
 use crate::known::Known;
 use crate::lost::{LinkLost, Standing};
 use crate::map::Described;
+use crate::memory::Memory;
 use crate::moment::Moment;
 use crate::speech::Told;
 use crate::tasks::{Asker, Tasks};
@@ -138,6 +140,10 @@ pub struct Conversation {
     known: Known,
     /// What is told besides where the extension is spoken.
     telling: Telling,
+    /// What has happened lately.
+    memory: Memory,
+    /// The services of the robot, and since when each lives, as their samples' stamps have it.
+    lives: HashMap<Role, u64>,
     tasks: Tasks,
     driving: Driving,
     /// Stops that are to be confirmed, and when they came.
@@ -176,6 +182,8 @@ impl Conversation {
                 ..Known::default()
             },
             telling: Telling::default(),
+            memory: Memory::default(),
+            lives: HashMap::new(),
             tasks: Tasks::default(),
             driving: Driving::default(),
             stops: Vec::new(),
@@ -201,6 +209,9 @@ impl Conversation {
 
     /// A connection is there.
     pub fn connected(&mut self, now: Moment) {
+        if self.up_ns != 0 {
+            self.happened(now, EventKind::LinkBack, "");
+        }
         self.is_up = true;
         self.is_extended = false;
         self.is_fresh = true;
@@ -220,7 +231,9 @@ impl Conversation {
 
     /// The connection has ended.
     pub fn disconnected(&mut self, now: Moment) {
-        self.is_up = false;
+        if core::mem::take(&mut self.is_up) {
+            self.happened(now, EventKind::LinkLost, "");
+        }
         self.held.clear();
         self.stops.clear();
         self.tasks.forget_actions();
@@ -297,6 +310,9 @@ impl Conversation {
                     self.is_extended = true;
                     self.telling.begin();
                     self.sign(now, Some(now.clock_ms()));
+                    for report in self.memory.told(now.ns).collect::<Vec<_>>() {
+                        self.say(RobotLine::Report(report));
+                    }
                 }
             }
             StationLine::Order(extension::Order::Stop { .. }) => {}

@@ -21,6 +21,7 @@ mod known;
 mod link;
 mod lost;
 mod map;
+mod memory;
 mod moment;
 mod pose;
 mod shell;

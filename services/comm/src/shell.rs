@@ -141,7 +141,7 @@ impl Shell {
         let kept = kept.map(|(map, _)| map);
         watchdog.enter("opening the bells");
         let waiter = bus.waiter(Policy::Block)?;
-        let shell = Self {
+        let mut shell = Self {
             clock: bus.clock(),
             link: Link::new(config.station.clone(), waiter.ringer()?).map_err(|error| {
                 PortError::Thread {
@@ -175,6 +175,10 @@ impl Shell {
         };
         if let Some(map) = kept {
             shell.publish_map(&map);
+        }
+        if config.resume {
+            let now = shell.now();
+            shell.conversation.lives_again(now);
         }
         Ok(shell)
     }
@@ -213,6 +217,8 @@ impl Shell {
 
     fn take_samples(&mut self, now: Moment) {
         if let Some(health) = self.next(|shell| shell.health.latest()) {
+            let since = health.stamp().epoch;
+            self.conversation.lives(now, Role::Bridge, since);
             self.conversation.health(now, &health);
         }
         if let Some(queue) = self.next(|shell| shell.queue.latest()) {
@@ -220,6 +226,8 @@ impl Shell {
         }
         if let Some(status) = self.next(|shell| shell.status.latest()) {
             let published_ns = status.stamp().publish_time_ns;
+            let since = status.stamp().epoch;
+            self.conversation.lives(now, Role::Logic, since);
             self.conversation.status(now, &status, published_ns);
         }
         // Before the events, some of which name the next node.
@@ -245,6 +253,12 @@ impl Shell {
     /// Takes what only a station hears that speaks the extension; the last sample of each is
     /// enough.
     fn take_senses(&mut self) {
+        let truth = self.next(|shell| shell.truth.latest());
+        if let Some(truth) = &truth {
+            let since = truth.stamp().epoch;
+            let now = self.now();
+            self.conversation.lives(now, Role::Simulator, since);
+        }
         let senses = Senses {
             line: self.next(|shell| shell.line.latest()).map(|line| *line),
             distance: self
@@ -253,7 +267,7 @@ impl Shell {
             blocks: (self.next(|shell| shell.blocks.latest())).map(|blocks| Box::new(*blocks)),
             latency: (self.next(|shell| shell.latency.latest()))
                 .map(|latency| Box::new(latency.total)),
-            truth: (self.next(|shell| shell.truth.latest())).map(|truth| Box::new(*truth)),
+            truth: truth.map(|truth| Box::new(*truth)),
         };
         self.conversation.senses(senses);
     }

@@ -33,6 +33,7 @@ pub(crate) struct Telling {
     route: Option<Report>,
     blocked: Option<Report>,
     queue: Option<Report>,
+    obstacles: Option<Report>,
     sensors: Option<Report>,
     /// What was counted when the latency was told last.
     latency: Durations,
@@ -63,7 +64,8 @@ impl Telling {
             blocks,
             ..
         } = &mut known.senses;
-        reports.extend(truth.take().map(|truth| self::truth(&truth)));
+        let truth = truth.take();
+        reports.extend(truth.as_deref().map(self::truth));
         if let Some(latency) = latency.take() {
             reports.push(self::latency(&latency.since(&self.latency)));
             self.latency = *latency;
@@ -72,6 +74,7 @@ impl Telling {
             (&mut self.route, known.route.as_deref().map(route)),
             (&mut self.blocked, blocks.as_deref().map(blocked)),
             (&mut self.queue, known.queue.as_ref().map(queue)),
+            (&mut self.obstacles, truth.as_deref().map(obstacles)),
             (&mut self.sensors, known.health.as_ref().and_then(sensors)),
         ];
         for (told, list) in lists {
@@ -85,7 +88,7 @@ impl Telling {
 }
 
 /// Kinds of reports of which a newer one replaces an older one.
-pub(crate) const KINDS: usize = 7;
+pub(crate) const KINDS: usize = 8;
 
 /// Which of the kinds a report is, the first to be told first; `None` where each counts.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
@@ -97,10 +100,12 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Queue(_) => Some(4),
         Report::Latency(_) => Some(5),
         Report::Sensors(_) => Some(6),
+        Report::Obstacles(_) => Some(7),
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }
         | Report::Event(_)
+        | Report::Past { .. }
         | Report::Thinks(_) => None,
     }
 }
@@ -139,6 +144,28 @@ pub(crate) fn event(event: &lager_topics::Event, known: &Known) -> Option<Report
         product: ProductId::new(event.product).filter(|_| has_order),
         text: Text::new(text).unwrap_or_default(),
     }))
+}
+
+/// That something has happened to the robot itself, wherever it is; `text` is the event's.
+pub(crate) fn happened(kind: EventKind, text: &str, known: &Known) -> Report {
+    let passed = known.status.and_then(|status| {
+        let (x, y) = (status.x.try_into().ok()?, status.y.try_into().ok()?);
+        Some(Coord { x, y })
+    });
+    Report::Event(Event {
+        kind,
+        node: passed.unwrap_or(Coord { x: 0, y: 0 }),
+        order: None,
+        product: None,
+        text: Text::new(text.to_owned()).unwrap_or_default(),
+    })
+}
+
+/// What of a stop is told as it begins: its cause and who has set it.
+pub(crate) fn stop_words(health: &Health) -> String {
+    let words = [word(health.stop_cause), word(health.stop_origin)];
+    let words = words.map(|word| word.map_or_else(|| "-".to_owned(), |word| word.to_string()));
+    words.join(" ")
 }
 
 /// A thought in values. Those that its kind does not fill mean nothing.
@@ -279,7 +306,7 @@ const fn pick(pick: BusPick) -> Pick {
     }
 }
 
-const fn mode(mode: BusMode) -> Mode {
+pub(crate) const fn mode(mode: BusMode) -> Mode {
     match mode {
         BusMode::Manual => Mode::Manual,
         BusMode::Autonomous => Mode::Autonomous,
@@ -370,6 +397,20 @@ fn latency(counted: &Durations) -> Report {
         max_us: u32::try_from(counted.max_ns.div_ceil(1_000)).unwrap_or(u32::MAX),
         buckets: counted.buckets.map(most),
     }))
+}
+
+/// What stands on ways, whoever has put it there.
+fn obstacles(truth: &Truth) -> Report {
+    let stands = truth.obstacles().iter().filter_map(|stands| {
+        Some(Edge {
+            node: Coord {
+                x: stands.x,
+                y: stands.y,
+            },
+            way: stands.heading.get().map(direction)?,
+        })
+    });
+    Report::Obstacles(Listed::<Edge>::new(&stands.collect::<Vec<_>>()))
 }
 
 fn truth(truth: &Truth) -> Report {

@@ -1,6 +1,7 @@
 // What the page asks a person: where the robot stands after it was driven by hand, and whether
 // somebody else may have the wheel. STOP and its keys work meanwhile: nothing here is in front of them.
 
+import { judge, wrong } from "./fields.js";
 import { reason } from "./reasons.js";
 import { put, say } from "./words.js";
 
@@ -12,6 +13,7 @@ export class Where {
   constructor(link, parts, robot) {
     Object.assign(this, { link, parts, robot, then: null });
     const { form, later } = parts;
+    judge(form);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.answer();
@@ -41,6 +43,8 @@ export class Where {
     const robot = this.robot();
     if (!robot) return put(said, say("no_robot"));
     const { at, x, y, looks } = form.elements;
+    const why = at.value === "crossing" ? wrong([x, y]) : null;
+    if (why) return put(said, why);
     const [cornerX, cornerY] = this.link.warehouse.delivery;
     let action = `place ${x.value} ${y.value} ${looks.value}`;
     // A simulated robot is carried there; a real one has been.

@@ -3,10 +3,14 @@
 //   key, finger or stick down --> armed, driver, fresh state? --> "drive code lease" every 50 ms
 //   up, blur, hidden, cancel, menu, lost link, stale state ----> "drive 1" once, then silence
 //
+// Of two that are held the newer one counts, and when it is let go the older one again. Whatever
+// else ends a hold ends both.
+//
 // A command lives 200 ms by its lease, so a page that dies lets the robot stand. Steps of the arm and
 // the eighth turns are given once a press. Nothing cuts one of them short but the command to stand:
 // what is held ends before one, and nothing is held or begun while one is under way.
 
+import { Pads } from "./pads.js";
 import { reason } from "./reasons.js";
 import { isText } from "./stop.js";
 import { say } from "./words.js";
@@ -49,9 +53,6 @@ const STEPS = [
   ["FA", "release", [".", "\u00f7"]],
 ];
 
-/** So long after the box was ticked a gamepad is only looked at. */
-const PAD_MS = 500;
-
 /** Keys whose names are long, as they are printed on keyboards. */
 const SIGNS = { ArrowUp: "\u2191", ArrowDown: "\u2193", ArrowLeft: "\u2190", ArrowRight: "\u2192", PageUp: "PgUp", PageDown: "PgDn" };
 
@@ -61,15 +62,17 @@ export class Driving {
     this.parts = parts;
     this.robot = robot;
     this.now = now;
+    /** What is held: code, the key, pointer or stick that holds it, its button, and the robot. */
     this.held = null;
+    /** What was held before that and still is, the newest last. */
+    this.older = [];
     this.timer = null;
     /** The robot that a step or a turn is under way on. */
     this.step = null;
+    this.gamepads = new Pads(now);
     this.buttons();
     this.keys();
     this.releases();
-    /** When the box was ticked. */
-    this.armedAt = -Infinity;
   }
 
   /** Whether something is held now. */
@@ -79,6 +82,13 @@ export class Driving {
 
   tell(key, ...values) {
     this.parts.said.textContent = key ? say(key, ...values) : "";
+    this.isOfStop = false;
+  }
+
+  /** Tells why the robot has refused; a stop is ended by the button beside it. */
+  refuse(refused) {
+    this.tell("refused", reason(refused));
+    this.isOfStop = this.robot()?.state.stopped === "1";
   }
 
   /** Why nothing may be driven now, as a word; null if it may. */
@@ -95,18 +105,22 @@ export class Driving {
   draw() {
     const isOff = this.objection() !== null;
     for (const part of [this.parts.pad, this.parts.arm]) part.classList.toggle("off", isOff);
+    if (this.robot()?.state.stopped !== "1") this.isOfStop = false;
+    this.parts.resume.hidden = !this.isOfStop;
   }
 
   /** `source` is the key, pointer or stick that holds it; a button's hold ends with its focus, too. */
   hold(code, source, button = null) {
-    if (this.held) return;
+    if (this.held?.source === source || this.older.some((other) => other.source === source)) return;
     const why = this.objection();
     if (why) return this.tell(...why);
-    if (this.step === this.robot()) return this.tell("wait");
+    const robot = this.robot();
+    if (this.step === robot) return this.tell("wait");
     this.tell(null);
-    this.held = { code, source, button, robot: this.robot() };
+    if (this.held) this.older.push(this.held);
+    else this.timer = setInterval(() => this.renew(), RENEW_MS);
+    this.held = { code, source, button, robot };
     button?.classList.add("down");
-    this.timer = setInterval(() => this.renew(), RENEW_MS);
     this.renew();
   }
 
@@ -121,19 +135,34 @@ export class Driving {
     // What was let go meanwhile has its own end.
     if (answer.refused && this.held === held) {
       this.letGo();
-      this.tell("refused", reason(answer.refused));
+      this.refuse(answer.refused);
     }
   }
 
-  /** Ends what is held, for whatever reason. */
+  /** Ends what is held, for whatever reason, and what was held before it. */
   letGo(why = null) {
     if (!this.held) return;
     clearInterval(this.timer);
     const { robot } = this.held;
     this.held = null;
+    this.older = [];
     for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
     if (this.link.open) this.link.act(robot, `drive ${STAND} ${LEASE_MS}`);
     if (why) this.tell(why);
+  }
+
+  /** A key, pointer or stick is let go: what was held before it counts again. */
+  release(source) {
+    if (this.held?.source === source) {
+      if (!this.older.length) return this.letGo();
+      this.held.button?.classList.remove("down");
+      this.held = this.older.pop();
+      this.renew();
+      return;
+    }
+    const ended = this.older.find((other) => other.source === source);
+    ended?.button?.classList.remove("down");
+    this.older = this.older.filter((other) => other !== ended);
   }
 
   async once(action) {
@@ -155,7 +184,7 @@ export class Driving {
   }
 
   hear({ refused }) {
-    if (refused) this.tell("refused", reason(refused));
+    if (refused) this.refuse(refused);
   }
 
   buttons() {
@@ -185,11 +214,7 @@ export class Driving {
       if (event.key === "Enter" && !event.repeat) this.hold(code, place(event), button);
     });
     // Wherever the key comes up: the focus may be elsewhere by then.
-    button.addEventListener("blur", () => this.held?.button === button && this.letGo());
-  }
-
-  release(source) {
-    if (this.held?.source === source) this.letGo();
+    button.addEventListener("blur", () => [this.held, ...this.older].some((held) => held?.button === button) && this.letGo());
   }
 
   keys() {
@@ -224,7 +249,7 @@ export class Driving {
     addEventListener("contextmenu", (event) => event.defaultPrevented || this.letGo());
     addEventListener("pointerdown", (event) => ownsKeys(event.target) && this.letGo(), { capture: true });
     this.parts.armed.addEventListener("change", () => {
-      this.armedAt = this.now();
+      this.gamepads.forget();
       this.letGo();
     });
     this.link.addEventListener("link", () => this.link.open || this.letGo());
@@ -234,20 +259,11 @@ export class Driving {
   pads() {
     // A browser that was asked once looks at them all the time, for a hundredth of a core.
     if (!this.parts.armed.checked) return;
-    const pad = navigator.getGamepads?.().find((found) => found?.mapping === "standard");
-    if (!pad) return this.release("pad");
-    const [x, y] = pad.axes;
-    const pressed = (index) => pad.buttons[index]?.pressed;
-    let code = null;
-    if (y < -0.5 || pressed(12)) code = 2;
-    else if (y > 0.5 || pressed(13)) code = 4;
-    else if (x < -0.5 || pressed(14)) code = 6;
-    else if (x > 0.5 || pressed(15)) code = 7;
-    if (this.held?.source === "pad" && this.held.code !== code) this.letGo();
-    // What was held before the box was ticked is to be let go first. The browser tells of it some time later.
-    const isNew = this.padWas !== code && this.now() - this.armedAt > PAD_MS;
-    if (code && !this.held && isNew) this.hold(code, "pad");
-    this.padWas = code;
+    const was = this.padCode;
+    this.padCode = this.gamepads.read();
+    if (was === this.padCode) return;
+    this.release("pad");
+    if (this.padCode) this.hold(this.padCode, "pad");
   }
 }
 

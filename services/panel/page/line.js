@@ -1,6 +1,7 @@
 // The line under the robot: the calibration of its sensors as guided steps, and the gains of the
 // control that follows it.
 
+import { judge, wrong } from "./fields.js";
 import { reason } from "./reasons.js";
 import { SENSORS, sensors } from "./strips.js";
 import { put, say } from "./words.js";
@@ -15,10 +16,13 @@ export class Line {
     this.gainsNow = null;
     this.gainsBefore = null;
     this.gainsTyped = false;
+    judge(parts.gains);
     parts.gains.addEventListener("submit", (event) => {
       event.preventDefault();
       const { p, d } = parts.gains.elements;
-      this.setGains([p.value, d.value]);
+      const why = wrong([p, d]);
+      if (why) put(parts.said, why);
+      else this.setGains([p.value, d.value]);
     });
     parts.gains.addEventListener("input", () => (this.gainsTyped = true));
     parts.gainsBack.onclick = () => {

@@ -6,7 +6,8 @@
 //   warehouse <json>
 //   about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<n>]
 //   from <robot> <a line of the extension, such as state ...>
-//   past <robot> <ms> <an event or a thought of so long ago>
+//   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
+//   past <robot> <ms> <an event, a thought or what was asked so long ago>
 //   answer <number> done | refused <reason> | stopped <ms> | lost <reason>
 //
 // What the page says:
@@ -51,6 +52,11 @@ class Robot {
     /** What each line sensor has read in the last calibration, the leftmost first. */
     this.sensors = null;
     this.route = [];
+    /** The ways on which something was put in a simulated world, as `x y side`. */
+    this.placed = [];
+    /** Where it was when that was known last, and how far it may have come since, in mm. */
+    this.pose = null;
+    this.strayed = 0;
     /** Ways that are not taken, and since when, in s of the robot's clock. */
     this.blocked = new Map();
     this.queue = [];
@@ -74,9 +80,10 @@ class Robot {
     this.unreachable = new Set();
   }
 
-  /** Keeps an event, a thought or a refusal. */
+  /** Keeps an event, a thought, a refusal or what was asked, by when it was: some are told later. */
   happened(entry) {
-    this.events.push(entry);
+    const after = this.events.findLastIndex(({ at }) => at <= entry.at);
+    this.events.splice(after + 1, 0, entry);
     if (this.events.length > 1_000) this.events.shift();
   }
 
@@ -229,6 +236,7 @@ export class Link extends EventTarget {
     if (word === "state") {
       const state = fields(rest);
       robot.stoppedSince = state.stop_age_ms === undefined ? null : Date.now() - Number(state.stop_age_ms);
+      stray(robot, state, now);
       robot.state = state;
       robot.stated = now;
       remember(robot, now);
@@ -239,6 +247,9 @@ export class Link extends EventTarget {
       for (let i = 1; i + 3 < rest.length; i += 4) {
         robot.blocked.set(rest.slice(i, i + 3).join(" "), Number(rest[i + 3]));
       }
+    } else if (word === "obstacles") {
+      robot.placed = [];
+      for (let i = 1; i + 2 < rest.length; i += 3) robot.placed.push(rest.slice(i, i + 3).join(" "));
     } else if (word === "queue") {
       robot.queue = [];
       for (let i = 1; i + 1 < rest.length; i += 2) {
@@ -258,7 +269,7 @@ export class Link extends EventTarget {
       });
     } else if (word === "thinks") {
       robot.thinks = fields(rest);
-    } else if (word === "event" || word === "thought") {
+    } else if (word === "event" || word === "thought" || word === "asked") {
       // A thought's values come right before it.
       const values = word === "thought" ? robot.thinks : null;
       robot.thinks = null;
@@ -284,6 +295,20 @@ function pairs(list, word, index) {
   if (index % 2 === 0) list.push([Number(word), 0]);
   else list[list.length - 1][1] = Number(word);
   return list;
+}
+
+/** How fast it is at most for each unit of duty, in mm/s: 73 at a duty of 104 is usual, with room above. */
+const MM_PER_DUTY = 1;
+
+/** Keeps where it was, and how far its wheels may have taken it since nobody knows. */
+function stray(robot, { x_mm: x, y_mm: y, heading_deg: heading = 0, unsure_mm: unsure = 0, left_duty: left = 0, right_duty: right = 0 }, now) {
+  if (x !== undefined) {
+    robot.pose = { x: Number(x), y: Number(y), heading: Number(heading), unsure: Number(unsure) };
+    robot.strayed = 0;
+  } else if (robot.pose) {
+    const seconds = Math.max(0, now - robot.stated) / 1_000;
+    robot.strayed += Math.max(Number(left), Number(right)) * MM_PER_DUTY * Math.min(seconds, 60);
+  }
 }
 
 /** What is kept only to be saved (E11): heading, mode, next node, sensors, servos, orders. */

@@ -1,10 +1,10 @@
-// What has happened, as sentences in the reader's language, and the last ten minutes as a file.
+// What has happened, as sentences in the reader's language, and what the page has seen of the last ten minutes as a file.
 
-import { clock, current, say } from "./words.js";
+import { clock, current, put, say, span } from "./words.js";
 import { mcap } from "./mcap.js";
 import { fill, item } from "./missions.js";
 import { reason } from "./reasons.js";
-import { crossing, thought } from "./sentences.js";
+import { crossing, sentence, thought } from "./sentences.js";
 
 /** How long ago what is saved may be, in ms. */
 const KEPT_MS = 600_000;
@@ -16,7 +16,7 @@ const EVENT = {
   type: "object",
   required: ["kind", "words", "values"],
   properties: {
-    kind: { enum: ["event", "thought", "refused"] },
+    kind: { enum: ["event", "thought", "refused", "asked"] },
     words: { type: "array", items: { type: "string" } },
     values: { type: ["object", "null"], additionalProperties: { type: "string" } },
   },
@@ -33,6 +33,10 @@ export class Log {
   draw(robot) {
     const { filter, entries, csv, mcap } = this.parts;
     csv.disabled = mcap.disabled = !robot?.past.length;
+    // No page knows more than it has seen.
+    const seen = robot?.past.length ? span(robot.past.at(-1).at - robot.past[0].at) : "";
+    put(csv, say("save_csv", seen));
+    put(mcap, say("save_mcap", seen));
     const events = robot?.events ?? [];
     const shown = [robot?.name, events.length, events.at(-1)?.at, filter.value, current()].join();
     // Nobody reads it while another view is open.
@@ -44,7 +48,7 @@ export class Log {
     fill(entries, lines.slice(-200).reverse(), (text) => item(text));
   }
 
-  /** Hands the last ten minutes to the reader as a file. */
+  /** Hands what this page has seen, ten minutes at most, to the reader as a file. */
   save(ending, type, content) {
     const robot = this.robot();
     if (!robot?.past.length) return;
@@ -59,7 +63,7 @@ export class Log {
 /** The figures of each moment as lines with commas. */
 function table({ past }) {
   const keys = Object.keys(figures(past[0]));
-  const rows = past.map((point) => [new Date(point.wall).toISOString(), ...keys.map((key) => cell(point[key] ?? ""))].join(","));
+  const rows = past.map((point) => [new Date(point.wall).toISOString(), ...Object.values(figures(point)).map((value) => cell(value ?? ""))].join(","));
   return [`time,${keys.join(",")}`, ...rows, ""].join("\n");
 }
 
@@ -77,8 +81,14 @@ function recording({ past, events }) {
   ]);
 }
 
+/** The names in a file of what has a unit: "left_duty" is of 255, "line_error" in half sensors. */
+const UNITS = {
+  x: "x_mm", y: "y_mm", line_error: "line_error_half_sensors", left_duty: "left_duty_of_255", right_duty: "right_duty_of_255",
+  battery: "battery_V", path_p50: "path_p50_us", path_p99: "path_p99_us", lost: "lost_packets", servos: "servos_of_1023", loads: "loads_of_1023",
+};
+
 function figures({ at, wall, ...figures }) {
-  return figures;
+  return Object.fromEntries(Object.entries(figures).map(([key, value]) => [UNITS[key] ?? key, value]));
 }
 
 /** One entry as a sentence with its time. */
@@ -86,6 +96,23 @@ function line({ at, kind, words, values }) {
   const time = clock(at);
   if (kind === "refused") return `${time}  ${say("blocked", reason(words[0]))}`;
   if (kind === "thought") return `${time}  ${(values && thought(values)) ?? reason(words.join(" "))}`;
-  const [what, x, y, , product] = words;
-  return `${time}  ${say(`event_${what}`, product, crossing(`${x},${y}`))}`;
+  if (kind === "asked") return `${time}  ${asked(words)}`;
+  const [what, x, y, , product, ...more] = words;
+  return `${time}  ${say(`event_${what}`, product, crossing(`${x},${y}`), ...about(what, more))}`;
+}
+
+/** What a person calls the parts of a robot that stop it for him. */
+const BY = { comm: "by_comm", operator: "by_operator" };
+
+/** What an event is about besides its place and its goods. */
+function about(what, [first, second]) {
+  if (what === "stopped") return [sentence(`stop_cause_${first}`) || "\u2013", BY[second] ? say(BY[second]) : second];
+  if (what === "mode") return [say(`mode_${first}`)];
+  return [first];
+}
+
+/** Who at a page has asked for what. */
+function asked([who, what, first, ...more]) {
+  const of = { mode: () => say(`mode_${first}`), order: () => more[0], resume: () => "", obstacle: () => more.slice(0, 2).join(", ") };
+  return say(`did_${what}${what === "obstacle" ? `_${first}` : ""}`, who, of[what]?.() ?? [first, ...more].join(" "));
 }

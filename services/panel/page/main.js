@@ -3,7 +3,9 @@
 import { Arm } from "./arm.js";
 import { Asked, Where } from "./ask.js";
 import { Bar } from "./bar.js";
+import { choose, named, shown } from "./chosen.js";
 import { Driving } from "./drive.js";
+import { ByHand } from "./hand.js";
 import { Line } from "./line.js";
 import { Link } from "./link.js";
 import { Log } from "./log.js";
@@ -20,19 +22,24 @@ const now = () => performance.now();
 current();
 translate();
 const link = new Link();
-const robot = () => link.robots.get(at("robot").value) ?? [...link.robots.values()][0];
+const robot = () => shown(link);
 
 const bar = new Bar(link, {
   link: at("link"), linkSaid: at("link-said"), mode: at("mode"), driver: at("driver"), battery: at("battery"), doing: at("doing"),
-  stop: at("stop"), stopSaid: at("stop-said"), resume: at("resume"),
-}, robot);
+  form: at("stop-place"), stop: at("stop"), stopSaid: at("stop-said"), stopWhom: at("stop-whom"), stopAll: at("stop-all"),
+  halt: at("halt"), haltSaid: at("halt-said"), haltThen: at("halt-then"), resume: at("resume"),
+}, robot, [
+  { button: at("resume"), said: at("resume-said") },
+  { button: at("drive-resume"), said: at("drive-resume-said") },
+]);
 const map = new WarehouseMap(at("map"), at("map-text"), { zoomIn: at("zoom-in"), zoomOut: at("zoom-out"), fit: at("fit"), follow: at("follow"), isArmed: () => at("armed").checked }, meetEdge, () => !at("setup").hidden, (square, side) => setup.place(square, side));
 const missions = new Missions(link, {
   fetch: at("fetch"), goods: at("goods"), picks: at("picks"), picked: at("picked"), pickedForce: at("picked-force"), clear: at("clear"), undo: at("queue-undo"),
   said: at("missions-said"), queue: at("queue"), history: at("history"),
 }, robot);
 const arm = new Arm(at("arm-drawing"));
-const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm") }, robot, now);
+const driving = new Driving(link, { armed: at("armed"), said: at("drive-said"), pad: at("pad"), arm: at("arm"), resume: at("drive-resume") }, robot, now);
+const byHand = new ByHand(link, { ask: at("manual"), box: at("hand"), said: at("hand-said"), take: at("hand-now"), leave: at("hand-leave") }, robot, () => act("mode manual"), (...words) => driving.tell(...words));
 const where = new Where(link, { dialog: at("where"), form: at("where-form"), said: at("where-said"), later: at("where-later") }, robot);
 const asked = new Asked(link, { box: at("asked"), said: at("asked-said"), give: at("hand-over"), keep: at("keep") }, robot, () => driving.letGo());
 const setup = new Setup(link, {
@@ -77,10 +84,10 @@ async function act(action) {
   const shown = robot();
   if (!shown) return;
   const answer = await link.act(shown, action);
-  driving.tell(...(answer.refused ? ["refused", reason(answer.refused)] : [null]));
+  if (answer.refused) driving.refuse(answer.refused);
+  else driving.tell(null);
 }
 
-at("manual").onclick = () => act("mode manual");
 at("autonomous").onclick = () => {
   driving.letGo();
   // Whoever was driven by hand is lost until somebody says where it stands.
@@ -134,16 +141,22 @@ function show(tab) {
 /** Words that change with the language or with who looks. */
 function words() {
   at("language").textContent = say("language");
-  at("stop").textContent = say("stop");
+  put(at("stop-word"), say("stop"));
   for (const element of document.querySelectorAll(".driver-only")) element.disabled = !link.mayDrive;
 }
 
 link.addEventListener("robots", () => {
   const list = at("robot");
-  const chosen = list.value;
-  list.replaceChildren(...[...link.robots.keys()].sort().map((name) => new Option(name, name)));
-  if (link.robots.has(chosen)) list.value = chosen;
+  // One that is not here stays chosen: nobody takes its place unasked.
+  const names = new Set([...link.robots.keys(), ...(named() === null ? [] : [named()])]);
+  list.replaceChildren(...[...names].sort().map((name) => new Option(name, name)));
+  list.value = robot()?.name ?? named() ?? "";
 });
+at("robot").onchange = () => {
+  choose(at("robot").value);
+  driving.letGo();
+  byHand.leave();
+};
 link.addEventListener("warehouse", () => {
   at("map-zone").classList.toggle("empty", !link.warehouse);
   map.setWarehouse(link.warehouse);
@@ -204,12 +217,14 @@ function drawRest(shown, time) {
   strips.draw(shown);
   line.draw(shown);
   asked.draw(shown);
+  byHand.draw(shown);
   log.draw(shown);
   const mine = shown?.driver && shown.driver === link.me;
   const seat = mine ? ["control_mine"] : shown?.driver ? ["control_other", shown.driver] : ["control_free"];
   put(at("control"), say(...seat));
   // Who has the wheel is not known until the robot is heard again.
   at("control").disabled = !link.open || !shown?.connected;
+  at("map-legend").hidden = !shown?.placed.length && !shown?.blocked.size;
   if (!link.warehouse) tell("no_map");
   else if (at("map-said").textContent === say("no_map")) put(at("map-said"), "");
 }

@@ -47,6 +47,7 @@ export class WarehouseMap {
     this.following = false;
     this.floor = make("g", {}, svg);
     this.goods = make("g", {}, svg);
+    this.placed = make("g", {}, svg);
     this.ways = make("g", {}, svg);
     this.trail = make("g", { class: "trail" }, svg);
     for (let step = 0; step < TRAIL; step++) make("polyline", { opacity: (0.5 * (TRAIL - step)) / TRAIL }, this.trail);
@@ -56,6 +57,7 @@ export class WarehouseMap {
     this.ghost = robotShape(svg, "ghost");
     this.cross = make("path", { class: "cross", d: "M-60 0H60M0 -60V60" }, svg);
     this.body = robotShape(svg, "robot");
+    this.lost = make("text", { class: "lost" }, svg);
     this.shown = null;
     this.pan();
     tools.zoomIn.onclick = () => this.zoom(0.8);
@@ -172,29 +174,46 @@ export class WarehouseMap {
     make("text", { class: "why", x, y: y + half + 70, "font-size": half }, box);
   }
 
-  /** Moves a robot to where it is now; called before each picture. */
+  /** Moves a robot to where it is now, or where it was last; called before each picture. */
   move(robot, now) {
-    const known = robot && robot.state.x_mm !== undefined;
-    for (const part of [this.body, this.unsure, this.trail, this.route, this.next]) part.toggleAttribute("hidden", !known);
+    const isKnown = robot?.state.x_mm !== undefined;
+    const shown = isKnown || Boolean(robot?.pose);
+    for (const part of [this.body, this.unsure, this.trail]) part.toggleAttribute("hidden", !shown);
+    for (const part of [this.route, this.next]) part.toggleAttribute("hidden", !isKnown);
+    this.lost.toggleAttribute("hidden", isKnown || !robot?.state.phase);
+    if (robot && !isKnown) this.sayLost(robot.pose);
     this.ghost.toggleAttribute("hidden", !robot?.truth);
     const stale = !robot || robot.isStale(now);
     this.svg.classList.toggle("stale", stale);
-    if (!known) return;
-    const told = { x: Number(robot.state.x_mm), y: Number(robot.state.y_mm), heading: Number(robot.state.heading_deg ?? 0) };
-    const pose = this.glide(this.onWayOut(told), now, stale);
+    this.svg.classList.toggle("lost", shown && !isKnown);
+    this.svg.classList.toggle("stopped", robot?.state.stopped === "1");
+    if (robot?.truth) place(this.ghost, robot.truth);
+    if (!shown) return;
+    const { unsure } = robot.pose;
+    const pose = this.glide(this.onWayOut(robot.pose), now, stale);
     place(this.body, pose);
-    // Where the axle may be: as wide as odometry is wrong, until the next mark.
+    // Where the axle may be: as wide as odometry is wrong until the next mark, and as it was driven by hand since.
     set(this.unsure, "cx", Math.round(pose.x));
     set(this.unsure, "cy", Math.round(-pose.y));
-    set(this.unsure, "r", robot.state.unsure_mm ?? 0);
-    if (robot.truth) place(this.ghost, robot.truth);
+    set(this.unsure, "r", Math.round(unsure + robot.strayed + (isKnown ? 0 : BODY.front)));
     if (this.following) this.centre(pose.x, -pose.y);
+  }
+
+  /** That nobody knows where it is: where it was last, or, for who has not seen it, over the map. */
+  sayLost(pose) {
+    const size = this.warehouse ? this.letters * 1.4 : 80;
+    const [left, top, width] = this.view;
+    put(this.lost, say("place_unknown"));
+    set(this.lost, "font-size", size);
+    set(this.lost, "x", Math.round(pose?.x ?? left + width / 2));
+    set(this.lost, "y", Math.round(pose ? -pose.y - BODY.front - 60 : top + 1.5 * size));
   }
 
   /** Draws what changes now and then: ways and goods. */
   draw(robot, now) {
     put(this.words, this.describe(robot));
     if (!robot) return;
+    this.drawPlaced(robot);
     this.drawBlocked(robot);
     this.markGoods(robot);
     if (robot.state.x_mm === undefined || !this.shown) return;
@@ -212,6 +231,7 @@ export class WarehouseMap {
       say("text_size", width, height, goods.join("; ") || "\u2013"),
       node && looks ? say("text_robot", crossing(node), say(looks)) : robot ? say("text_lost") : "",
       next ? say("text_next", crossing(next)) : "",
+      robot?.placed.length ? say("text_placed", robot.placed.map((way) => way.split(" ")).map(([x, y, side]) => `(${x}, ${y}) ${say(side)}`).join("; ")) : "",
       robot?.blocked.size ? say("text_blocked", [...robot.blocked.keys()].map((way) => way.split(" ")).map(([x, y, side]) => `(${x}, ${y}) ${say(side)}`).join("; ")) : "",
     ].filter(Boolean).join(" ");
   }
@@ -265,6 +285,22 @@ export class WarehouseMap {
     }
   }
 
+  /** What was put on ways, as bars across them; what the robot has found blocked is a cross. */
+  drawPlaced(robot) {
+    const shown = [this.side, ...robot.placed].join(";");
+    if (this.shownPlaced === shown) return;
+    this.shownPlaced = shown;
+    this.placed.replaceChildren();
+    for (const way of robot.placed) {
+      const [x, y, side] = way.split(" ");
+      const [dx, dy] = SIDES[side] ?? [0, 0];
+      const [cx, cy] = [(Number(x) + dx / 2) * this.side, -(Number(y) + dy / 2) * this.side];
+      const [width, height] = dx ? [60, 220] : [220, 60];
+      const bar = make("rect", { class: "placed", x: cx - width / 2, y: cy - height / 2, width, height }, this.placed);
+      make("title", { "data-word": "placed" }, bar, say("placed"));
+    }
+  }
+
   drawBlocked(robot) {
     const shown = [...robot.blocked.keys()].join(";");
     const seconds = Math.floor(Number(robot.state.time_ms) / 1_000);
@@ -277,6 +313,7 @@ export class WarehouseMap {
       const [dx, dy] = SIDES[side] ?? [0, 0];
       const [cx, cy] = [(Number(x) + dx / 2) * this.side, -(Number(y) + dy / 2) * this.side];
       const cross = make("g", { class: "blocked" }, this.ways);
+      make("title", { "data-word": "found" }, cross, say("found"));
       make("path", { d: `M${cx - 60} ${cy - 60}l120 120m0 -120l-120 120` }, cross);
       make("text", { x: cx + 75, y: cy - 40 }, cross, `${Math.max(0, seconds - since)} s`);
     }
@@ -440,6 +477,8 @@ function robotShape(svg, name) {
   // It looks up at 0 degrees.
   make("path", { d: `M${-half} ${rear}V${-front + 50}L${-half + 50} ${-front}H${half - 50}L${half} ${-front + 50}V${rear}Z` }, group);
   make("path", { class: "arrow", d: `M0 ${-front + 25}l45 70h-90z` }, group);
+  // Two bars, while it is stopped.
+  make("path", { class: "bars", d: `M-45 -70h30v120h-30zM15 -70h30v120h-30z` }, group);
   return group;
 }
 

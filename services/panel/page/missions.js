@@ -4,6 +4,9 @@ import { reason } from "./reasons.js";
 import { crossing, sentence } from "./sentences.js";
 import { clock, put, say, span } from "./words.js";
 
+/** Whoever orders the same goods again within this time has clicked twice, or holds Enter. */
+const TWICE_MS = 700;
+
 export class Missions {
   constructor(link, parts, robot) {
     this.link = link;
@@ -13,12 +16,14 @@ export class Missions {
     /** Number and name of goods, by number. */
     this.names = new Map();
     this.order = Date.now() % 1_000_000_000;
+    /** What was ordered last, of which robot and when; one press is one order. */
+    this.ordered = { at: -Infinity };
     /** What was taken out of a robot's queue last: its products, and how many waited behind. */
     this.taken = null;
     parts.fetch.addEventListener("submit", (event) => {
       event.preventDefault();
       if (!parts.goods.value) return put(parts.said, say("no_map"));
-      this.act(`order ${++this.order} ${parts.goods.value}`);
+      this.fetch(parts.goods.value);
     });
     // It shows what the robot says, not what was wished.
     parts.picks.onclick = (event) => {
@@ -38,6 +43,20 @@ export class Missions {
     const answer = await this.link.act(robot, action);
     put(this.parts.said, answer.refused ? reason(answer.refused) : "");
     return !answer.refused;
+  }
+
+  async fetch(product) {
+    const [robot, at] = [this.robot(), performance.now()];
+    const { ordered } = this;
+    const isTwice = ordered.robot === robot && ordered.product === product && (ordered.waits || at - ordered.at < TWICE_MS);
+    if (isTwice) {
+      ordered.at = at;
+      return;
+    }
+    const order = { robot, product, at, waits: true };
+    this.ordered = order;
+    await this.act(`order ${++this.order} ${product}`);
+    order.waits = false;
   }
 
   /** Takes orders out of the queue; `gone` are those, `behind` those that wait behind them. */
@@ -67,6 +86,7 @@ export class Missions {
   /** Keeps when goods were fetched and delivered, what was in the way, and what cannot be reached. */
   remember({ robot, entry }) {
     if (entry.kind === "thought") return this.rememberThought(robot, entry.values ?? {});
+    if (entry.kind !== "event") return;
     const [what, x, y, , product, looks] = entry.words;
     if (what === "way_blocked") robot.detours.push({ node: `${x},${y}`, looks });
     if (what === "getting_item") Object.assign(robot, { began: entry.at, detours: [] });

@@ -1,6 +1,7 @@
 // Why something is not done, in the reader's language. Robot and station say it in English sentences,
 // in which a word in braces here stands for whatever they put there. A test holds the table to the
-// sentences that they know; what is not in it is shown as it was said.
+// sentences that they know; what is not in it is shown as it was said. A third sentence is the page's English,
+// where the other names a command of a terminal: here a button stands beside it.
 
 import { pairs } from "./sentences.js";
 import { current, say } from "./words.js";
@@ -61,7 +62,7 @@ const TABLE = [
   ["there is an order {id} already", "det finns redan en order {id}"],
   ["order {id} is under way and waits no more", "order {id} pågår och väntar inte längre"],
   ["order {id} is under way and its goods are in the claw: they are delivered first", "order {id} pågår och varan är i klon: den levereras först"],
-  ["no order {id} waits; `lager queue` shows those that do", "ingen order {id} väntar; `lager queue` visar dem som gör det"],
+  ["no order {id} waits; `lager queue` shows those that do", "ingen order {id} väntar", "no order {id} waits"],
   ["the robot does not wait at goods", "roboten väntar inte vid varor"],
   ["the robot does not stand at goods, so nothing was picked up", "roboten står inte vid varor, så inget har plockats upp"],
   ["the robot is moving; drive it by hand or stop it first", "roboten rör sig; kör den för hand eller stoppa den först"],
@@ -97,8 +98,8 @@ const TABLE = [
   ["only logic may give this command", "bara logiken får ge detta kommando"],
   ["the arm is locked while the wheels move", "armen är låst medan hjulen rör sig"],
   ["its number is in use for another command", "numret används för ett annat kommando"],
-  ["somebody else steers in this mode; `lager mode` changes who steers", "någon annan styr i detta läge; `lager mode` byter vem som styr"],
-  ["the robot is stopped; `lager resume` releases the stop", "roboten är stoppad; `lager resume` häver stoppet"],
+  ["somebody else steers in this mode; `lager mode` changes who steers", "någon annan styr i detta läge", "somebody else steers in this mode"],
+  ["the robot is stopped; `lager resume` releases the stop", "roboten är stoppad", "the robot is stopped"],
   ["the bridge is shutting down", "bryggan stängs av"],
   ["no steering board is connected; `lager doctor` looks for the cause", "inget styrkort är anslutet; `lager doctor` letar efter orsaken"],
   ["the steering board does not report; look at its cable and its power", "styrkortet rapporterar inte; se till dess kabel och ström"],
@@ -108,12 +109,13 @@ const TABLE = [
   ["it is done", "det är klart"],
   ["it is refused: the value is out of range, or the board is an original one without settings", "det nekas: värdet är utanför området, eller kortet är ett originalkort utan inställningar"],
   ["the board that would have to do it is not connected; `lager topic echo link/health` shows the links", "kortet som skulle göra det är inte anslutet; `lager topic echo link/health` visar länkarna"],
+  ["the robot is on its way by itself; stop it or drive it by hand before that", "roboten är på väg på egen hand; stoppa den eller kör den för hand innan dess"],
   ["it was found when its time was over, since somebody was held up; nothing was changed, try again", "det hittades när dess tid var ute, eftersom någon hölls upp; inget ändrades, försök igen"],
   // The simulated world.
   ["the warehouse has no such crossing or way", "lagret har ingen sådan korsning eller väg"],
-  ["the robot is there; wait until it has gone on, or `lager stop` it elsewhere", "roboten är där; vänta tills den har kört vidare, eller stoppa den någon annanstans"],
-  ["nothing stands there; `lager obstacle` lists what stands", "där står inget; `lager obstacle` visar vad som står"],
-  ["no more things fit into the warehouse; `lager obstacle take` one first", "fler saker får inte plats i lagret; ta bort en först"],
+  ["the robot is there; wait until it has gone on, or `lager stop` it elsewhere", "roboten är där; vänta tills den har kört vidare, eller stoppa den någon annanstans", "the robot is there; wait until it has gone on, or stop it elsewhere"],
+  ["nothing stands there; `lager obstacle` lists what stands", "där står inget", "nothing stands there"],
+  ["no more things fit into the warehouse; `lager obstacle take` one first", "fler saker får inte plats i lagret; ta bort en först", "no more things fit into the warehouse; take one away first"],
   ["the ways are so short that the robot could not turn beside a thing", "vägarna är så korta att roboten inte skulle kunna svänga bredvid en sak"],
   // Commands, by their names.
   ["forward", "framåt"], ["follow-forward", "följ linje"], ["backward", "bakåt"], ["follow-backward", "följ linje bakåt"],
@@ -123,23 +125,22 @@ const TABLE = [
 ];
 
 const words = ([english]) => english.split("{").length;
-/** Each English sentence as an expression with a group for each word in braces, and the Swedish one. */
+/** Each English sentence as an expression with a group for each word in braces, and what the page says in each language. */
 const PATTERNS = [...pairs("failure_"), ...TABLE]
   // Those that say most themselves come first.
   .sort((one, other) => words(one) - words(other))
-  .map(([english, swedish]) => {
-    const fixed = english.replace(/[.*+?^$()|[\]\\]/g, "\\$&");
-    return [new RegExp(`^${fixed.replace(/\{(\w+)\}/g, "(?<$1>.+)")}$`), swedish];
+  .map(([said, sv, en = said]) => {
+    const fixed = said.replace(/[.*+?^$()|[\]\\]/g, "\\$&");
+    return [new RegExp(`^${fixed.replace(/\{(\w+)\}/g, "(?<$1>.+)")}$`), { sv, en }];
   });
 
 /** Why an answer is no: `refused` as the link has it, "lost" where there is no link. */
 export function reason(refused) {
   if (refused === "lost") return say("lost");
-  if (current() !== "sv") return refused;
-  for (const [pattern, swedish] of PATTERNS) {
+  for (const [pattern, told] of PATTERNS) {
     const found = pattern.exec(refused);
     // What was put in may be a reason itself.
-    if (found) return swedish.replace(/\{(\w+)\}/g, (_, word) => reason(found.groups[word]));
+    if (found) return told[current()].replace(/\{(\w+)\}/g, (_, word) => reason(found.groups[word]));
   }
   return refused;
 }

@@ -1,9 +1,14 @@
 // Setting up: the warehouse by form, file and strings, with checks as one types.
 
+import { judge, wrong } from "./fields.js";
 import { reason } from "./reasons.js";
 import { put, say, translate } from "./words.js";
 
 const SIDES = ["left", "up", "right", "down"];
+/** What a robot can drive in (services/logic/src/map.rs): crossings along a side, cm of a square, goods. */
+const MOST_CROSSINGS = 100;
+const LEAST_SIDE_CM = 40;
+const MOST_GOODS = 256;
 
 export class Setup {
   constructor(link, parts) {
@@ -12,6 +17,7 @@ export class Setup {
     this.past = [];
     this.dirty = false;
     const { form } = parts;
+    judge(form);
     form.addEventListener("input", ({ target }) => {
       // What is pasted or loaded replaces the form's content as a whole.
       if (!target.name) return;
@@ -21,7 +27,9 @@ export class Setup {
     });
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.save(this.read());
+      const why = wrong(form.elements);
+      if (why) put(parts.said, why);
+      else this.save(this.read());
     });
     parts.add.onclick = () => {
       this.dirty = true;
@@ -109,7 +117,7 @@ export class Setup {
     const why = this.wrong(warehouse);
     const answer = why ? {} : await this.link.ask("warehouse", null, JSON.stringify(warehouse));
     const refused = why ?? (answer.refused && reason(answer.refused));
-    put(this.parts.said, refused ?? say("saved"));
+    put(this.parts.said, refused ?? say("saved_here"));
     if (refused) return false;
     if (undoable && before) this.past.push(before);
     this.drawUndo();
@@ -190,7 +198,11 @@ export class Setup {
   }
 
   /** What is wrong with a warehouse, as a sentence; the station checks it, too. */
-  wrong({ size, product }) {
+  wrong({ size = [], side_length_cm: side, product }) {
+    const largest = Math.max(...size);
+    if (largest >= MOST_CROSSINGS) return say("size_limits", MOST_CROSSINGS - 1, largest);
+    if (side < LEAST_SIDE_CM) return say("side_limits", LEAST_SIDE_CM, side);
+    if (product.length > MOST_GOODS) return say("goods_limits", MOST_GOODS, product.length);
     const ids = product.map(({ id }) => id);
     const twice = ids.find((id, index) => ids.indexOf(id) !== index);
     if (twice !== undefined) return say("duplicate", twice);

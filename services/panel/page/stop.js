@@ -1,4 +1,9 @@
 // STOP: it asks nothing, waits for nothing, and says what has become of it.
+//
+//   socket there --> "stop", ahead of all else; unanswered for a second: the form as well
+//   socket gone  --> the form, by a request of its own
+//
+// Before this runs the form is the browser's, and is answered by a page (services/panel/src/stop.rs).
 
 import { reason } from "./reasons.js";
 import { say } from "./words.js";
@@ -10,22 +15,49 @@ export function isText(element) {
 
 /** After this time a stop that nobody has confirmed is said to be none, in ms. */
 const CONFIRM_MS = 1_000;
+/** So long the form is waited for; the panel answers within a second. */
+const FORM_MS = 5_000;
+/** A click ends a press that has stopped already, unless that was so long ago. */
+const PRESS_MS = 1_000;
+
+/** The words of the form's answer. */
+const BECAME = { stands: "stands_of", sent: "sent_to", unconfirmed: "unconfirmed_of", unheard: "unheard_of", unknown: "stop_not_here" };
 
 export class Stop {
-  /** `button` and the keys Esc and Space stop `robot()`; `said` is where it is told. A stop calls `first`. */
-  constructor(link, { button, said, resume = null }, robot, first = () => {}) {
-    Object.assign(this, { link, said, resume, robot, first });
-    button.addEventListener("pointerdown", () => this.stop());
-    button.addEventListener("click", (event) => event.detail === 0 && this.stop());
+  /**
+   * The buttons of `form` stop the robots that they name, and `button` and the keys Esc and Space
+   * `robot()`; `said` is where it is told. A stop calls `first`.
+   */
+  constructor(link, { form, button, said }, robot, name, first = () => {}) {
+    Object.assign(this, { link, form, said, robot, name, first });
+    this.pressed = -Infinity;
+    for (const one of form.querySelectorAll("button")) {
+      one.addEventListener("pointerdown", () => {
+        this.pressed = performance.now();
+        this.press(one, button);
+      });
+    }
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      const since = performance.now() - this.pressed;
+      this.pressed = -Infinity;
+      if (since > PRESS_MS) this.press(event.submitter ?? button, button);
+    });
+    document.documentElement.dataset.stops = "yes";
     // Ahead of whatever has the focus, dialogs and open lists included.
     addEventListener("keydown", (event) => this.key(event), { capture: true });
     // Some browsers press a button when Space comes up.
     addEventListener("keyup", (event) => event.key === " " && this.isKey(event) && event.preventDefault(), { capture: true });
   }
 
+  press(one, button) {
+    if (one === button) this.stop();
+    else this.stopAll();
+  }
+
   isKey({ key, target }) {
-    // The button of Resume is held by Space.
-    return key === "Escape" || (key === " " && !isText(target) && !(this.resume && target === this.resume));
+    // A button that is held, such as Resume, is held by Space.
+    return key === "Escape" || (key === " " && !isText(target) && !target.closest?.(".hold"));
   }
 
   key(event) {
@@ -35,23 +67,53 @@ export class Stop {
     if (!event.repeat) this.stop();
   }
 
-  /** Stops the robot that is shown; every other one has its own page. */
+  /** Stops the robot that is shown. */
   async stop() {
     this.first();
     const robot = this.robot();
-    if (!robot || !this.link.open) return this.say("stop_lost");
     this.say("sent");
-    const unconfirmed = setTimeout(() => this.say("stop_unconfirmed"), CONFIRM_MS);
+    // Who has not connected yet, or has no socket, is stopped by name.
+    if (!robot || !this.link.open) return this.post([this.name()]);
+    const unconfirmed = setTimeout(() => this.post([robot.name], "stop_unconfirmed"), CONFIRM_MS);
     const answer = await this.link.ask("stop", robot.name);
     clearTimeout(unconfirmed);
     if (answer.stopped !== undefined) this.say("stands", answer.stopped);
-    else if (answer.done) this.say("sent");
-    else if (answer.unsent) this.say("stop_lost");
+    else if (answer.done) this.say("sent_to", robot.name);
+    else if (answer.unsent) this.post([robot.name]);
     else if (answer.isUnknown) this.say("stop_unconfirmed");
+    else if (!robot.connected) this.say("unheard_of", robot.name);
     else this.say("stop_refused", reason(answer.refused));
   }
 
+  /** Stops every robot that the station knows. */
+  stopAll() {
+    this.first();
+    this.say("sent");
+    return this.post([]);
+  }
+
+  /** The form by a request; without a name all are stopped. Until there is an answer `meanwhile` is said. */
+  async post(names, meanwhile = "sent") {
+    this.say(meanwhile);
+    const body = new URLSearchParams(names.map((name) => ["robot", name ?? ""]));
+    let lines;
+    try {
+      const answer = await fetch("/stop", { method: "POST", body, headers: { accept: "text/plain" }, signal: AbortSignal.timeout(FORM_MS) });
+      if (!answer.ok) return this.tell(say("stop_refused", reason((await answer.text()).split("\n")[0])));
+      lines = (await answer.text()).split("\n").filter(Boolean);
+    } catch (error) {
+      // One that nobody answers may have arrived.
+      return this.say(error.name === "TimeoutError" ? "stop_unconfirmed" : "stop_lost");
+    }
+    const words = lines.map((line) => line.split(" ")).map(([robot, word, ms]) => say(BECAME[word] ?? word, robot, ms));
+    this.tell(words.join(". ") || say("no_robot"));
+  }
+
   say(key, ...values) {
-    this.said.textContent = key ? say(key, ...values) : "";
+    this.tell(key ? say(key, ...values) : "");
+  }
+
+  tell(text) {
+    this.said.textContent = text;
   }
 }

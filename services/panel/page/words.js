@@ -25,7 +25,7 @@ const TABLE = {
     picked_force: "Pick-up done, not felt", picks: "The robot picks goods up by itself", plain: "speaks only the document's language: no live picture",
     queue_empty: "Nothing waits.", reached_from: "from", refused: "{0}", release: "release", remove: "remove", reset: "It stands at the delivery, looking in",
     resume: "Hold to resume", right: "right", right_diag: "45° right", robot: "robot",
-    save: "Save", save_csv: "Save CSV", save_file: "Save as a file", save_mcap: "Save MCAP", saved: "saved", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
+    save: "Save", save_csv: "Save CSV {0}", save_file: "Save as a file", save_mcap: "Save MCAP {0}", saved: "saved", sent: "sent", servo_base: "base", servo_shoulder: "shoulder", servo_elbow: "elbow", servo_wrist: "wrist", servo_rotation: "rotation", servo_claw: "claw", servo_load: "load {0} %",
     servo_voltage: "input voltage", servo_angle: "angle limit", servo_heat: "too hot", servo_range: "value out of range", servo_checksum: "checksum", servo_overload: "overload", servo_instruction: "unknown instruction",
     set: "Set", setup: "Set up",
     side: "Side", size: "Squares", square: "square", squeeze: "squeeze", stale: "nothing new for {0}", stand: "stand", stands: "both wheels stand, {0} ms",
@@ -39,6 +39,18 @@ const TABLE = {
     real_floor: "put obstacles on a real floor by hand", text_size: "A warehouse of {0} by {1} squares. Goods: {2}.", text_robot: "The robot is at {0} and looks {1}.",
     took: "{0} in {1}", text_lost: "It is not known where the robot is.", text_next: "It goes to {0}.", text_blocked: "Blocked ways: {0}.", column: "column", row: "row", looks: "looks",
     where_asked: "Where does the robot stand?", on_crossing: "On this crossing:", stands_there: "It stands there", later: "Later", ghost: "where it really is", drives: "drives", volts: "{0} V", battery_low: "{0} V, low",
+    event_stopped: "STOPPED: {2} (by {3})", by_comm: "the station", by_operator: "a command in a terminal", event_resumed: "the stop is released", event_mode: "is {2} now", event_restarted: "its service {2} was started anew", event_link_lost: "does not reach the station", event_link_back: "reaches the station again",
+    did_stop: "{0} stops it", did_resume: "{0} releases the stop", did_mode: "{0} makes it {1}", did_take: "{0} takes the wheel", did_free: "{0} leaves the wheel", did_order: "{0} orders {1}", did_cancel: "{0} cancels order {1}",
+    did_first: "{0} puts order {1} first", did_up: "{0} moves order {1} up", did_clear: "{0} clears the queue", did_reset: "{0} says that it stands at the delivery", did_place: "{0} says that it stands at {1}", did_pick: "{0} changes who picks: {1}",
+    did_picked: "{0} says that the goods are picked up", did_gains: "{0} sets the line control to {1}", did_calibrate: "{0} calibrates", did_obstacle_put: "{0} puts an obstacle at {1}", did_obstacle_take: "{0} takes away the obstacle at {1}",
+    field_range: "{0}: a number from {1} to {2}", field_least: "{0}: a number from {1} up", stands_of: "{0} stands after {1} ms", sent_to: "sent to {0}, which confirms nothing",
+    unconfirmed_of: "sent to {0}, not confirmed: it may still be moving", unheard_of: "NOT SENT: {0} is not heard", stop_not_here: "NOT SENT: {0} is not here", not_here: "{0} is not here", stop_all: "Stop all",
+    hold_longer: "hold it for a second", stopped_again: "it was stopped again meanwhile", still_moves: "it still moves", was_to_fetch: "was to fetch {0}", then_stands: "Released, it stands until somebody drives it.",
+    then_needs: "Released, it still needs what is said above.", then_waits: "Released, it waits for an order.", then_fetches: "Released, it goes on by itself: it fetches {0}.",
+    hand_asked: "The robot is fetching {0}. It is taken by hand in {1} s.", hand_now: "By hand now", hand_leave: "Leave it to the robot",
+    place_unknown: "place unknown", placed: "obstacle that stands there", found: "found blocked", legend: "bar: an obstacle stands there; cross: found blocked", text_placed: "Obstacles stand at: {0}.",
+    side_limits: "the robot drives in squares of {0} cm or more; these are {1} cm", size_limits: "the robot knows up to {0} squares along a side; here are {1}", goods_limits: "the robot knows up to {0} goods; here are {1}",
+    saved_here: "saved at the station; a robot that is up keeps its floor until it starts again",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -64,7 +76,7 @@ const TABLE = {
     picked_force: "Upplockning klar, känns ej", picks: "Roboten plockar upp varorna själv", plain: "talar bara dokumentets språk: ingen levande bild",
     queue_empty: "Inget väntar.", reached_from: "från", refused: "{0}", release: "släpp", remove: "ta bort", reset: "Den står vid leveransen och ser in i lagret",
     resume: "Håll för att fortsätta", right: "höger", right_diag: "45° höger", robot: "robot",
-    save: "Spara", save_csv: "Spara CSV", save_file: "Spara som fil", save_mcap: "Spara MCAP", saved: "sparat", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
+    save: "Spara", save_csv: "Spara CSV {0}", save_file: "Spara som fil", save_mcap: "Spara MCAP {0}", saved: "sparat", sent: "skickat", servo_base: "bas", servo_shoulder: "axel", servo_elbow: "armbåge", servo_wrist: "handled", servo_rotation: "vridning", servo_claw: "klo", servo_load: "last {0} %",
     servo_voltage: "matningsspänning", servo_angle: "vinkelgräns", servo_heat: "för varm", servo_range: "värde utanför området", servo_checksum: "kontrollsumma", servo_overload: "överlast", servo_instruction: "okänd instruktion",
     set: "Sätt", setup: "Ställ in",
     side: "Sida", size: "Rutor", square: "ruta", squeeze: "kläm", stale: "inget nytt på {0}", stand: "stå", stands: "båda hjulen står, {0} ms",
@@ -79,26 +91,41 @@ const TABLE = {
     text_robot: "Roboten är vid {0} och tittar {1}.", took: "{0} på {1}", text_lost: "Det är okänt var roboten är.", text_next: "Den kör till {0}.", text_blocked: "Spärrade vägar: {0}.",
     column: "kolumn", row: "rad", looks: "tittar", where_asked: "Var står roboten?", on_crossing: "I den här korsningen:", stands_there: "Där står den", later: "Senare",
     ghost: "där den verkligen är", drives: "kör", volts: "{0} V", battery_low: "{0} V, lågt",
+    event_stopped: "STOPPAD: {2} (av {3})", by_comm: "stationen", by_operator: "ett kommando i en terminal", event_resumed: "stoppet är hävt", event_mode: "är {2} nu", event_restarted: "dess tjänst {2} startades om", event_link_lost: "når inte stationen", event_link_back: "når stationen igen",
+    did_stop: "{0} stoppar den", did_resume: "{0} häver stoppet", did_mode: "{0} gör den {1}", did_take: "{0} tar ratten", did_free: "{0} lämnar ratten", did_order: "{0} beställer {1}", did_cancel: "{0} tar bort order {1}",
+    did_first: "{0} lägger order {1} först", did_up: "{0} flyttar upp order {1}", did_clear: "{0} tömmer kön", did_reset: "{0} säger att den står vid leveransen", did_place: "{0} säger att den står vid {1}", did_pick: "{0} ändrar vem som plockar: {1}",
+    did_picked: "{0} säger att varan är upplockad", did_gains: "{0} sätter linjeregleringen till {1}", did_calibrate: "{0} kalibrerar", did_obstacle_put: "{0} ställer ut ett hinder vid {1}", did_obstacle_take: "{0} tar bort hindret vid {1}",
+    field_range: "{0}: ett tal från {1} till {2}", field_least: "{0}: ett tal från {1}", stands_of: "{0} står efter {1} ms", sent_to: "skickat till {0}, som inte bekräftar något",
+    unconfirmed_of: "skickat till {0}, ej bekräftat: den kan röra sig", unheard_of: "EJ SKICKAT: {0} hörs inte", stop_not_here: "EJ SKICKAT: {0} finns inte här", not_here: "{0} finns inte här", stop_all: "Stoppa alla",
+    hold_longer: "håll den i en sekund", stopped_again: "den stoppades igen under tiden", still_moves: "den rör sig ännu", was_to_fetch: "skulle hämta {0}", then_stands: "Släppt står den tills någon kör den.",
+    then_needs: "Släppt behöver den ändå det som sägs ovan.", then_waits: "Släppt väntar den på en order.", then_fetches: "Släppt fortsätter den själv: den hämtar {0}.",
+    hand_asked: "Roboten hämtar {0}. Den tas för hand om {1} s.", hand_now: "För hand nu", hand_leave: "Låt roboten köra",
+    place_unknown: "okänd plats", placed: "hinder som står där", found: "funnen spärrad", legend: "balk: ett hinder står där; kryss: funnen spärrad", text_placed: "Hinder står vid: {0}.",
+    side_limits: "roboten kör i rutor om minst {0} cm; dessa är {1} cm", size_limits: "roboten kan högst {0} rutor längs en sida; här är {1}", goods_limits: "roboten kan högst {0} varor; här är {1}",
+    saved_here: "sparat i stationen; en robot som är igång behåller sitt golv tills den startar om",
   },
 };
 
-let language = null;
+/** The page itself keeps the language in use. */
+const root = document.documentElement;
 
 /** The language in use: chosen before, or the browser's. */
 export function current() {
-  if (!language) {
+  if (!root.dataset.language) {
     const kept = localStorage.getItem("language");
-    language = kept in TABLE ? kept : navigator.language.startsWith("sv") ? "sv" : "en";
-    document.documentElement.lang = language;
+    use(kept in TABLE ? kept : navigator.language.startsWith("sv") ? "sv" : "en");
   }
-  return language;
+  return root.dataset.language;
 }
 
 /** Changes to the other language. */
 export function change() {
-  language = current() === "sv" ? "en" : "sv";
-  localStorage.setItem("language", language);
-  document.documentElement.lang = language;
+  use(current() === "sv" ? "en" : "sv");
+  localStorage.setItem("language", current());
+}
+
+function use(language) {
+  root.dataset.language = root.lang = language;
 }
 
 /** A word or sentence; {0} and so on are filled in. */
@@ -127,13 +154,13 @@ export function span(ms) {
 }
 
 /** Fills in the words that stand in the page itself. */
-export function translate(root = document) {
-  for (const element of root.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
-  for (const element of root.querySelectorAll("[data-label]")) {
+export function translate(part = document) {
+  for (const element of part.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
+  for (const element of part.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", say(element.dataset.label));
     if (element.type === "search") element.placeholder = say(element.dataset.label);
   }
-  for (const element of root.querySelectorAll("[data-title]")) {
+  for (const element of part.querySelectorAll("[data-title]")) {
     element.title = say(element.dataset.title);
     element.setAttribute("aria-label", say(element.dataset.title));
   }

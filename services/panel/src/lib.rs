@@ -7,7 +7,8 @@
 //! ```
 //!
 //! - [`Panel`]: the server, in one thread with tasks of its own.
-//! - `page`: the files, embedded.
+//! - `page`: the files, embedded, and `bundle`: their scripts as one.
+//! - `stop`: STOP by a form, which needs no script and no socket.
 //! - `door`: how many connections there may be, and `access`: who may open the files.
 //! - `speech`: the lines that page and panel say to each other.
 //! - `socket`: one page's conversation, and `visit`: what it may do, has asked and has been told.
@@ -19,12 +20,14 @@
 #![forbid(unsafe_code)]
 
 mod access;
+mod bundle;
 mod door;
 mod handover;
 mod late;
 mod page;
 mod socket;
 mod speech;
+mod stop;
 mod visit;
 
 use std::io;
@@ -34,10 +37,11 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::{ConnectInfo, Request, State, WebSocketUpgrade};
+use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{any, get};
+use axum::routing::{any, get, post};
+use lager_lines::Name;
 use lager_station::Handle;
 use thiserror::Error;
 use tokio::sync::watch;
@@ -183,6 +187,8 @@ impl Panel {
             let listener = tokio::net::TcpListener::from_std(self.listener)?;
             let router = Router::new()
                 .route("/live", any(live))
+                .route("/stop", post(stop))
+                .layer(DefaultBodyLimit::max(stop::LONGEST_BODY))
                 .fallback(get(file))
                 .with_state(self.shared)
                 .into_make_service_with_connect_info::<Stays>();
@@ -226,7 +232,8 @@ async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
     if rank(&shared.access, headers).is_none() {
         return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
     }
-    let Some((kind, content)) = page::file(path) else {
+    let robot = chosen(&shared.handle, request.uri().query());
+    let Some((kind, content)) = page::file(path, &robot) else {
         return refuse(
             StatusCode::NOT_FOUND,
             "there is no such file here; the page is at /",
@@ -234,6 +241,47 @@ async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
     };
     guarded(([(header::CONTENT_TYPE, kind)], content).into_response())
 }
+
+/// The robot that the page's address names, or the only one there is; empty: none.
+fn chosen(handle: &Handle, query: Option<&str>) -> String {
+    if let Some(name) = query.and_then(|query| Name::new(query).ok()) {
+        return name.to_string();
+    }
+    match &handle.robots()[..] {
+        [one] => one.name.to_string(),
+        _ => String::new(),
+    }
+}
+
+/// STOP by the page's form; the same doors as to the page's socket.
+async fn stop(State(shared): State<Arc<Shared>>, headers: HeaderMap, body: String) -> Response {
+    let Some(host) = host(&shared.access, &headers) else {
+        return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
+    };
+    if !is_ours(&shared.access, &headers, host) {
+        return refuse(StatusCode::FORBIDDEN, "STOP is for the panel's own page");
+    }
+    if rank(&shared.access, &headers).is_none() {
+        return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
+    }
+    let became = stop::stop(&shared.handle, stop::names(&body)).await;
+    let wants = text(&headers, &header::ACCEPT).unwrap_or_default();
+    guarded(match wants.contains("text/html") {
+        true => axum::response::Html(stop::page(&became)).into_response(),
+        false => stop::lines(&became).into_response(),
+    })
+}
+
+/// Whether the panel's own page asks: by its origin, or by what the browser says of it.
+fn is_ours(access: &Access, headers: &HeaderMap, host: &str) -> bool {
+    match text(headers, &header::ORIGIN) {
+        Some(origin) if origin != "null" => access.is_origin(origin, host),
+        _ => text(headers, &FETCH_SITE) == Some("same-origin"),
+    }
+}
+
+/// How the page that asks stands to this panel, as browsers say it.
+const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 /// The answer with what keeps others out of it.
 fn guarded(mut response: Response) -> Response {

@@ -1,5 +1,9 @@
-//! The page's files, in the program itself: nothing is built for it and nothing fetched from
-//! elsewhere.
+//! The page's files, in the program itself: nothing is fetched from elsewhere. Its modules are sent
+//! as one script for each page (`bundle`), and STOP names the robot before that script runs.
+
+use std::sync::LazyLock;
+
+use crate::bundle::bundle;
 
 /// Name, type and content of each.
 const FILES: &[(&str, &str, &str)] = &[
@@ -12,7 +16,11 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/arm.js", SCRIPT, include_str!("../page/arm.js")),
     ("/ask.js", SCRIPT, include_str!("../page/ask.js")),
     ("/bar.js", SCRIPT, include_str!("../page/bar.js")),
+    ("/chosen.js", SCRIPT, include_str!("../page/chosen.js")),
     ("/drive.js", SCRIPT, include_str!("../page/drive.js")),
+    ("/early.js", SCRIPT, include_str!("../page/early.js")),
+    ("/fields.js", SCRIPT, include_str!("../page/fields.js")),
+    ("/hand.js", SCRIPT, include_str!("../page/hand.js")),
     ("/line.js", SCRIPT, include_str!("../page/line.js")),
     ("/link.js", SCRIPT, include_str!("../page/link.js")),
     ("/log.js", SCRIPT, include_str!("../page/log.js")),
@@ -20,7 +28,9 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/map.js", SCRIPT, include_str!("../page/map.js")),
     ("/mcap.js", SCRIPT, include_str!("../page/mcap.js")),
     ("/missions.js", SCRIPT, include_str!("../page/missions.js")),
+    ("/pads.js", SCRIPT, include_str!("../page/pads.js")),
     ("/reasons.js", SCRIPT, include_str!("../page/reasons.js")),
+    ("/resume.js", SCRIPT, include_str!("../page/resume.js")),
     ("/screen", HTML, include_str!("../page/screen.html")),
     ("/screen.js", SCRIPT, include_str!("../page/screen.js")),
     (
@@ -42,19 +52,38 @@ pub(crate) const HEADERS: &[(&str, &str)] = &[
     (
         "content-security-policy",
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; connect-src 'self'; \
-         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+         base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
     ),
     ("x-content-type-options", "nosniff"),
-    ("referrer-policy", "no-referrer"),
+    // With `no-referrer` a form would not say which page it stands on.
+    ("referrer-policy", "same-origin"),
     ("cross-origin-opener-policy", "same-origin"),
     ("cross-origin-resource-policy", "same-origin"),
     ("cache-control", "no-cache"),
 ];
 
-/// Type and content of a file.
-pub(crate) fn file(path: &str) -> Option<(&'static str, &'static str)> {
+/// The scripts that the pages run, with all their modules.
+static BUNDLES: LazyLock<[(&str, String); 2]> = LazyLock::new(|| {
+    ["main", "screen"].map(|entry| (entry, bundle(entry, |name| written(&format!("/{name}.js")))))
+});
+
+/// A file as it is written.
+fn written(path: &str) -> Option<&'static str> {
     let found = FILES.iter().find(|(name, ..)| *name == path)?;
-    Some((found.1, found.2))
+    Some(found.2)
+}
+
+/// Type and content of a file as it is sent, for a page that shows `robot`; empty: none is chosen.
+pub(crate) fn file(path: &str, robot: &str) -> Option<(&'static str, String)> {
+    let (_, kind, content) = FILES.iter().find(|(name, ..)| *name == path)?;
+    let mut bundles = BUNDLES.iter();
+    let bundled = bundles.find(|(entry, _)| path.strip_prefix('/') == Some(&format!("{entry}.js")));
+    let content = match bundled {
+        Some((_, script)) => script.clone(),
+        None if *kind == HTML => content.replace("{robot}", robot),
+        None => (*content).to_owned(),
+    };
+    Some((kind, content))
 }
 
 #[cfg(test)]
@@ -77,7 +106,53 @@ mod tests {
         let known: BTreeSet<String> = FILES.iter().map(|(name, ..)| (*name).to_owned()).collect();
         assert_eq!(there, known);
         let bytes: usize = FILES.iter().map(|(.., content)| content.len()).sum();
-        assert!(bytes < 200_000, "{bytes}");
+        assert!(bytes < 250_000, "{bytes}");
+    }
+
+    #[test]
+    fn modules_import_and_export_as_one_script_can_hold_them() {
+        for (name, kind, content) in FILES.iter().filter(|(_, kind, _)| *kind == SCRIPT) {
+            assert_eq!(*kind, SCRIPT);
+            for line in content.lines().filter(|line| line.starts_with("import")) {
+                let is_one = line.starts_with("import { ") && line.ends_with(".js\";");
+                assert!(is_one, "{name}: {line}");
+            }
+            for line in content.lines().filter(|line| line.starts_with("export")) {
+                let rest = line
+                    .trim_start_matches("export ")
+                    .trim_start_matches("async ");
+                let mut kinds = ["const ", "function ", "class "].iter();
+                assert!(kinds.any(|kind| rest.starts_with(kind)), "{name}: {line}");
+            }
+        }
+        let (_, script) = file("/main.js", "").unwrap();
+        assert!(script.contains("const $words = ") && !script.contains("\nimport "));
+        // Every module is in it, but for those of the other page and the first script.
+        for (name, kind, _) in FILES {
+            let module = name.trim_start_matches('/').trim_end_matches(".js");
+            let is_in = script.contains(&format!("const ${module} = "));
+            assert_eq!(
+                is_in,
+                *kind == SCRIPT && !["early", "screen"].contains(&module),
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn stop_names_its_robot_before_any_script_runs() {
+        for page in ["/", "/screen"] {
+            let (_, content) = file(page, "r7").unwrap();
+            assert!(content.contains("name=\"robot\" value=\"r7\""), "{page}");
+            assert!(
+                !content.contains('{'),
+                "{page}: nothing is left to be filled in"
+            );
+            assert!(
+                content.contains("method=\"post\" action=\"/stop\""),
+                "{page}"
+            );
+        }
     }
 
     #[test]
@@ -111,7 +186,7 @@ mod tests {
     }
 
     fn same_words(file: &str) {
-        let (_, words) = super::file(file).unwrap();
+        let words = written(file).unwrap();
         let (english, rest) = words.split_once("  sv: {").unwrap();
         let (_, english) = english.split_once("  en: {").unwrap();
         let (swedish, _) = rest.split_once("\n};").unwrap();
@@ -129,7 +204,7 @@ mod tests {
 
     #[test]
     fn each_word_that_the_page_says_is_in_the_table_and_each_of_the_table_is_said() {
-        let (_, words) = super::file("/words.js").unwrap();
+        let words = written("/words.js").unwrap();
         let (english, _) = words.split_once("  sv: {").unwrap();
         let known = keys(english.split_once("  en: {").unwrap().1);
         let mut said = BTreeSet::new();
@@ -149,7 +224,7 @@ mod tests {
         assert!(unknown.is_empty(), "said and not in the table: {unknown:?}");
         // Others stand in lists and in names that are put together.
         let everything: String = FILES.iter().map(|(.., content)| *content).collect();
-        let put_together = ["mode_", "event_", "servo_", "board_", "side_"];
+        let put_together = ["mode_", "event_", "did_", "servo_", "board_", "side_"];
         let unsaid: Vec<_> = known
             .iter()
             .filter(|key| !said.contains(*key))

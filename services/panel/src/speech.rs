@@ -22,8 +22,9 @@
 //! you <name> driver|viewer          what this page is called and may do; the first line
 //! warehouse <json>                  the warehouse, or `null`; when it has changed
 //! about <robot> connected=0|1 speaks=0|1 driver=<name>|- [asks=<name>] [age_ms=<int>]
-//! from <robot> <report>             a line of the extension, or `thought <text>`
-//! past <robot> <ms> <report>        an event or a thought of so long before this page came
+//! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>
+//!                                   <what>`: a person here wants an action, `stop`, `take` or `free`
+//! past <robot> <ms> <report>        an event, a thought or what was asked, so long ago
 //! answer <number> done | stopped <ms> | refused <text> | lost <text>
 //! ```
 //!

@@ -6,7 +6,7 @@ use std::sync::{MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
-use lager_lines::extension::{Action, Report};
+use lager_lines::extension::{Action, Mode, Report};
 use lager_station::{
     Awaited, Doing, Driver, Given, Reply, Saving, Subscription, Told, View, Warehouse,
 };
@@ -22,6 +22,8 @@ use crate::speech::{Said, Unread, read};
 const STAY: Duration = Duration::from_secs(1);
 /// How often a page is told of a robot that says nothing.
 const ABOUT: Duration = Duration::from_millis(100);
+/// What is older than this when a page is told it is told with its age.
+const JUST_NOW: Duration = Duration::from_secs(1);
 /// Lines without a number that a page may say.
 const MOST_UNREAD: u32 = 20;
 
@@ -62,7 +64,7 @@ pub(crate) struct Visit {
 /// When what a page was told of a robot last was new.
 #[derive(Debug, Default)]
 struct LastTold {
-    at: [Option<Duration>; 7],
+    at: [Option<Duration>; 8],
 }
 
 impl Visit {
@@ -118,12 +120,13 @@ impl Visit {
     fn carry_out(&mut self, said: Said) {
         let handle = self.place.shared.handle.clone();
         if let Said::Stop { robot, number } = said {
-            return match handle.stop(&robot) {
+            match handle.stop(&robot) {
                 Ok(Some(awaited)) => self.asked.push((number, awaited)),
                 // It speaks the document's language, which confirms nothing.
                 Ok(None) => self.answer(number, "done"),
-                Err(why) => self.refuse(number, &why.to_string()),
-            };
+                Err(why) => return self.refuse(number, &why.to_string()),
+            }
+            return handle.note(&robot, &self.name, "stop");
         }
         if let Said::Here { said_ms } = said {
             self.late.hear(said_ms, handle.now());
@@ -153,7 +156,9 @@ impl Visit {
             }
             Said::Take { robot, .. } => self.take(robot, number),
             Said::Free { robot, .. } => {
-                self.wheels.remove(&robot);
+                if self.wheels.remove(&robot).is_some() {
+                    self.note(&robot, "free");
+                }
                 self.answer(number, "done");
             }
             Said::Keep { robot, .. } if self.wheels.contains_key(&robot) => {
@@ -194,6 +199,7 @@ impl Visit {
     fn seat(&mut self, robot: Name, number: u32) {
         match self.place.shared.handle.take_wheel(&robot, &self.name) {
             Ok(driver) => {
+                self.note(&robot, "take");
                 self.wheels.insert(robot, driver);
                 self.answer(number, "done");
             }
@@ -230,7 +236,7 @@ impl Visit {
         let driver = self.wheels.get(robot);
         let late = action.late;
         let asked = match (action.what, driver) {
-            (Action::Drive { .. } | Action::Arm(_), None) => {
+            (Action::Drive { .. } | Action::Arm(_) | Action::Mode(Mode::Manual), None) => {
                 return self.refuse(number, NOT_DRIVER);
             }
             // Its lease is the station's.
@@ -246,8 +252,16 @@ impl Visit {
         };
         match asked {
             Ok(awaited) => self.asked.push((number, awaited)),
-            Err(why) => self.refuse(number, &why.to_string()),
+            Err(why) => return self.refuse(number, &why.to_string()),
         }
+        // What is held, and steps, would be all that there is to read.
+        if !matches!(action.what, Action::Drive { .. } | Action::Arm(_)) {
+            self.note(robot, &action.what.to_string());
+        }
+    }
+
+    fn note(&self, robot: &Name, what: &str) {
+        self.place.shared.handle.note(robot, &self.name, what);
     }
 
     fn driver_of(&self, robot: &Name) -> Option<String> {
@@ -325,11 +339,13 @@ impl Visit {
                 Told::Event(event) => Report::Event(event).to_string(),
                 Told::Thinks(thinks) => Report::Thinks(thinks).to_string(),
                 Told::Thought(text) => format!("thought {text}"),
-                Told::Replied { .. } => continue,
+                Told::Asked { by, what } => format!("asked {by} {what}"),
+                Told::Replied { .. } | Told::Past { .. } => continue,
             };
-            let _ = match self.began.checked_sub(news.at) {
-                Some(age) => writeln!(self.lines, "past {robot} {} {line}", age.as_millis()),
-                None => writeln!(self.lines, "from {robot} {line}"),
+            let age = self.place.shared.handle.now().saturating_sub(news.at);
+            let _ = match news.at < self.began || age > JUST_NOW {
+                true => writeln!(self.lines, "past {robot} {} {line}", age.as_millis()),
+                false => writeln!(self.lines, "from {robot} {line}"),
             };
         }
     }
@@ -394,6 +410,9 @@ impl Visit {
         }
         if let Some(seen) = &shown.sensors {
             tell(6, seen.at, &|| Report::Sensors(seen.value));
+        }
+        if let Some(seen) = &shown.obstacles {
+            tell(7, seen.at, &|| Report::Obstacles(seen.value.clone()));
         }
     }
 }

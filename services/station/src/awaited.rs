@@ -7,10 +7,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
-use lager_lines::Name;
+use lager_lines::{Name, Text};
 
 use crate::shown::{Reply, Told};
 use crate::station::News;
+
+/// What a robot tells of earlier is what it told then, if that was so near to it: it is counted from
+/// when each was read.
+const SAME: Duration = Duration::from_secs(5);
 
 /// The answer to an action or to a stop, which comes later.
 #[derive(Debug)]
@@ -110,9 +114,50 @@ impl Outlets {
         Subscription { news, lost }
     }
 
+    /// What a robot has told of earlier, as news of when it was; nothing if it was told then, too.
+    fn recalled(&self, news: News) -> Vec<News> {
+        let News { robot, at, told } = news;
+        let Told::Past { ago, told } = told else {
+            return vec![News { robot, at, told }];
+        };
+        let at = at.saturating_sub(ago);
+        let is_it = |other: &News| {
+            let is_near = other.at.abs_diff(at) < SAME;
+            is_near && other.robot == robot && other.told == *told
+        };
+        if self.kept.iter().any(is_it) {
+            return Vec::new();
+        }
+        let mut news = vec![News {
+            robot: robot.clone(),
+            at,
+            told: *told,
+        }];
+        // Its words are not told again, and its values say it all.
+        if matches!(news[0].told, Told::Thinks(_)) {
+            let told = Told::Thought(Text::default());
+            news.push(News { robot, at, told });
+        }
+        news
+    }
+
+    /// Keeps what was said, by when it was.
+    fn keep(&mut self, news: News) {
+        let later = self.kept.iter().rev();
+        let later = later.take_while(|other| other.at > news.at).count();
+        self.kept.insert(self.kept.len() - later, news);
+        if self.kept.len() > Subscription::KEPT {
+            self.kept.pop_front();
+        }
+    }
+
     /// Hands on what robots have said. It waits for nobody.
     pub(crate) fn hand_on(&mut self, news: Vec<News>) {
-        for news in news {
+        for news in news
+            .into_iter()
+            .flat_map(|news| self.recalled(news))
+            .collect::<Vec<_>>()
+        {
             if let Told::Replied { number, reply } = news.told {
                 if let Some(to) = self.replies.remove(&(news.robot, number)) {
                     // Whoever has asked may have given up.
@@ -120,10 +165,7 @@ impl Outlets {
                 }
                 continue;
             }
-            if self.kept.len() == Subscription::KEPT {
-                self.kept.pop_front();
-            }
-            self.kept.push_back(news.clone());
+            self.keep(news.clone());
             self.subscribers
                 .retain(|(to, lost)| match to.try_send(news.clone()) {
                     Ok(()) => true,

@@ -34,10 +34,13 @@ use lager_wire::OperatorArm;
 use crate::awaited::{Awaited, Outlets, Saved, Saving, Subscription};
 use crate::given::Given;
 use crate::robot::Doing;
-use crate::shown::Shown;
-use crate::station::{Station, Wish, WishRefused};
+use crate::shown::{Shown, Told};
+use crate::station::{News, Station, Wish, WishRefused};
 use crate::warehouse::{Warehouse, WarehouseError};
 use crate::wheel::Key;
+
+/// What the station's clock shows when it starts: what robots tell of before that has a moment, too.
+const ORIGIN: Duration = Duration::from_hours(24);
 
 /// The station, for any thread; clones are of the same one.
 #[derive(Clone, Debug)]
@@ -136,6 +139,16 @@ impl Handle {
         });
         self.wake();
         stopped
+    }
+
+    /// Keeps that somebody here has asked something of a robot, for whoever reads what has happened.
+    pub fn note(&self, robot: &Name, by: &str, what: &str) {
+        let told = Told::Asked {
+            by: by.to_owned(),
+            what: what.to_owned(),
+        };
+        let (robot, at) = (robot.clone(), self.now());
+        self.work(|state| state.outlets.hand_on(vec![News { robot, at, told }]));
     }
 
     /// Lets `who` drive a robot, and nobody else as long as the driver is there and says something
@@ -314,7 +327,7 @@ impl Handle {
 
     /// The station's clock.
     pub fn now(&self) -> Duration {
-        self.shared.start.elapsed()
+        ORIGIN + self.shared.start.elapsed()
     }
 
     fn wake(&self) {

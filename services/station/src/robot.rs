@@ -343,7 +343,11 @@ impl Robot {
                 self.told_news.extend(told.filter(|told| match told {
                     // What nobody waits for is no news.
                     Told::Replied { number, .. } => self.asked.close(*number),
-                    Told::Event(_) | Told::Thinks(_) | Told::Thought(_) => true,
+                    Told::Event(_)
+                    | Told::Thinks(_)
+                    | Told::Thought(_)
+                    | Told::Past { .. }
+                    | Told::Asked { .. } => true,
                 }));
             }
         }

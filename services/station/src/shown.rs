@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lager_lines::extension::{
-    Block, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
+    Block, Edge, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
 };
 use lager_lines::{Coord, Text};
 use lager_wire::LineReading;
@@ -37,6 +37,8 @@ pub struct Shown {
     pub blocked: Option<Seen<Listed<Block>>>,
     /// What it fetches next by itself, after what it is on.
     pub queue: Option<Seen<Listed<Queued>>>,
+    /// What stands on ways of its simulated world.
+    pub obstacles: Option<Seen<Listed<Edge>>>,
     /// How long it takes to react, about once a second.
     pub latency: Option<Seen<Box<Latency>>>,
     /// What each line sensor has read in the last calibration, the leftmost first.
@@ -68,6 +70,20 @@ pub enum Told {
     Thinks(Box<Thinks>),
     /// It has thought something.
     Thought(Text),
+    /// One of these, so long before it was told.
+    Past {
+        /// How long, by the robot's clock.
+        ago: Duration,
+        /// What.
+        told: Box<Told>,
+    },
+    /// Somebody here has asked something of it, which is under way.
+    Asked {
+        /// Who, as the station calls him.
+        by: String,
+        /// What: the words of an action, `stop`, `take` or `free`.
+        what: String,
+    },
     /// It has answered the action or the stop with this number.
     Replied {
         /// The number.
@@ -89,6 +105,12 @@ impl Shown {
             Report::Queue(value) => self.queue = Some(Seen { value, at }),
             Report::Latency(value) => self.latency = Some(Seen { value, at }),
             Report::Sensors(value) => self.sensors = Some(Seen { value, at }),
+            Report::Obstacles(value) => self.obstacles = Some(Seen { value, at }),
+            Report::Past { ago_ms, report } => {
+                let ago = Duration::from_millis(ago_ms);
+                let told = Box::new(self.take(*report, at)?);
+                return Some(Told::Past { ago, told });
+            }
             Report::Event(event) => return Some(Told::Event(event)),
             Report::Thinks(thinks) => return Some(Told::Thinks(thinks)),
             Report::Done { number } => return replied(number, Reply::Done),

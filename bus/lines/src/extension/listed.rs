@@ -38,6 +38,7 @@ macro_rules! listed {
 listed!(Coord, 120);
 listed!(Block, 40);
 listed!(Queued, 45);
+listed!(Edge, 64);
 
 impl<T> Listed<T> {
     /// How many there are.

@@ -5,7 +5,7 @@ use core::fmt;
 use lager_wire::LineReading;
 
 use super::fields::Degrees;
-use super::listed::{Block, Listed, Queued};
+use super::listed::{Block, Edge, Listed, Queued};
 use super::order::number;
 use super::state::State;
 use super::thinks::Thinks;
@@ -45,8 +45,17 @@ pub enum Report {
     Blocked(Listed<Block>),
     /// What it fetches next, in this order.
     Queue(Listed<Queued>),
+    /// What stands on ways of a simulated world.
+    Obstacles(Listed<Edge>),
     /// Something has happened.
     Event(Event),
+    /// Something has happened, or was thought, before this connection was there.
+    Past {
+        /// How long ago, in ms.
+        ago_ms: u64,
+        /// What: an [`Event`](Self::Event) or a thought's values.
+        report: Box<Report>,
+    },
     /// The thought that comes next, in values.
     Thinks(Box<Thinks>),
     /// How long it takes to react.
@@ -68,7 +77,8 @@ pub struct Event {
     pub order: Option<u32>,
     /// The product of that order.
     pub product: Option<ProductId>,
-    /// The reason, where there is one; with `way_blocked` the direction of the way.
+    /// The reason, where there is one; with `way_blocked` the direction of the way. With `stopped`
+    /// the cause and who has set it, with `mode` the mode, with `restarted` the service.
     pub text: Text,
 }
 
@@ -91,11 +101,23 @@ pub enum EventKind {
     Failed,
     /// The robot has found the way from the node in a direction blocked (L6).
     WayBlocked,
+    /// A stop is in force.
+    Stopped,
+    /// It is not any more.
+    Resumed,
+    /// Somebody else may drive.
+    Mode,
+    /// A service of the robot has been started anew.
+    Restarted,
+    /// The external computer is out of reach.
+    LinkLost,
+    /// It is there again.
+    LinkBack,
 }
 
 impl EventKind {
     /// Every kind.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 14] = [
         Self::InPosition,
         Self::GettingItem,
         Self::ItemDelivered,
@@ -104,6 +126,12 @@ impl EventKind {
         Self::PickupRefused,
         Self::Failed,
         Self::WayBlocked,
+        Self::Stopped,
+        Self::Resumed,
+        Self::Mode,
+        Self::Restarted,
+        Self::LinkLost,
+        Self::LinkBack,
     ];
 
     /// The word.
@@ -117,6 +145,12 @@ impl EventKind {
             Self::PickupRefused => "pickup_refused",
             Self::Failed => "failed",
             Self::WayBlocked => "way_blocked",
+            Self::Stopped => "stopped",
+            Self::Resumed => "resumed",
+            Self::Mode => "mode",
+            Self::Restarted => "restarted",
+            Self::LinkLost => "link_lost",
+            Self::LinkBack => "link_back",
         }
     }
 
@@ -203,7 +237,11 @@ impl Report {
                 |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Block>::read(reader)?))
             }
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
+            "obstacles" => {
+                |reader: &mut Reader<'_>| Ok(Self::Obstacles(Listed::<Edge>::read(reader)?))
+            }
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
+            "past" => read_past,
             "latency" => {
                 |reader: &mut Reader<'_>| Ok(Self::Latency(Box::new(Latency::read(reader)?)))
             }
@@ -220,6 +258,24 @@ fn read_stopped(reader: &mut Reader<'_>) -> Result<Report, Misread> {
     let wanted = "a time from 0 to 4294967295 ms";
     let after_ms = reader.word().number(wanted, 0, i64::from(u32::MAX))?;
     Ok(Report::Stopped { number, after_ms })
+}
+
+fn read_past(reader: &mut Reader<'_>) -> Result<Report, Misread> {
+    let wanted = "a time from 0 to 9223372036854775807 ms";
+    let ago_ms = reader.word().number(wanted, 0, i64::MAX)?;
+    let report = match reader.ahead().text {
+        "event" => {
+            reader.word();
+            Event::read(reader).map(Report::Event)?
+        }
+        "thinks" => {
+            reader.word();
+            Report::Thinks(Box::new(Thinks::read(reader)?))
+        }
+        _ => return Err(reader.ahead().misread("event or thinks")),
+    };
+    let report = Box::new(report);
+    Ok(Report::Past { ago_ms, report })
 }
 
 fn read_sensors(reader: &mut Reader<'_>) -> Result<[LineReading; 11], Misread> {
@@ -255,7 +311,8 @@ fn read_or_dash<T>(
 impl Event {
     fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
         let wanted = "one of in_position, getting_item, item_delivered, next_node, refused, \
-                      pickup_refused, failed and way_blocked";
+                      pickup_refused, failed, way_blocked, stopped, resumed, mode, restarted, \
+                      link_lost and link_back";
         Ok(Self {
             kind: reader.word().read(wanted, EventKind::from_word)?,
             node: Coord::read(reader)?,
@@ -322,7 +379,9 @@ impl fmt::Display for Report {
             Self::Route(nodes) => write!(formatter, "route {nodes}"),
             Self::Blocked(ways) => write!(formatter, "blocked {ways}"),
             Self::Queue(orders) => write!(formatter, "queue {orders}"),
+            Self::Obstacles(edges) => write!(formatter, "obstacles {edges}"),
             Self::Event(event) => write!(formatter, "event {event}"),
+            Self::Past { ago_ms, report } => write!(formatter, "past {ago_ms} {report}"),
             Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),
             Self::Latency(latency) => write!(formatter, "latency {latency}"),
             Self::Truth(truth) => write!(formatter, "truth {truth}"),

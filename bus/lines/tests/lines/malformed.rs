@@ -96,7 +96,8 @@ const ANSWER: &str = "one of sidelength, karta, prodlis, prodlist, fetchprod, ar
 const ACTION: &str = "one of order, cancel, first, up, clear, mode, resume, reset, place, \
                       picked, pick, drive, arm, gains, calibrate and obstacle";
 const EVENT: &str = "one of in_position, getting_item, item_delivered, next_node, refused, \
-                     pickup_refused, failed and way_blocked";
+                     pickup_refused, failed, way_blocked, stopped, resumed, mode, restarted, \
+                     link_lost and link_back";
 
 #[test]
 fn requests_that_are_none() {

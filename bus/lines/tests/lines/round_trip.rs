@@ -220,6 +220,42 @@ prop_compose! {
     }
 }
 
+fn event() -> impl Strategy<Value = Report> {
+    (
+        select(&EventKind::ALL),
+        coord(),
+        any::<Option<u32>>(),
+        of(product_id()),
+        text(),
+    )
+        .prop_map(|(kind, node, order, product, text)| {
+            Report::Event(Event {
+                kind,
+                node,
+                order,
+                product,
+                text,
+            })
+        })
+}
+
+/// Of what has happened before a line has room for what an event says, with the time before it.
+fn past() -> impl Strategy<Value = Report> {
+    let thinks = thinks().prop_map(|thinks| Report::Thinks(Box::new(thinks)));
+    let short = event().prop_map(|report| match report {
+        Report::Event(event) => Report::Event(Event {
+            text: Text::default(),
+            ..event
+        }),
+        other => other,
+    });
+    let ago_ms = 0..=i64::MAX as u64;
+    (ago_ms, prop_oneof![thinks, short]).prop_map(|(ago_ms, report)| Report::Past {
+        ago_ms,
+        report: Box::new(report),
+    })
+}
+
 fn report() -> impl Strategy<Value = Report> {
     let queued =
         (any::<u32>(), product_id()).prop_map(|(order, product)| Queued { order, product });
@@ -236,22 +272,10 @@ fn report() -> impl Strategy<Value = Report> {
             .prop_map(|all| Report::Blocked(Listed::<Block>::new(&all))),
         prop::collection::vec(queued, many)
             .prop_map(|all| Report::Queue(Listed::<Queued>::new(&all))),
-        (
-            select(&EventKind::ALL),
-            coord(),
-            any::<Option<u32>>(),
-            of(product_id()),
-            text()
-        )
-            .prop_map(|(kind, node, order, product, text)| {
-                Report::Event(Event {
-                    kind,
-                    node,
-                    order,
-                    product,
-                    text,
-                })
-            }),
+        prop::collection::vec(edge(), 0..200_usize)
+            .prop_map(|all| Report::Obstacles(Listed::<Edge>::new(&all))),
+        event(),
+        past(),
         (
             any::<u32>(),
             prop::collection::vec(0..=Latency::MOST, Latency::BUCKETS)

@@ -37,6 +37,8 @@ coded! {
         NoBoard = 2,
         /// It came when its time was over; nothing was done.
         Late = 3,
+        /// Not while the robot drives by itself.
+        UnderWay = 4,
     }
 }
 
@@ -52,6 +54,9 @@ impl fmt::Display for Outcome {
             Self::NoBoard => {
                 "the board that would have to do it is not connected; `lager topic echo \
                  link/health` shows the links"
+            }
+            Self::UnderWay => {
+                "the robot is on its way by itself; stop it or drive it by hand before that"
             }
             Self::Late => {
                 "it was found when its time was over, since somebody was held up; nothing was \

@@ -6,7 +6,7 @@
 use core::time::Duration;
 
 use lager_topics::{Answer, Ask, AskKind, Mode, Outcome};
-use lager_wire::{Callsign, SettingKey, Version};
+use lager_wire::{Callsign, Command, SettingKey, Version, WheelCommand};
 
 use super::action::News;
 use super::{Asked, BridgeCore};
@@ -57,6 +57,8 @@ impl BridgeCore {
                 let gains = [ask.gain_p.into(), ask.gain_d.into()];
                 self.set(now.robot, &[SettingKey::GainP, SettingKey::GainD], &gains)
             }
+            // Its thresholds would be those of what it happens to drive over.
+            (Some(AskKind::Calibrate), _) if self.is_under_way() => Answered(Outcome::UnderWay),
             // Done means that it has begun; `link/health` tells its end.
             (Some(AskKind::Calibrate), _) => self.set(now.robot, &[SettingKey::Calibrate], &[1]),
             (Some(AskKind::ResetBoards), _) => {
@@ -65,6 +67,14 @@ impl BridgeCore {
             }
             (Some(AskKind::SetMode), None) | (None, _) => Answered(Outcome::Refused),
         });
+    }
+
+    /// Whether logic drives the robot now.
+    fn is_under_way(&self) -> bool {
+        let standby = Command::Wheel(WheelCommand::Standby);
+        let mut running = self.arbiter.current().into_iter();
+        let drives = running.any(|(_, command)| command != standby);
+        drives && self.arbiter.mode() == Mode::Autonomous && !self.arbiter.is_stopped()
     }
 
     /// The answer, once it can be given and its content is in force.

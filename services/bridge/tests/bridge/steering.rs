@@ -294,6 +294,27 @@ fn a_calibration_is_answered_by_the_sensor_board_or_given_up() {
 }
 
 #[test]
+fn one_that_drives_by_itself_is_not_calibrated() {
+    let mut robot = Robot::autonomous();
+    let ask = Ask {
+        kind: AskKind::Calibrate.into(),
+        ..Ask::default()
+    };
+    let mut asked = || {
+        robot.hands.give(logic(1, FOLLOW));
+        robot.hands.ask(ask).outcome.get()
+    };
+    wait_until("it is refused while the wheels turn", || {
+        asked() == Some(Outcome::UnderWay)
+    });
+    robot.hands.stop();
+    robot
+        .hands
+        .wait_for_health("the stop is latched", |health| health.stopped == 1);
+    assert_eq!(robot.hands.ask(ask).outcome.get(), Some(Outcome::Done));
+}
+
+#[test]
 fn the_robot_can_be_steered_while_a_board_is_asked() {
     let mut robot = Robot::up();
     robot.sensor.with(|board| board.deaf = true);

@@ -7,7 +7,9 @@ use core::time::Duration;
 
 use lager_lines::extension::{Action as Wanted, Edge, Mode as WantedMode, Pick as WantedPick, Put};
 use lager_lines::{LATEST_MOVE, TooLate};
-use lager_topics::{Ask, AskKind, Goal, Mode, Order, Phase, Pick, Refusal, WorldAsk, WorldAskKind};
+use lager_topics::{
+    Ask, AskKind, Goal, Mode, Order, Outcome, Phase, Pick, Refusal, WorldAsk, WorldAskKind,
+};
 use lager_wire::{Command, OperatorCommand, WheelCommand};
 
 use super::{Conversation, MOST_STOPS, STOPPED};
@@ -230,7 +232,10 @@ impl Conversation {
                     },
                 );
             }
-            Wanted::Calibrate => self.ask_bridge(now, asker, kind(AskKind::Calibrate)),
+            Wanted::Calibrate => {
+                self.may_be_calibrated()?;
+                self.ask_bridge(now, asker, kind(AskKind::Calibrate));
+            }
             Wanted::Gains { p, d } => self.ask_bridge(
                 now,
                 asker,
@@ -261,6 +266,17 @@ impl Conversation {
             return Err("the robot is moving; drive it by hand or stop it first".into());
         }
         Ok(())
+    }
+
+    /// The thresholds of one that is on its way would be those of what it happens to drive over, and
+    /// it may drive off at any moment. The bridge refuses it of one that drives, whoever asks.
+    fn may_be_calibrated(&self) -> Result<(), String> {
+        let is_by_itself = self.known.mode() == Some(Mode::Autonomous) && !self.known.is_stopped();
+        let has_order = self.known.queue.is_some_and(|queue| queue.under_way != 0);
+        match is_by_itself && has_order {
+            true => Err(Outcome::UnderWay.to_string()),
+            false => Ok(()),
+        }
     }
 
     /// An order is taken back as long as its goods are not held.

@@ -2,9 +2,10 @@
 
 use lager_lines::Coord;
 use lager_lines::conversation::RobotLine;
-use lager_lines::extension::Report;
+use lager_lines::extension::{EventKind, Report};
 use lager_topics::{
-    Answer, Event, Health, NavigatorStatus, OrderQueue, Route, SteeringReport, Thought, WorldAnswer,
+    Answer, Event, Health, NavigatorStatus, OrderQueue, Role, Route, SteeringReport, Thought,
+    WorldAnswer,
 };
 
 use super::{AGAIN, Conversation, STOPPED};
@@ -16,8 +17,9 @@ use crate::telling;
 impl Conversation {
     /// The bridge has told who may steer.
     pub fn health(&mut self, now: Moment, health: &Health) {
-        let mode_before = self.known.mode();
-        self.known.health = Some(*health);
+        let before = self.known.health.replace(*health);
+        self.note(now, before.as_ref(), health);
+        let mode_before = before.and_then(|before| before.mode.get());
         if self.known.mode() != mode_before {
             // What was begun in one mode has no meaning in the other.
             self.driving.let_go("the mode has been changed");
@@ -60,9 +62,8 @@ impl Conversation {
             // It was refused.
             self.ask_from_ns = now.ns + AGAIN;
         }
-        if self.is_extended {
-            let report = telling::event(event, &self.known);
-            self.say_if_up(report.map(RobotLine::Report));
+        if let Some(report) = telling::event(event, &self.known) {
+            self.remember(now, report);
         }
         self.settle();
         self.ask(now);
@@ -112,10 +113,55 @@ impl Conversation {
 
     /// A service has thought something.
     pub fn thought(&mut self, thought: &Thought) {
-        if self.is_extended {
-            self.say_if_up(Some(RobotLine::Report(telling::thinks(thought))));
-        }
+        let now = Moment {
+            ns: self.turned_ns,
+            ..Moment::default()
+        };
+        self.remember(now, telling::thinks(thought));
         self.think(&thought.to_string());
+    }
+
+    /// A service has published, whose life began then by its samples' stamps.
+    pub fn lives(&mut self, now: Moment, service: Role, since: u64) {
+        if self
+            .lives
+            .insert(service, since)
+            .is_some_and(|before| before != since)
+        {
+            self.happened(now, EventKind::Restarted, service.as_str());
+        }
+    }
+
+    /// This process itself has been started anew.
+    pub fn lives_again(&mut self, now: Moment) {
+        self.happened(now, EventKind::Restarted, Role::Comm.as_str());
+    }
+
+    /// Tells what of the bridge's word is news to a person: stops and who may drive.
+    fn note(&mut self, now: Moment, before: Option<&Health>, health: &Health) {
+        let Some(before) = before else { return };
+        let is_another = before.stopped_at_ns != health.stopped_at_ns;
+        if health.stopped != 0 && (before.stopped == 0 || is_another) {
+            self.happened(now, EventKind::Stopped, &telling::stop_words(health));
+        } else if before.stopped != 0 && health.stopped == 0 {
+            self.happened(now, EventKind::Resumed, "");
+        }
+        if let Some(mode) = health.mode.get().filter(|_| before.mode != health.mode) {
+            self.happened(now, EventKind::Mode, telling::mode(mode).as_str());
+        }
+    }
+
+    pub(super) fn happened(&mut self, now: Moment, kind: EventKind, text: &str) {
+        let report = telling::happened(kind, text, &self.known);
+        self.remember(now, report);
+    }
+
+    /// Tells it to a station that speaks the extension, and keeps it for one that comes later.
+    fn remember(&mut self, now: Moment, report: Report) {
+        self.memory.keep(now.ns, report.clone());
+        if self.is_extended {
+            self.say_if_up(Some(RobotLine::Report(report)));
+        }
     }
 
     /// What became of an [`Action::Ask`]; `Err` is why nobody knows.

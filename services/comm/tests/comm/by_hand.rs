@@ -262,7 +262,12 @@ fn the_warehouse_is_asked_for_where_the_extension_is_spoken_and_nobody_drives() 
     // By one connection is enough.
     robot.disconnect();
     robot.connect();
-    assert_eq!(robot.hears(&["lager 1 station"]), [""; 0]);
+    // What happened before is all that it tells.
+    let said = robot.hears(&["lager 1 station"]);
+    assert!(
+        said.iter().all(|line| line.starts_with("past ")),
+        "{said:?}"
+    );
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod bounds;
 mod scene;
+mod stop;
 mod wheel;
 
 use std::net::SocketAddr;

@@ -77,6 +77,26 @@ impl Running {
         String::from_utf8_lossy(&answer).into_owned()
     }
 
+    /// The answer to STOP by a form of this body.
+    pub(crate) fn stop(&self, body: &str, headers: &[(&str, &str)]) -> String {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(WATCHDOG)).unwrap();
+        let length = body.len();
+        let mut request = format!(
+            "POST /stop HTTP/1.1\r\nConnection: close\r\nContent-Length: {length}\r\n\
+             Content-Type: application/x-www-form-urlencoded\r\nHost: {}\r\n",
+            self.host()
+        );
+        for (name, value) in headers {
+            request += &format!("{name}: {value}\r\n");
+        }
+        let request = format!("{request}\r\n{body}");
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+
     pub(crate) fn host(&self) -> String {
         self.address.to_string()
     }
@@ -114,6 +134,11 @@ impl Running {
                     if writeln!(to, "done {number}").is_err() {
                         return;
                     }
+                }
+                if let Some(number) = line.strip_prefix("stop ")
+                    && writeln!(to, "stopped {number} 7").is_err()
+                {
+                    return;
                 }
                 keeps.lock().unwrap().push(line);
             }

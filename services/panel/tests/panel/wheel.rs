@@ -88,10 +88,15 @@ fn what_moves_a_robot_or_how_it_drives_is_its_drivers_while_there_is_one() {
             format!("answer {number} done")
         );
     }
-    // Without a driver they are anybody's.
+    // Without a driver they are anybody's; but nobody takes a robot by hand without its wheel.
     anna.say("free r1 2");
     assert_eq!(anna.line("answer 2").unwrap(), "answer 2 done");
-    for (number, action) in (30..).zip(hers) {
+    bo.say("do r1 29 29000 mode manual");
+    assert_eq!(
+        bo.line("answer 29").unwrap(),
+        "answer 29 refused take the wheel first"
+    );
+    for (number, action) in (30..).zip(hers.into_iter().filter(|action| *action != "mode manual")) {
         bo.say(&format!("do r1 {number} {number}000 {action}"));
         assert_eq!(
             bo.line(&format!("answer {number}")).unwrap(),

@@ -5,7 +5,7 @@ use lager_lines::extension::Latency;
 use lager_topics::{
     BlockedWay, BlockedWays, DistanceFrame, Durations, Event, EventKind, Failure, FailureKind,
     Heading, LineFrame, Mode, NavigatorStatus, Phase, Remedy, Role, Route, RouteNode,
-    SERVO_UNKNOWN, SteeringReport, StopCause, Thought, ThoughtKind, Truth,
+    SERVO_UNKNOWN, SteeringReport, StopCause, Thought, ThoughtKind, Truth, TruthObstacle,
 };
 
 use super::{extended, pass, queue};
@@ -260,4 +260,109 @@ fn a_stop_and_a_failure_are_told_with_what_is_known_of_them() {
     ] {
         assert!(state.contains(field), "{field}: {state}");
     }
+}
+
+#[test]
+fn what_stands_on_ways_of_a_simulated_world_is_told_at_once_and_when_it_changes() {
+    let mut robot = extended(Mode::Autonomous);
+    let mut truth = Truth::default();
+    let mut stands = |truth: &Truth| {
+        robot.conversation.senses(Senses {
+            truth: Some(Box::new(*truth)),
+            ..Senses::default()
+        });
+        robot.shown.clear();
+        pass(&mut robot, 100);
+        let shown = robot.shown.iter();
+        let told = shown.filter(|line| line.starts_with("obstacles"));
+        told.cloned().collect::<Vec<_>>()
+    };
+    assert_eq!(stands(&truth), ["obstacles 0"]);
+    assert_eq!(stands(&truth), [""; 0], "nothing has changed");
+    truth.obstacles[0] = TruthObstacle {
+        x: 2,
+        y: 1,
+        heading: Heading::Up.into(),
+        by_chance: 0,
+    };
+    truth.obstacle_count = 1;
+    assert_eq!(stands(&truth), ["obstacles 1 2 1 up"]);
+}
+
+#[test]
+fn what_happens_to_the_robot_is_told_and_told_again_to_a_station_that_comes_later() {
+    let mut robot = extended(Mode::Autonomous);
+    let happened = |said: &[String]| -> Vec<String> {
+        let said = said.iter();
+        let events = said.filter(|line| line.starts_with("event ") || line.starts_with("past "));
+        events.cloned().collect()
+    };
+    robot.told();
+    robot.health.stopped = 1;
+    robot.health.stopped_at_ns = 5;
+    robot.health.stop_cause = StopCause::Ordered.into();
+    robot.health.stop_origin = Role::Operator.into();
+    assert_eq!(
+        happened(&robot.told()),
+        ["event stopped 0 0 - - ordered operator"]
+    );
+    robot.health.stopped = 0;
+    assert_eq!(happened(&robot.told()), ["event resumed 0 0 - -"]);
+    assert_eq!(
+        happened(&robot.mode(Mode::Manual)),
+        ["event mode 0 0 - - manual"]
+    );
+    let now = robot.now;
+    robot.conversation.lives(now, Role::Logic, 1);
+    robot.conversation.lives(now, Role::Logic, 1);
+    assert_eq!(
+        happened(&robot.done()),
+        [""; 0],
+        "it has not been seen before"
+    );
+    robot.conversation.lives(now, Role::Logic, 2);
+    assert_eq!(happened(&robot.done()), ["event restarted 0 0 - - logic"]);
+    robot.disconnect();
+    robot.leap(2_000);
+    robot.connect();
+    let said = happened(&robot.hears(&["lager 1 station"]));
+    let words = said
+        .iter()
+        .map(|line| line.splitn(3, ' ').collect::<Vec<_>>());
+    let words: Vec<_> = words.collect();
+    let events: Vec<_> = words.iter().map(|words| words[2]).collect();
+    assert_eq!(
+        events,
+        [
+            "event stopped 0 0 - - ordered operator",
+            "event resumed 0 0 - -",
+            "event mode 0 0 - - manual",
+            "event restarted 0 0 - - logic",
+            "event link_lost 0 0 - -",
+            "event link_back 0 0 - -",
+        ]
+    );
+    assert!(words.iter().all(|words| words[0] == "past"));
+    let ages: Vec<u64> = words
+        .iter()
+        .map(|words| words[1].parse().unwrap())
+        .collect();
+    assert!(ages[..5].iter().all(|age| *age >= 2_000), "{ages:?}");
+    assert!(ages.is_sorted_by(|before, after| before >= after));
+}
+
+#[test]
+fn one_that_is_on_its_way_is_not_calibrated() {
+    let mut robot = extended(Mode::Autonomous);
+    robot.told();
+    robot.queue(&queue(&[]));
+    let said = robot.hears(&["do 1 calibrate"]);
+    assert_eq!(
+        said,
+        ["refused 1 the robot is on its way by itself; stop it or drive it by hand before that"]
+    );
+    robot.health.stopped = 1;
+    robot.told();
+    robot.hears(&["do 2 calibrate"]);
+    assert!(robot.asked.is_some(), "a person moves one that is stopped");
 }

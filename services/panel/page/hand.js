@@ -1,0 +1,53 @@
+// Taking a robot by hand needs the wheel. One that is on its way is not taken by a hand that slipped: the page
+// asks first, and takes it when the time is over unless it is left to the robot.
+
+import { say, put } from "./words.js";
+
+/** How long there is to think, in ms. */
+const THINK_MS = 5_000;
+
+export class ByHand {
+  /** `take` has the robot driven by hand, `tell` says why not. */
+  constructor(link, parts, robot, take, tell) {
+    Object.assign(this, { link, parts, robot, take, tell });
+    /** The robot that is asked about, and when it is taken. */
+    this.asked = null;
+    parts.ask.onclick = () => this.ask();
+    parts.take.onclick = () => this.now();
+    parts.leave.onclick = () => this.leave();
+  }
+
+  ask() {
+    const robot = this.robot();
+    if (!robot || this.asked) return;
+    if (robot.driver !== this.link.me) return this.tell("not_driver");
+    const { mode, product, stopped } = robot.state;
+    // One that is stopped, or has nothing to do, loses nothing.
+    if (mode !== "autonomous" || product === undefined || stopped === "1") return this.take();
+    this.tell(null);
+    this.asked = { robot, product, at: performance.now() + THINK_MS };
+    this.draw(robot);
+  }
+
+  now() {
+    const { robot } = this.asked ?? {};
+    this.leave();
+    if (robot && robot === this.robot()) this.take();
+  }
+
+  leave() {
+    this.asked = null;
+    this.parts.box.hidden = true;
+  }
+
+  draw(robot) {
+    const { asked, parts } = this;
+    if (!asked) return;
+    // What it was asked about is over.
+    if (robot !== asked.robot || robot.driver !== this.link.me || robot.state.mode !== "autonomous") return this.leave();
+    const left = asked.at - performance.now();
+    if (left <= 0) return this.now();
+    parts.box.hidden = false;
+    put(parts.said, say("hand_asked", asked.product, Math.ceil(left / 1_000)));
+  }
+}

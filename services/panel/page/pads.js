@@ -1,0 +1,90 @@
+// What the gamepads say, and whether they may be believed: an entry that is dead, or that never was at
+// rest, drives nothing.
+//
+// A pad whose radio drops may leave its entry behind with the stick as it was, and comes back as a
+// second one; a pad may appear with a stick at its end. So
+//
+// - an entry counts once it was seen at rest, at least `COME_MS` after it came and `LOOK_MS` after the box was
+//   ticked;
+// - of several entries of one pad only the one that came last counts;
+// - one that has told nothing new while another one did since is not believed until it rests again.
+
+/** So long an entry that has come is only looked at: its first reading may be none. */
+const COME_MS = 150;
+/** So long all are once the box is ticked: a browser tells of what is held some time after it is asked first. */
+const LOOK_MS = 500;
+/** An entry whose news is so much older than another one's is dead, in ms of the browser's clock. */
+const FROZEN_MS = 300;
+/** How far a stick is bent that says something. */
+const BENT = 0.5;
+/** Buttons of the cross, and the axes, that say which code of the wheels; the first that is pressed counts. */
+const CODES = [
+  [2, 12, 1, -1],
+  [4, 13, 1, 1],
+  [6, 14, 0, -1],
+  [7, 15, 0, 1],
+];
+
+/** The code of the wheels that an entry says, or null. */
+function code({ axes, buttons }) {
+  const says = ([, button, axis, way]) => axes[axis] * way > BENT || buttons[button]?.pressed;
+  return CODES.find(says)?.[0] ?? null;
+}
+
+export class Pads {
+  constructor(now) {
+    this.now = now;
+    this.forget();
+    addEventListener("gamepadconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
+    addEventListener("gamepaddisconnected", ({ gamepad }) => this.known.delete(gamepad?.index));
+  }
+
+  /** Each entry is new again. */
+  forget() {
+    /** By its place in the browser's list: its pad, when it came, and whether it was seen at rest. */
+    this.known = new Map();
+    this.came = 0;
+    this.since = this.now();
+    /** The entry that says something, by its place. */
+    this.speaks = null;
+  }
+
+  /** The code of the wheels that is held on a pad, or null. */
+  read() {
+    const all = [...(navigator.getGamepads?.() ?? [])];
+    const there = all.map((pad, index) => ({ pad, index })).filter(({ pad }) => pad?.mapping === "standard" && pad.connected !== false);
+    for (const index of this.known.keys()) {
+      if (!there.some((one) => one.index === index)) this.known.delete(index);
+    }
+    for (const { pad, index } of there) this.meet(pad, index);
+    const newest = Math.max(...there.map(({ pad }) => pad.timestamp ?? 0));
+    const counts = there.filter(({ pad, index }) => this.isBelieved(pad, index, newest, there));
+    // Who speaks goes on speaking; another pad does not talk into it.
+    const speaker = counts.find(({ index }) => index === this.speaks) ?? counts.find(({ pad }) => code(pad));
+    const said = speaker ? code(speaker.pad) : null;
+    this.speaks = said ? speaker.index : null;
+    return said;
+  }
+
+  /** Learns of an entry, and whether it rests. */
+  meet(pad, index) {
+    let known = this.known.get(index);
+    if (!known || known.id !== pad.id) {
+      known = { id: pad.id, came: ++this.came, since: this.now(), rested: false };
+      this.known.set(index, known);
+    }
+    const isLookedAt = this.now() - known.since > COME_MS && this.now() - this.since > LOOK_MS;
+    if (code(pad) === null && isLookedAt) known.rested = true;
+  }
+
+  isBelieved(pad, index, newest, there) {
+    const known = this.known.get(index);
+    const isReplaced = there.some((other) => {
+      const { id, came } = this.known.get(other.index);
+      return id === known.id && came > known.came;
+    });
+    const isFrozen = code(pad) !== null && newest - (pad.timestamp ?? newest) > FROZEN_MS;
+    if (isReplaced || isFrozen) known.rested = false;
+    return known.rested;
+  }
+}

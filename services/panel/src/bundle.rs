@@ -1,0 +1,97 @@
+//! The page's modules as one script, so that a slow network brings it in one answer and has room
+//! for STOP beside it.
+//!
+//! Each module becomes a function that is called once, in the order in which they import each
+//! other:
+//!
+//! ```text
+//!   import { put, say } from "./words.js";      const { put, say } = $words;
+//!   export function doing(robot) {              function doing(robot) {
+//!                                               return { doing };
+//! ```
+//!
+//! An `import` stands in one line and names what it wants, and an `export` stands before its
+//! `const`, `function` or `class`; the page's modules say no other, and a test holds them to it.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+/// The module `entry`, such as `main`, with all that it imports; `source` finds a module's text.
+pub(crate) fn bundle<'s>(entry: &str, source: impl Fn(&str) -> Option<&'s str>) -> String {
+    let mut script = String::new();
+    add(entry, &source, &mut BTreeSet::new(), &mut script);
+    script
+}
+
+fn add<'s>(
+    name: &str,
+    source: &impl Fn(&str) -> Option<&'s str>,
+    added: &mut BTreeSet<String>,
+    script: &mut String,
+) {
+    let Some(text) = source(name).filter(|_| added.insert(name.to_owned())) else {
+        return;
+    };
+    let mut body = String::new();
+    let mut exports = Vec::new();
+    for line in text.lines() {
+        if let Some((wanted, from)) = import(line) {
+            add(from, source, added, script);
+            let _ = writeln!(body, "const {{ {wanted} }} = ${from};");
+        } else if let Some(rest) = line.strip_prefix("export ") {
+            exports.extend(exported(rest));
+            body.push_str(rest);
+            body.push('\n');
+        } else if !line.trim_start().starts_with("//") {
+            body.push_str(line);
+            body.push('\n');
+        }
+    }
+    let exports = exports.join(", ");
+    let _ = write!(
+        script,
+        "const ${name} = (() => {{\n{body}return {{ {exports} }};\n}})();\n"
+    );
+}
+
+/// What a line imports, and from which module.
+fn import(line: &str) -> Option<(&str, &str)> {
+    let (wanted, from) = line.strip_prefix("import { ")?.split_once(" } from \"./")?;
+    Some((wanted, from.strip_suffix(".js\";")?))
+}
+
+/// The name that an `export` gives out.
+fn exported(rest: &str) -> Option<&str> {
+    let rest = rest.strip_prefix("async ").unwrap_or(rest);
+    let (_, rest) = ["const ", "function ", "class "].iter().find_map(|word| {
+        rest.split_once(word)
+            .filter(|(before, _)| before.is_empty())
+    })?;
+    rest.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_')
+        .next()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modules_become_one_script_each_once_and_before_who_needs_it() {
+        let source = |name: &str| match name {
+            "main" => {
+                Some("import { b } from \"./b.js\";\nimport { c, d } from \"./c.js\";\nb(c);\n")
+            }
+            "b" => Some(
+                "// What b is.\nimport { c } from \"./c.js\";\nexport function b(x) {\n  return x + c;\n}\n",
+            ),
+            "c" => Some("export const c = 1;\nexport class d {}\nconst hidden = 2;\n"),
+            _ => None,
+        };
+        assert_eq!(
+            bundle("main", source),
+            "const $c = (() => {\nconst c = 1;\nclass d {}\nconst hidden = 2;\nreturn { c, d };\n})();\n\
+             const $b = (() => {\nconst { c } = $c;\nfunction b(x) {\n  return x + c;\n}\nreturn { b };\n})();\n\
+             const $main = (() => {\nconst { b } = $b;\nconst { c, d } = $c;\nb(c);\nreturn {  };\n})();\n"
+        );
+    }
+}
