@@ -85,6 +85,7 @@
 //! blocked <int> {<edge> <int>}         ways that are not taken, likewise, and since when, in s of
 //!                                      the robot's clock
 //! queue <int> {<order> <prodid>}       what is fetched next, likewise
+//! gone <int> {<prodid>}                products whose goods are not in their place, likewise
 //! event <event> <coord> <order> <prodid> [<text>]
 //!                                      at that node; `-` where there is no order or product
 //! latency <int> {<int> <int>}          how long sensor frames took to logic's decision: the longest
@@ -108,8 +109,8 @@
 //! is divided into four equal parts. Bucket 89 holds what took longer than 2^30 ns. A bucket
 //! counts the frames since the robot made such a line before, at most 999999.
 //!
-//! Here a list may be empty, and `route`, `blocked`, `queue` and `sensors` are sent when they have
-//! changed. A line that cannot be read changes nothing; if it has a number the robot answers
+//! Here a list may be empty, and `route`, `blocked`, `queue`, `gone` and `sensors` are sent when they
+//! have changed. A line that cannot be read changes nothing; if it has a number the robot answers
 //! `refused`.
 //!
 //! ```

@@ -33,6 +33,7 @@ pub(crate) struct Telling {
     route: Option<Report>,
     blocked: Option<Report>,
     queue: Option<Report>,
+    gone: Option<Report>,
     sensors: Option<Report>,
     /// What was counted when the latency was told last.
     latency: Durations,
@@ -72,6 +73,7 @@ impl Telling {
             (&mut self.route, known.route.as_deref().map(route)),
             (&mut self.blocked, blocks.as_deref().map(blocked)),
             (&mut self.queue, known.queue.as_ref().map(queue)),
+            (&mut self.gone, known.queue.as_ref().map(gone)),
             (&mut self.sensors, known.health.as_ref().and_then(sensors)),
         ];
         for (told, list) in lists {
@@ -85,7 +87,7 @@ impl Telling {
 }
 
 /// Kinds of reports of which a newer one replaces an older one.
-pub(crate) const KINDS: usize = 7;
+pub(crate) const KINDS: usize = 8;
 
 /// Which of the kinds a report is, the first to be told first; `None` where each counts.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
@@ -97,6 +99,7 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Queue(_) => Some(4),
         Report::Latency(_) => Some(5),
         Report::Sensors(_) => Some(6),
+        Report::Gone(_) => Some(7),
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }
@@ -344,6 +347,14 @@ fn queue(queue: &OrderQueue) -> Report {
         })
         .collect();
     Report::Queue(Listed::<Queued>::new(&orders))
+}
+
+fn gone(queue: &OrderQueue) -> Report {
+    let products = queue.gone().iter();
+    let products: Vec<_> = products
+        .filter_map(|gone| ProductId::new(gone.product))
+        .collect();
+    Report::Gone(Listed::<ProductId>::new(&products))
 }
 
 /// What the line sensors read while they are calibrated, once all have been heard.

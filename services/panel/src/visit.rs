@@ -62,7 +62,7 @@ pub(crate) struct Visit {
 /// When what a page was told of a robot last was new.
 #[derive(Debug, Default)]
 struct LastTold {
-    at: [Option<Duration>; 7],
+    at: [Option<Duration>; 8],
 }
 
 impl Visit {
@@ -300,7 +300,7 @@ impl Visit {
         for (number, saving) in std::mem::take(&mut self.saving) {
             match saving.wait(Duration::ZERO) {
                 None => self.saving.push((number, saving)),
-                Some(Ok(())) => self.answer(number, "done"),
+                Some(Ok(())) => self.answer(number, &format!("done {}", saving.sentence())),
                 Some(Err(why)) => self.refuse(number, &why),
             }
         }
@@ -394,6 +394,9 @@ impl Visit {
         }
         if let Some(seen) = &shown.sensors {
             tell(6, seen.at, &|| Report::Sensors(seen.value));
+        }
+        if let Some(seen) = &shown.gone {
+            tell(7, seen.at, &|| Report::Gone(seen.value.clone()));
         }
     }
 }

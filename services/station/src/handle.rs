@@ -23,6 +23,7 @@
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -51,6 +52,8 @@ pub(crate) struct Shared {
     changed: Condvar,
     /// Wakes the thread of the sockets.
     waker: UnixStream,
+    /// The warehouse's file, if it has one.
+    kept_in: Option<PathBuf>,
     /// The origin of the station's clock.
     start: Instant,
 }
@@ -165,15 +168,18 @@ impl Handle {
     }
 
     /// Gives the station another warehouse, which is then saved. It is in force even if the disk
-    /// does not take it.
+    /// does not take it. What robots do with it that know another one already, the sentence of the
+    /// [`Saving`] says.
     ///
     /// # Errors
     ///
     /// When there can be no such warehouse.
     pub fn set_warehouse(&self, warehouse: Warehouse) -> Result<Saving, WarehouseError> {
+        let kept_in = self.shared.kept_in.clone();
         let result = self.work(|state| {
             state.station.set_warehouse(warehouse)?;
-            Ok(state.outlets.save())
+            let robots = state.station.tell_goods();
+            Ok(state.outlets.save(kept_in, robots))
         });
         self.wake();
         result
@@ -244,7 +250,7 @@ impl Drop for Driver {
 
 /// The station as it is.
 impl Handle {
-    pub(crate) fn new(station: Station, waker: UnixStream) -> Self {
+    pub(crate) fn new(station: Station, waker: UnixStream, kept_in: Option<PathBuf>) -> Self {
         Self {
             shared: Arc::new(Shared {
                 state: Mutex::new(State {
@@ -254,6 +260,7 @@ impl Handle {
                 }),
                 changed: Condvar::new(),
                 waker,
+                kept_in,
                 start: Instant::now(),
             }),
         }

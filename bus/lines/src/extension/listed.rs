@@ -38,6 +38,7 @@ macro_rules! listed {
 listed!(Coord, 120);
 listed!(Block, 40);
 listed!(Queued, 45);
+listed!(ProductId, 85);
 
 impl<T> Listed<T> {
     /// How many there are.
@@ -132,6 +133,12 @@ pub struct Queued {
     pub order: u32,
     /// What is fetched.
     pub product: ProductId,
+}
+
+impl ProductId {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
+        Self::from_word(reader.word())
+    }
 }
 
 impl Queued {

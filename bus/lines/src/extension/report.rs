@@ -45,6 +45,8 @@ pub enum Report {
     Blocked(Listed<Block>),
     /// What it fetches next, in this order.
     Queue(Listed<Queued>),
+    /// Products whose goods are not in their place: delivered, or not found there.
+    Gone(Listed<ProductId>),
     /// Something has happened.
     Event(Event),
     /// The thought that comes next, in values.
@@ -203,6 +205,7 @@ impl Report {
                 |reader: &mut Reader<'_>| Ok(Self::Blocked(Listed::<Block>::read(reader)?))
             }
             "queue" => |reader: &mut Reader<'_>| Ok(Self::Queue(Listed::<Queued>::read(reader)?)),
+            "gone" => |reader: &mut Reader<'_>| Ok(Self::Gone(Listed::<ProductId>::read(reader)?)),
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
             "latency" => {
                 |reader: &mut Reader<'_>| Ok(Self::Latency(Box::new(Latency::read(reader)?)))
@@ -322,6 +325,7 @@ impl fmt::Display for Report {
             Self::Route(nodes) => write!(formatter, "route {nodes}"),
             Self::Blocked(ways) => write!(formatter, "blocked {ways}"),
             Self::Queue(orders) => write!(formatter, "queue {orders}"),
+            Self::Gone(products) => write!(formatter, "gone {products}"),
             Self::Event(event) => write!(formatter, "event {event}"),
             Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),
             Self::Latency(latency) => write!(formatter, "latency {latency}"),

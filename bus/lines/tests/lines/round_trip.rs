@@ -234,8 +234,10 @@ fn report() -> impl Strategy<Value = Report> {
             .prop_map(|all| Report::Route(Listed::<Coord>::new(&all))),
         prop::collection::vec(block(), many.clone())
             .prop_map(|all| Report::Blocked(Listed::<Block>::new(&all))),
-        prop::collection::vec(queued, many)
+        prop::collection::vec(queued, many.clone())
             .prop_map(|all| Report::Queue(Listed::<Queued>::new(&all))),
+        prop::collection::vec(product_id(), many)
+            .prop_map(|all| Report::Gone(Listed::<ProductId>::new(&all))),
         (
             select(&EventKind::ALL),
             coord(),
