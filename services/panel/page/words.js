@@ -50,7 +50,6 @@ const TABLE = {
     hand_asked: "The robot is fetching {0}. It is taken by hand in {1} s.", hand_now: "By hand now", hand_leave: "Leave it to the robot",
     place_unknown: "place unknown", placed: "obstacle that stands there", found: "found blocked", legend: "bar: an obstacle stands there; cross: found blocked", text_placed: "Obstacles stand at: {0}.",
     side_limits: "the robot drives in squares of {0} cm or more; these are {1} cm", size_limits: "the robot knows up to {0} squares along a side; here are {1}", goods_limits: "the robot knows up to {0} goods; here are {1}",
-    saved_here: "saved at the station; a robot that is up keeps its floor until it starts again",
   },
   sv: {
     add_product: "Lägg till vara", age: "hörd för {0} sedan", arm: "Arm", arm_waits: "Roboten kör: stanna först, flytta sedan armen.",
@@ -102,7 +101,6 @@ const TABLE = {
     hand_asked: "Roboten hämtar {0}. Den tas för hand om {1} s.", hand_now: "För hand nu", hand_leave: "Låt roboten köra",
     place_unknown: "okänd plats", placed: "hinder som står där", found: "funnen spärrad", legend: "balk: ett hinder står där; kryss: funnen spärrad", text_placed: "Hinder står vid: {0}.",
     side_limits: "roboten kör i rutor om minst {0} cm; dessa är {1} cm", size_limits: "roboten kan högst {0} rutor längs en sida; här är {1}", goods_limits: "roboten kan högst {0} varor; här är {1}",
-    saved_here: "sparat i stationen; en robot som är igång behåller sitt golv tills den startar om",
   },
 };
 
