@@ -42,7 +42,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     rehearse(&config)?;
 
     let folder = RuntimeFolder::create(&config)?;
-    let lock = folder.lock()?;
+    let mut lock = folder.lock()?;
     if config.body != Body::Serial {
         config.serial.sensor = folder.sensor_port();
         config.serial.steering = folder.steering_port();
@@ -53,7 +53,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         // The ports may be those of an emulator that somebody else runs.
         Body::Serial => {}
     }
-    let mut external = external::choose(&mut config, args.headless)?;
+    let mut external = external::choose(&mut config, &mut lock, args.headless)?;
     external.gateway = gateway::promise(&config)?;
     folder.write_config(&config)?;
     let mission = ordered(&config, &external, products)?;
@@ -243,6 +243,9 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     }
     if let Some(gag) = &args.gag {
         config.station.gag = Some(std::path::absolute(gag)?);
+    }
+    if let Some(secret) = &args.secret {
+        config.comm.secret = Some(secret.clone());
     }
     if let Some(panel) = args.panel {
         config.station.panel = Some(panel);

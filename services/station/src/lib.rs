@@ -24,6 +24,7 @@ mod asked;
 mod awaited;
 mod connection;
 mod given;
+mod gate;
 mod handle;
 mod queues;
 mod robot;
@@ -32,6 +33,7 @@ mod server;
 mod shown;
 mod station;
 mod unread;
+mod waiting;
 mod warehouse;
 mod wheel;
 
