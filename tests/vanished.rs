@@ -240,6 +240,7 @@ fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
     let server = Server::open(ServerConfig {
         name: Name::new("tester").expect("a name"),
         listen: Listen::On(scene.listener()),
+        secrets: Secrets::default(),
         gag: None,
         warehouse: None,
         fetch: Vec::new(),
