@@ -26,8 +26,9 @@ use std::time::{Duration, Instant};
 
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
+use lager_lines::secret::Secrets;
 use lager_ports::Clock;
-use lager_station::{Doing, Listen, Server, ServerConfig};
+use lager_station::{Doing, Listen, Server, ServerConfig, Station};
 use lager_tests::{alone, wait_for};
 use lager_topics::TruthPose;
 use rustix::thread::{LinkNameSpaceType, move_into_link_name_space};
@@ -239,6 +240,7 @@ fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
     let server = Server::open(ServerConfig {
         name: Name::new("tester").expect("a name"),
         listen: Listen::On(scene.listener()),
+        secrets: Secrets::default(),
         gag: None,
         warehouse: None,
         fetch: Vec::new(),
@@ -299,6 +301,7 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
     let server = Server::open(ServerConfig {
         name: Name::new("tester").expect("a name"),
         listen: Listen::At(format!("{OURS}:0").parse().expect("an address")),
+        secrets: Secrets::default(),
         gag: None,
         warehouse: None,
         otherwise: None,
@@ -311,14 +314,18 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
     let until = Arc::clone(&ends);
     let serves = std::thread::spawn(move || server.run(&until).expect("it serves"));
 
-    // As many as there are places.
+    // As many as there are places for one address, and one more.
     let crowd = network.inside(|| {
-        let robots = (0..Server::MOST_ROBOTS).map(|number| robot(at, &format!("far-{number}")));
+        let robots = 0..Station::MOST_OF_ONE_ADDRESS;
+        let robots = robots.map(|number| robot(at, &format!("far-{number}")));
         let mut robots: Vec<_> = robots.collect();
         assert!(robots.iter_mut().all(is_answered));
+        let mut one_more = robot(at, "far-too-many");
+        let mut line = String::new();
+        one_more.read_line(&mut line).expect("it is told");
+        assert!(line.starts_with("thought "), "there is no place: {line}");
         robots
     });
-    assert!(!is_answered(&mut robot(at, "near")), "there is no place");
     let away = || {
         let robots = handle.robots();
         let away = robots.iter().filter(|view| view.doing == Doing::Away);
@@ -331,7 +338,7 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
         (away() == crowd.len()).then_some(())
     });
     println!("all were away after {} ms", start.elapsed().as_millis());
-    assert!(is_answered(&mut robot(at, "near")), "there is room again");
+    assert!(is_answered(&mut robot(at, "near")), "there is room");
     ends.store(true, Ordering::SeqCst);
     serves.join().expect("it has ended");
     network.comes_back();

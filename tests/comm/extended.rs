@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
 use lager_lines::extension::{Action, State};
+use lager_lines::secret::Secrets;
 use lager_station::{Handle, Listen, Reply, Server, ServerConfig};
 use lager_tests::wait_for;
 
@@ -197,6 +198,7 @@ impl Served {
         let server = Server::open(ServerConfig {
             name: Name::new("tester").expect("a name"),
             listen: Listen::On(scene.listener()),
+            secrets: Secrets::default(),
             gag: None,
             warehouse: None,
             otherwise: None,

@@ -11,6 +11,7 @@ mod late;
 mod lost;
 mod pace;
 mod peers;
+mod proved;
 mod scene;
 
 use std::fs;

@@ -110,6 +110,40 @@ fn figures_tell_what_the_robot_does_and_outlive_a_killed_gateway() {
 }
 
 #[test]
+fn half_requests_keep_nobody_from_the_figures_and_use_up_no_files() {
+    let domain = Domain::new();
+    let metrics = free();
+    let up = domain.start(&["up", "--headless", "--no-station", "--metrics", &metrics]);
+    until(&metrics, LINES, |samples| samples > 10.0);
+    let gateway = up.service("gateway").expect("a gateway");
+    let files = || {
+        let open = std::fs::read_dir(format!("/proc/{gateway}/fd")).expect("it lives");
+        open.count()
+    };
+    let before = files();
+    let crowd: Vec<_> = (0..200)
+        .map(|_| {
+            let mut half = TcpStream::connect(&metrics).expect("it listens");
+            let _ = half.write_all(b"GET /metrics HTTP/1.1\r\n");
+            half
+        })
+        .collect();
+    until(&metrics, LINES, |samples| samples > 20.0);
+    // As many as there is room for, and the one that asks.
+    assert!(files() <= before + 40, "{before} and {} files", files());
+    // Each ends, and not because this end does.
+    for mut half in crowd {
+        half.set_read_timeout(Some(lager_tests::WATCHDOG))
+            .expect("a socket");
+        let mut said = Vec::new();
+        let _ = half.read_to_end(&mut said);
+    }
+    assert_eq!(up.service("gateway"), Some(gateway), "{}", up.log());
+    drop(up);
+    domain.assert_clean();
+}
+
+#[test]
 fn one_that_stands_alone_says_where_it_is_and_refuses_names_and_a_taken_address() {
     let domain = Domain::new();
     let up = domain.start(&["up", "--headless"]);

@@ -144,7 +144,7 @@ pub(crate) fn the_words_are_swedish_for_who_reads_swedish(_scene: &mut Scene, pa
 }
 
 pub(crate) fn the_display_on_the_robot_stops_it(scene: &mut Scene, page: &mut Page) {
-    let url = format!("{}/screen", scene.url.trim_end_matches('/'));
+    let url = scene.screen();
     page.call("Page.navigate", &json!({ "url": url }));
     scene.wait_to_move();
     page.wait_until("document.querySelector('.screen #figures')?.textContent.length > 0");
@@ -365,7 +365,7 @@ fn an_accessibility_checker_finds_nothing_serious() {
     }
     kill_process(comm, Signal::CONT).expect("it runs");
     page.wait_for("#link", "link ");
-    let url = format!("{}/screen", scene.url.trim_end_matches('/'));
+    let url = scene.screen();
     page.call("Page.navigate", &json!({ "url": url }));
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
     page.value(&axe);

@@ -90,7 +90,7 @@ fn of_every_view() {
     page.click("#where-ask");
     view(&mut page, "where-it-stands");
     page.click("#where-later");
-    let screen = format!("{}/screen", scene.url.trim_end_matches('/'));
+    let screen = scene.screen();
     page.call("Page.navigate", &serde_json::json!({ "url": screen }));
     page.wait_until("document.querySelector('.screen #doing')?.textContent.length > 0");
     view(&mut page, "screen");
@@ -118,7 +118,7 @@ const DRIVES: &str = "x_mm=500 y_mm=760 heading_deg=0 unsure_mm=24 next=1,2 phas
 #[test]
 #[ignore = "it makes pictures: tests/screenshots"]
 fn of_what_is_rare() {
-    let stage = Stage::new(None, false);
+    let stage = Stage::new(None);
     let mut page = stage.page(&stage.url);
     page.wait_for("#link", "No robot has connected yet");
     view(&mut page, "first-start");
@@ -127,8 +127,8 @@ fn of_what_is_rare() {
     drop(page);
     stage.end();
 
-    let stage = Stage::new(Some(SMALL), true);
-    let viewer = stage.viewer.clone().expect("a viewer's address");
+    let stage = Stage::new(Some(SMALL));
+    let viewer = stage.viewer.clone();
     let lists = [
         "route 3 1 2 0 2 0 3",
         "blocked 1 1 1 right 40",
@@ -186,7 +186,7 @@ fn of_what_is_rare() {
         let product = format!("[[product]]\nid = {id}\nsquare = [{x}, {y}]\nside = \"{side}\"\n");
         let _ = large.write_str(&product);
     }
-    let stage = Stage::new(Some(&large), false);
+    let stage = Stage::new(Some(&large));
     let state = state(&DRIVES.replace("x_mm=500 y_mm=760", "x_mm=7000 y_mm=6120"));
     let far = "route 12 14 13 14 14 13 14 12 14 11 14 10 14 9 14 8 14 7 14 7 15 7 16 6 16";
     let robot = stage.robot("r1", &[&state.replace("next=1,2", "next=14,13"), far]);

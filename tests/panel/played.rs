@@ -15,8 +15,8 @@ use crate::browser::{Browser, Page};
 /// A station with its panel and a browser at it.
 pub(crate) struct Stage {
     pub(crate) url: String,
-    /// The address of who may look and stop, of a station with tokens.
-    pub(crate) viewer: Option<String>,
+    /// The address of who may look and stop.
+    pub(crate) viewer: String,
     robots: String,
     browser: Browser,
     station: Running,
@@ -24,14 +24,11 @@ pub(crate) struct Stage {
 }
 
 impl Stage {
-    /// One that knows this warehouse, a file of TOML, if any; `everywhere`: beyond this machine.
-    pub(crate) fn new(warehouse: Option<&str>, everywhere: bool) -> Self {
+    /// One that knows this warehouse, a file of TOML, if any.
+    pub(crate) fn new(warehouse: Option<&str>) -> Self {
         let domain = Domain::new();
-        let panel = match everywhere {
-            true => "0.0.0.0:0",
-            false => "127.0.0.1:0",
-        };
-        let mut args = vec!["station", "--listen", "127.0.0.1:0", "--panel", panel];
+        let here = "127.0.0.1:0";
+        let mut args = vec!["station", "--listen", here, "--panel", here];
         let file = domain.folder().join("played.toml");
         if let Some(text) = warehouse {
             std::fs::write(&file, text).expect("a folder");
@@ -42,15 +39,13 @@ impl Stage {
             let told = station.output();
             let (_, rest) = told.split_once("robots connect to ")?;
             let robots = rest.split(',').next()?.to_owned();
-            let here = |text: &str| text.replace("0.0.0.0", "127.0.0.1");
             let mut panels = told.split("http://").skip(1);
             let mut next = || {
                 let at = panels.next()?.split([' ', '\n']).next()?;
-                Some(here(&format!("http://{at}")))
+                Some(format!("http://{at}"))
             };
-            let url = next()?;
-            let viewer = next();
-            (everywhere == viewer.is_some()).then_some((robots, url, viewer))
+            let (url, viewer) = (next()?, next()?);
+            told.ends_with('\n').then_some((robots, url, viewer))
         });
         Self {
             url,

@@ -175,7 +175,7 @@ fn every_reason_that_is_told_is_told_in_swedish() {
     let before = reasons.len();
     reasons.extend(SOURCES.iter().flat_map(|source| written(source)));
     assert!(reasons.len() > before + 30, "{:#?}", &reasons[before..]);
-    let stage = Stage::new(None, false);
+    let stage = Stage::new(None);
     let mut page = stage.page(&stage.url);
     let english = told(&mut page, &reasons);
     for (told, said) in english.as_array().expect("a list").iter().zip(&reasons) {

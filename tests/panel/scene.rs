@@ -62,6 +62,11 @@ impl Scene {
         }
     }
 
+    /// The address of the display on the robot.
+    pub(crate) fn screen(&self) -> String {
+        self.url.replacen("/?", "/screen?", 1)
+    }
+
     pub(crate) fn page(&self) -> Page {
         let mut page = self.browser.page(&self.url);
         page.wait_for("#link", " ms");

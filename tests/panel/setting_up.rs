@@ -224,7 +224,7 @@ const SMALL: &str = "size = [2, 3]\nside_length_cm = 50\ndelivery = [0, 0]\n\
 
 #[test]
 fn what_is_wrong_stands_where_it_is_and_in_the_readers_language() {
-    let stage = Stage::new(Some(SMALL), false);
+    let stage = Stage::new(Some(SMALL));
     let robot = stage.robot("r1", &["state sensor_up=1 steering_up=1"]);
     let mut page = stage.page(&stage.url);
     let now = |more: &str| {

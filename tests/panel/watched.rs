@@ -29,13 +29,18 @@ struct Watcher {
 
 impl Watcher {
     fn new(url: &str) -> Self {
-        let host = url.trim_start_matches("http://").trim_end_matches('/');
+        let at = url.trim_start_matches("http://");
+        let (host, token) = at.split_once("/?token=").expect("a driver's address");
+        let (_, port) = host.rsplit_once(':').expect("a port");
         let stream = TcpStream::connect(host).expect("the panel");
         let mut request = format!("ws://{host}/live")
             .into_client_request()
             .expect("an address");
         let origin = format!("http://{host}").parse().expect("a header");
         request.headers_mut().insert("origin", origin);
+        let cookie = format!("lager-token-{port}={token}");
+        let cookie = cookie.parse().expect("a header");
+        request.headers_mut().insert("cookie", cookie);
         let (mut socket, _) = tungstenite::client(request, stream).expect("its socket");
         let (over, bytes) = (
             Arc::new(AtomicBool::new(false)),

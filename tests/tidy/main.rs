@@ -19,6 +19,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("lager-wire", &[]),
     // An operator's commands and their codes are the wire's.
     ("lager-lines", &["lager-wire"]),
+    // It knows nothing of what is asked.
+    ("lager-door", &[]),
     ("lager-ax12", &[]),
     ("lager-exde", &[]),
     ("lager-plant", &["lager-ax12"]),
@@ -43,7 +45,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("lager-monitor", &["lager-ports", "lager-topics"]),
     (
         "lager-gateway",
-        &["lager-journal", "lager-ports", "lager-topics"],
+        &["lager-door", "lager-journal", "lager-ports", "lager-topics"],
     ),
     (
         "lager-recorder",
@@ -60,7 +62,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["lager-lines", "lager-plant", "lager-wire"],
     ),
     // It shows the station in a browser, so it is on no bus either.
-    ("lager-panel", &["lager-lines", "lager-station"]),
+    (
+        "lager-panel",
+        &["lager-door", "lager-lines", "lager-station"],
+    ),
     (
         "lager-simulator",
         &[

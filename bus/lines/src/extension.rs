@@ -23,6 +23,29 @@
 //! the robot or lets it move, the answers of the document among it, is refused when the two together
 //! exceed 200 ms, and everything else but a stop when they exceed 2 s.
 //!
+//! # Who proves it
+//!
+//! A station that knows a secret of the robot by that name does not believe the first line. It asks
+//! for a proof, and proves itself in turn ([`secret`](crate::secret)); a robot that has a secret
+//! says nothing more, and carries out nothing, before it has heard that:
+//!
+//! ```text
+//! > lager 1 r1
+//! < prove <nonce>              16 random bytes of the station, as 32 hexadecimal digits
+//! > proof <nonce> <code>       of the robot; HMAC-SHA256, as 64 digits
+//! < proved <code>
+//! < lager 1 station
+//!
+//! code of the robot   = HMAC(secret, "lager robot\n"   name "\n" nonces "\n")
+//! code of the station = HMAC(secret, "lager station\n" name "\n" nonces "\n")
+//! nonces              = the station's "\n" the robot's, both as digits
+//! ```
+//!
+//! Where a station takes a robot that has announced itself no longer, or refuses another who has
+//! announced himself by its name, it says why: `thought <text>`. It may then end the connection.
+//!
+//! # Between both
+//!
 //! The document's questions and answers go on between the lines below. These are asynchronous in
 //! both directions: neither side waits for a line before it sends its own. The first word tells the
 //! kind of a line.
@@ -30,6 +53,7 @@
 //! # Station to robot
 //!
 //! ```text
+//! thought <text>                       why it refuses somebody; nothing is answered
 //! stop [<number>]                      stand at once; has a lane of its own, see below
 //! do <number> [late <ms>] <action>     answered by `done` or `refused` with that number, once
 //!
@@ -145,6 +169,7 @@ mod fields;
 mod hello;
 mod listed;
 mod order;
+mod proof;
 mod report;
 mod state;
 mod thinks;
@@ -153,6 +178,7 @@ pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
 pub use listed::{Block, Edge, Listed, Queued};
 pub use order::{Action, ActionError, LeaseMs, Mode, Order, Pick, Put};
+pub use proof::Proof;
 pub use report::{Event, EventKind, Latency, Report, TruePose};
 pub use state::State;
 pub use thinks::Thinks;

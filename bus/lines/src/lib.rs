@@ -13,6 +13,7 @@
 //! - [`strings`]: map and goods as one string each (M1-M3).
 //! - [`command`]: the codes of commands as text (AMB-4).
 //! - [`LATEST_MOVE`]: how late something may come that moves a robot.
+//! - [`secret`]: by what a robot and a station prove who they are.
 //! - [`Called`]: a product by its number or its name, as people call it.
 //! - [`nearest`](fn@nearest): what somebody may have meant who has mistyped a word.
 //!
@@ -31,7 +32,8 @@
 //! refuses a line that is too long. A value is read by `read`, which never panics and allocates no
 //! more than the line's length. For every value `x` that can be written, `read(to_line(x)) == x`.
 //!
-//! Nothing here does input or output, reads a clock or knows a topic. A service that uses both
+//! Nothing here does input or output, reads a clock or knows a topic; of the system only
+//! [`secret::random`] asks anything. A service that uses both
 //! converts between a `Direction` here and a heading on the bus.
 
 #![forbid(unsafe_code)]
@@ -45,6 +47,7 @@ mod late;
 mod misread;
 mod nearest;
 mod reader;
+pub mod secret;
 pub mod splitter;
 pub mod strings;
 mod text;

@@ -309,9 +309,22 @@ pub enum IntrospectError {
     /// The configuration names no bus.
     #[error(transparent)]
     Config(#[from] OpenError),
+    /// This process or this machine has run out of something.
+    #[error("the bus's files could not be listed: {0}")]
+    Short(Shortage),
     /// The transport failed.
     #[error("the bus's files could not be listed ({0}); check the permissions of the bus's folder")]
-    Transport(#[from] TransportFault),
+    Transport(TransportFault),
+}
+
+impl From<TransportFault> for IntrospectError {
+    /// The transport does not say that it was for want of something.
+    fn from(fault: TransportFault) -> Self {
+        match Shortage::now() {
+            Some(shortage) => Self::Short(shortage),
+            None => Self::Transport(fault),
+        }
+    }
 }
 
 /// Why the stop word cannot be used.
@@ -333,6 +346,14 @@ pub enum StopError {
         /// The file.
         path: PathBuf,
     },
+    /// No file can be opened.
+    #[error("the stop word {path} cannot be used: {shortage}")]
+    Short {
+        /// The file.
+        path: PathBuf,
+        /// What there is too little of.
+        shortage: Shortage,
+    },
     /// Anything else the system says.
     #[error("the stop word {path} cannot be used ({detail}); is its folder there and a folder?")]
     System {
@@ -347,6 +368,9 @@ impl StopError {
     /// What `error` means for the file at `path`.
     pub(crate) fn new(path: &Path, error: &Error) -> Self {
         let path = path.to_owned();
+        if let Some(shortage) = Shortage::behind(error) {
+            return Self::Short { path, shortage };
+        }
         match error.kind() {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {

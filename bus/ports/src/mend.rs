@@ -42,13 +42,15 @@ const COUNTER_SIZE: u64 = 16;
 const VERSION: u64 = 0x000a_0000;
 
 /// What a supervisor and a station of its own keep in the robot's folder.
-const RUNTIME: [&str; 10] = [
+const RUNTIME: [&str; 12] = [
     "lager.toml",
     "lager.toml.new",
     "sensor.tty",
     "steering.tty",
     "clock",
     "gag",
+    "secret",
+    "secret.new",
     "warehouse.toml",
     "warehouse.toml.new",
     "warehouse.toml.queue",

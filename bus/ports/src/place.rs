@@ -9,7 +9,7 @@
 //!             stop           the stop word
 //!             up.lock, bridge.lock, logic.lock …      see [`Lock`]
 //!             lager.toml, sensor.tty, steering.tty, clock, eeprom/     the supervisor's
-//!             gag, warehouse.toml, warehouse.toml.queue                its station's
+//!             gag, secret, warehouse.toml, warehouse.toml.queue        its station's
 //!     /dev/shm/lager_<8 hex>_…      the transport's segments; the number is made from the folder
 //! ```
 //!

@@ -53,6 +53,13 @@ impl Shortage {
         (limit < needed).then_some(Self::Lengths { limit_kib })
     }
 
+    /// What is short where the system has refused with this error, if it is open files.
+    pub(crate) fn behind(error: &std::io::Error) -> Option<Self> {
+        let raw = error.raw_os_error()?;
+        let limit = getrlimit(Resource::Nofile).current?;
+        (raw == rustix::io::Errno::MFILE.raw_os_error()).then_some(Self::Files { limit })
+    }
+
     /// What is short now, if anything is.
     pub fn now() -> Option<Self> {
         let files = getrlimit(Resource::Nofile).current;
@@ -105,5 +112,24 @@ impl fmt::Display for Shortage {
                 "this user may not write to {SHARED_MEMORY} (EACCES); it needs mode 1777"
             ),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Error;
+    use std::path::Path;
+
+    use super::*;
+    use crate::error::StopError;
+
+    #[test]
+    fn a_stop_word_that_no_file_is_left_for_blames_no_folder() {
+        let none_left = Error::from_raw_os_error(rustix::io::Errno::MFILE.raw_os_error());
+        let said = StopError::new(Path::new("stop"), &none_left).to_string();
+        assert!(said.contains("ulimit -n"), "{said}");
+        let elsewhere = Error::from_raw_os_error(rustix::io::Errno::NOTDIR.raw_os_error());
+        let said = StopError::new(Path::new("stop"), &elsewhere).to_string();
+        assert!(!said.contains("ulimit"), "{said}");
     }
 }

@@ -9,19 +9,29 @@
 //! is the other thread's, which never waits: what the peer does not take stays with [`Link`],
 //! bounded. Of what only shows how things are the newest alone is kept, and goes after all that is
 //! said.
+//!
+//! Where the robot has a secret, a connection is up once both sides have proved that they know it
+//! (`proving.rs`). Who does not prove it is hung up on, and nothing that he says reaches the other
+//! thread.
 
 use std::io;
 use std::net::{Shutdown as Direction, TcpStream, ToSocketAddrs};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use lager_lines::Name;
+use lager_lines::secret::Nonce;
 use lager_lines::splitter::{LineError, LineSplitter};
 use lager_ports::{Clock, Ringer};
 use rustix::net::{SendFlags, send, sockopt};
+use thiserror::Error;
 
+use crate::proving::{Proving, Step, THOUGHT, Unproved, shown};
+use crate::secret::{SecretsError, secrets_at};
 use crate::telling::KINDS;
 
 /// How long one address may take to answer.
@@ -33,6 +43,10 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 const PATIENCE: Duration = Duration::from_millis(500);
 /// A connection that lasted this long was good: the next pause is the first again.
 const GOOD: Duration = Duration::from_secs(5);
+/// How long a station may take to prove itself.
+const PROOF: Duration = Duration::from_secs(5);
+/// How often a station's sentences are told at most.
+const SENTENCES: Duration = Duration::from_secs(1);
 /// How often a pause looks whether it is to end.
 const GLANCE: Duration = Duration::from_millis(20);
 /// What the peer may leave unread, in bytes, before it is given up.
@@ -56,6 +70,49 @@ pub(crate) enum News {
     Down(String),
 }
 
+/// Whom a robot connects to, and by what it proves who it is.
+#[derive(Clone, Debug)]
+pub(crate) struct Wanted {
+    /// The external computer: host and port.
+    pub(crate) station: String,
+    /// The robot's name.
+    pub(crate) robot: Name,
+    /// The file of its secret; it is read for each connection.
+    pub(crate) secret: Option<PathBuf>,
+}
+
+/// Why there is no connection.
+#[derive(Debug, Error)]
+enum NoLink {
+    /// Nobody is reached.
+    #[error("cannot reach the external computer at {at}: {error}")]
+    Reach {
+        /// Where.
+        at: String,
+        /// Why.
+        error: io::Error,
+    },
+    /// It is not the robot's station.
+    #[error("{at} is not taken for this robot's external computer: {why}")]
+    Unproved {
+        /// Where.
+        at: String,
+        /// Why.
+        why: Unproved,
+    },
+    /// The robot's secret is not to be had.
+    #[error("the robot cannot prove who it is: {0}")]
+    Secrets(#[from] SecretsError),
+    /// It is not in the file.
+    #[error("the robot cannot prove who it is: {} holds no secret of {robot}", .path.display())]
+    Nameless {
+        /// Which.
+        path: PathBuf,
+        /// Whose.
+        robot: Name,
+    },
+}
+
 /// The other thread's end.
 #[derive(Debug)]
 pub(crate) struct Link {
@@ -69,15 +126,15 @@ pub(crate) struct Link {
 }
 
 impl Link {
-    /// Connects to `station`, a host and a port, from now on.
+    /// Connects from now on.
     ///
     /// # Errors
     /// There is no thread for it.
-    pub(crate) fn new(station: String, ringer: Ringer) -> io::Result<Self> {
+    pub(crate) fn new(wanted: Wanted, ringer: Ringer) -> io::Result<Self> {
         let ends = Arc::new(AtomicBool::new(false));
         let (to, news) = sync_channel(PIECES);
         let thread = Thread {
-            station,
+            wanted,
             to,
             ringer,
             ends: Arc::clone(&ends),
@@ -181,34 +238,40 @@ impl Drop for Link {
 }
 
 struct Thread {
-    station: String,
+    wanted: Wanted,
     to: SyncSender<News>,
     ringer: Ringer,
     ends: Arc<AtomicBool>,
+}
+
+/// A connection that is made, and what has been read of it.
+struct Made {
+    stream: TcpStream,
+    splitter: LineSplitter,
+    lines: Vec<Result<String, LineError>>,
 }
 
 impl Thread {
     fn run(&self) {
         let mut pauses = Pauses::default();
         let mut said = String::new();
+        let station = &self.wanted.station;
         while !self.ends.load(Ordering::SeqCst) {
             let start = Instant::now();
-            match self.connect() {
-                Ok(stream) => {
-                    let _link = tracing::info_span!("link", station = %self.station).entered();
-                    tracing::info!("connected to the external computer at {}", self.station);
+            match self.make() {
+                Ok(made) => {
+                    let _link = tracing::info_span!("link", station = %station).entered();
+                    tracing::info!("connected to the external computer at {station}");
                     said.clear();
-                    if self.hold(stream).is_none() {
+                    if self.hold(made).is_none() {
                         return;
                     }
                 }
                 Err(error) => {
-                    let why = format!(
-                        "cannot reach the external computer at {}: {error}",
-                        self.station
-                    );
+                    let why = error.to_string();
                     // One that has just been started may not listen yet.
-                    if said != why && pauses.next > PATIENCE {
+                    let is_early = matches!(error, NoLink::Reach { .. }) && pauses.next <= PATIENCE;
+                    if said != why && !is_early {
                         tracing::warn!("{why}; it is tried for ever");
                         said = why;
                     }
@@ -220,9 +283,47 @@ impl Thread {
         }
     }
 
+    /// Connects, and where the robot has a secret lets both sides prove that they know it.
+    fn make(&self) -> Result<Made, NoLink> {
+        let failed = |error| NoLink::Reach {
+            at: self.wanted.station.clone(),
+            error,
+        };
+        let proving = self.proving()?;
+        let mut made = Made {
+            stream: self.connect().map_err(failed)?,
+            splitter: LineSplitter::new(),
+            lines: Vec::new(),
+        };
+        if let Some(proving) = proving {
+            let proved = prove(&mut made, proving).map_err(failed)?;
+            proved.map_err(|why| NoLink::Unproved {
+                at: self.wanted.station.clone(),
+                why,
+            })?;
+        }
+        Ok(made)
+    }
+
+    fn proving(&self) -> Result<Option<Proving>, NoLink> {
+        let Some(path) = &self.wanted.secret else {
+            return Ok(None);
+        };
+        let robot = self.wanted.robot.clone();
+        let Some(secret) = secrets_at(path)?.of(&robot).cloned() else {
+            let path = path.clone();
+            return Err(NoLink::Nameless { path, robot });
+        };
+        let nonce = Nonce::random().map_err(|error| SecretsError::Read {
+            path: path.clone(),
+            error,
+        })?;
+        Ok(Some(Proving::new(robot, secret, nonce)))
+    }
+
     fn connect(&self) -> io::Result<TcpStream> {
         let mut failure = io::Error::other("the name has no address");
-        for address in self.station.to_socket_addrs()? {
+        for address in self.wanted.station.to_socket_addrs()? {
             match TcpStream::connect_timeout(&address, CONNECT) {
                 Ok(stream) => {
                     stream.set_nodelay(true)?;
@@ -239,35 +340,38 @@ impl Thread {
     }
 
     /// Reads until the connection ends; `None` if the other thread has gone.
-    fn hold(&self, mut stream: TcpStream) -> Option<()> {
-        let ended = match stream.try_clone() {
+    fn hold(&self, made: Made) -> Option<()> {
+        let ended = match made.stream.try_clone() {
             Ok(writer) => {
                 self.tell(News::Up(writer))?;
-                self.read(&mut stream)?
+                self.read(made)?
             }
             Err(error) => error,
         };
         self.tell(News::Down(ended.to_string()))
     }
 
-    fn read(&self, stream: &mut TcpStream) -> Option<io::Error> {
-        use std::io::Read as _;
-        let mut splitter = LineSplitter::new();
-        let mut buffer = [0; 4096];
+    fn read(&self, mut made: Made) -> Option<io::Error> {
+        let mut told: Option<Instant> = None;
         loop {
-            let count = match stream.read(&mut buffer) {
-                Ok(0) => return Some(io::ErrorKind::UnexpectedEof.into()),
-                Ok(count) => count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Some(error),
-            };
-            let mut bytes = &buffer[..count];
-            let mut lines = Vec::new();
-            while let Some(line) = splitter.next(&mut bytes) {
-                lines.push(line.map(str::to_owned));
-            }
+            let mut lines = std::mem::take(&mut made.lines);
+            lines.retain(
+                |line| match line.as_deref().map(|line| line.strip_prefix(THOUGHT)) {
+                    Ok(Some(why)) => {
+                        if told.is_none_or(|told| told.elapsed() >= SENTENCES) {
+                            told = Some(Instant::now());
+                            tracing::warn!("the external computer says: {}", shown(why));
+                        }
+                        false
+                    }
+                    _ => true,
+                },
+            );
             if !lines.is_empty() {
                 self.tell(News::Lines(lines))?;
+            }
+            if let Err(error) = made.read() {
+                return Some(error);
             }
         }
     }
@@ -282,6 +386,65 @@ impl Thread {
         let start = Instant::now();
         while start.elapsed() < pause && !self.ends.load(Ordering::SeqCst) {
             std::thread::sleep(GLANCE);
+        }
+    }
+}
+
+impl Made {
+    /// Waits for bytes, and keeps the lines that they end.
+    ///
+    /// # Errors
+    ///
+    /// The connection has ended.
+    fn read(&mut self) -> io::Result<()> {
+        use std::io::Read as _;
+        let mut buffer = [0; 4096];
+        let count = loop {
+            match self.stream.read(&mut buffer) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => break count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        };
+        let mut bytes = &buffer[..count];
+        while let Some(line) = self.splitter.next(&mut bytes) {
+            self.lines.push(line.map(str::to_owned));
+        }
+        Ok(())
+    }
+}
+
+/// Lets both sides of a new connection prove themselves; lines behind the last one stay.
+fn prove(made: &mut Made, mut proving: Proving) -> io::Result<Result<(), Unproved>> {
+    use std::io::Write as _;
+    let until = Instant::now() + PROOF;
+    made.stream.set_write_timeout(Some(PROOF))?;
+    made.stream.write_all(proving.first().as_bytes())?;
+    loop {
+        let mut lines = std::mem::take(&mut made.lines).into_iter();
+        for line in lines.by_ref() {
+            let line = line.map_err(io::Error::other)?;
+            match proving.heard(&line) {
+                Ok(Step::Wait) => {}
+                Ok(Step::Say(line)) => made.stream.write_all(line.as_bytes())?,
+                Ok(Step::Proved) => {
+                    made.lines = lines.collect();
+                    made.stream.set_read_timeout(None)?;
+                    made.stream.set_write_timeout(None)?;
+                    return Ok(Ok(()));
+                }
+                Err(why) => return Ok(Err(why)),
+            }
+        }
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(Err(Unproved::Silent));
+        }
+        made.stream.set_read_timeout(Some(left))?;
+        match made.read() {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            read => read?,
         }
     }
 }

@@ -27,7 +27,7 @@ use crate::action::Action;
 use crate::asking::Asking;
 use crate::conversation::Conversation;
 use crate::known::Senses;
-use crate::link::{Link, News};
+use crate::link::{Link, News, Wanted};
 use crate::lost::LinkLost;
 use crate::moment::Moment;
 use crate::telling;
@@ -49,6 +49,9 @@ pub struct CommConfig {
     pub station: String,
     /// What the robot calls itself towards it.
     pub name: Name,
+    /// The file of the secret by which both prove who they are. Without one the robot talks to
+    /// whoever answers there, as the document has it.
+    pub secret: Option<PathBuf>,
     /// What a lost link means in autonomous mode.
     pub link_lost: LinkLost,
     /// Whether a predecessor's map is taken up.
@@ -141,13 +144,16 @@ impl Shell {
         let kept = kept.map(|(map, _)| map);
         watchdog.enter("opening the bells");
         let waiter = bus.waiter(Policy::Block)?;
+        let wanted = Wanted {
+            station: config.station.clone(),
+            robot: config.name.clone(),
+            secret: config.secret.clone(),
+        };
         let mut shell = Self {
             clock: bus.clock(),
-            link: Link::new(config.station.clone(), waiter.ringer()?).map_err(|error| {
-                PortError::Thread {
-                    what: "the link to the station",
-                    fault: error.into(),
-                }
+            link: Link::new(wanted, waiter.ringer()?).map_err(|error| PortError::Thread {
+                what: "the link to the station",
+                fault: error.into(),
             })?,
             bridge: opening.asking(&waiter)?,
             world: opening.asking(&waiter)?,

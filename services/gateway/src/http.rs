@@ -11,16 +11,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::State;
+use axum::extract::{ConnectInfo, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use lager_door::{Door, Limits, Visitor};
 use lager_ports::StopWord;
 use tokio::runtime::Runtime;
 
 use crate::Shared;
 use crate::exposition::{self, MEDIA_TYPE};
 
+/// Who may ask at a time: some servers, and people who look.
+const LIMITS: Limits = Limits {
+    most: 32,
+    whose: "the gateway",
+};
 /// How often the end is looked for.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -40,8 +46,9 @@ pub(crate) fn serve(
         let router = Router::new()
             .route("/metrics", get(metrics))
             .fallback(nothing)
-            .with_state(shared);
-        axum::serve(listener, router).await
+            .with_state(shared)
+            .into_make_service_with_connect_info::<Visitor>();
+        axum::serve(Door::new(listener, LIMITS), router).await
     };
     runtime.block_on(async {
         let ended = async {
@@ -56,7 +63,12 @@ pub(crate) fn serve(
     })
 }
 
-async fn metrics(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+async fn metrics(
+    State(shared): State<Shared>,
+    ConnectInfo(visitor): ConnectInfo<Visitor>,
+    headers: HeaderMap,
+) -> Response {
+    visitor.has_asked();
     if !headers
         .get(header::HOST)
         .and_then(|host| host.to_str().ok())
@@ -65,6 +77,7 @@ async fn metrics(State(shared): State<Shared>, headers: HeaderMap) -> Response {
         let why = "the gateway answers to its number and to localhost, and not to this name\n";
         return (StatusCode::MISDIRECTED_REQUEST, why).into_response();
     }
+    visitor.admit();
     // Read now, as the bridge does before each packet: a stop is told at once, whoever is silent.
     let stop = StopWord::read(&shared.stop_word).ok();
     let stop = stop.map(|told| told.and_then(|told| told.stop()));

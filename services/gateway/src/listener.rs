@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use lager_journal::{Envelope, EnvelopeSchema};
 use lager_ports::{
-    Bus, BusWatch, Clock, Found, Layout, Look, Pace, PortError, ReceiveError, Shutdown, Source,
-    Subscriber, Watchdog,
+    Bus, BusWatch, Clock, Found, IntrospectError, Layout, Look, Pace, PortError, ReceiveError,
+    Shutdown, Source, Subscriber, Watchdog,
 };
 use lager_topics::{Description, Stamp, TOPICS, Topic, TopicVisitor, visit};
 use serde::Serialize;
@@ -58,13 +58,25 @@ pub(crate) fn listen(
         ports: BusWatch::of_ports(),
     };
     let mut looked: Option<Instant> = None;
+    let mut is_short = false;
     while !shutdown.is_requested() && !is_over() {
         if looked.is_none_or(|looked| looked.elapsed() >= LOOK) {
             looked = Some(Instant::now());
             if !bus.is_listed() {
                 return Err(GatewayError::Cleared);
             }
-            listener.look(shared)?;
+            match listener.look(shared) {
+                // What is open goes on, and it is looked again in a moment.
+                Err(GatewayError::Look(error @ IntrospectError::Short(_))) => {
+                    if !std::mem::replace(&mut is_short, true) {
+                        tracing::warn!("{error}; topics that come are not seen until then");
+                    }
+                }
+                looked => {
+                    looked?;
+                    is_short = false;
+                }
+            }
         }
         listener.drain(shared, &mut pace)?;
         std::thread::sleep(pace.wait());

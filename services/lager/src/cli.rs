@@ -387,6 +387,15 @@ pub struct UpArgs {
     /// The external computer that runs at this address, instead of one that `up` starts
     #[arg(long, value_name = "HOST:PORT", value_parser = values::address, conflicts_with = "no_station", help_heading = "Station")]
     pub station: Option<String>,
+    /// The file of the secret by which the robot and its external computer prove who they are; it
+    /// has mode 0600 [default: one of their own for a station that `up` starts]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "no_station",
+        help_heading = "Station"
+    )]
+    pub secret: Option<PathBuf>,
     /// Do without an external computer; `up` tells the robot its warehouse
     #[arg(long, help_heading = "Station")]
     pub no_station: bool,
@@ -437,6 +446,10 @@ pub struct CommArgs {
     /// Where the external computer listens [default: as configured, or 127.0.0.1:7420]
     #[arg(long, value_name = "HOST:PORT", value_parser = values::address, help_heading = "Station")]
     pub station: Option<String>,
+    /// The file of the secret by which both prove who they are; it has mode 0600 [default: as
+    /// configured]
+    #[arg(long, value_name = "FILE", help_heading = "Station")]
+    pub secret: Option<PathBuf>,
     /// What every service is told
     #[command(flatten)]
     pub service: ServiceArgs,
@@ -465,6 +478,10 @@ pub struct StationArgs {
     /// as r1=3,screws; may be given several times
     #[arg(long, value_name = "ROBOT=GOODS,GOODS", value_parser = values::fetch, help_heading = "Station")]
     pub fetch: Vec<Fetch>,
+    /// The file of the secrets by which robots prove who they are: a line `<name> <secret>` for each,
+    /// or one secret for all; it has mode 0600 [default: none, and robots are believed]
+    #[arg(long, value_name = "FILE", help_heading = "Station")]
+    pub robots_secret: Option<PathBuf>,
     /// Where the operator panel answers browsers [default: 127.0.0.1:7410, or a free port]
     #[arg(long, value_name = "HOST:PORT", help_heading = "Station")]
     pub panel: Option<std::net::SocketAddr>,

@@ -25,6 +25,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
     if let Some(running) = RuntimeFolder::running(config)? {
         joined.speed = running.speed;
         joined.chip.clock = running.chip.clock;
+        joined.comm.secret = joined.comm.secret.or(running.comm.secret);
     }
     let name = Name::new(joined.name.clone())
         .with_context(|| format!("the robot cannot be called {:?} by a station", joined.name))?;
@@ -33,6 +34,7 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
             .or_else(|| joined.station.address.clone())
             .unwrap_or_else(|| StationSection::USUAL.to_owned()),
         name,
+        secret: args.secret.clone().or_else(|| joined.comm.secret.clone()),
         link_lost: joined.comm.link_lost.into(),
         resume: args.service.resume,
     };

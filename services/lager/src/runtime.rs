@@ -1,11 +1,15 @@
 //! What a running robot keeps in its folder of the bus ([`Place`]): the lock of its `up`, the
 //! effective configuration, the links to the simulated or emulated ports, an emulated body's clock
-//! and EEPROMs, and what a station of its own has open. What outlives `up` is `state.rs`'s.
+//! and EEPROMs, what a station of its own has open, and the secret of its link. What outlives `up`
+//! is `state.rs`'s.
 
-use std::fs;
-use std::path::PathBuf;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use lager_lines::secret::Secret;
 use lager_ports::{Lock, Place, RobotName, StopPage, StopWord};
 
 use crate::config::Config;
@@ -22,6 +26,8 @@ const EEPROM: &str = "eeprom";
 /// script.
 const GAG: &str = "gag";
 const QUEUE: &str = "queue.toml";
+/// The secret by which the robot and its own station prove who they are.
+const SECRET: &str = "secret";
 
 /// The folder of one robot on one bus.
 #[derive(Clone, Debug)]
@@ -63,6 +69,12 @@ impl RuntimeFolder {
     /// Where the own station keeps what waits if nothing of it is to outlive the robot.
     pub fn queue(&self) -> PathBuf {
         self.path.join(QUEUE)
+    }
+
+    /// The file of the secret of `config`'s robot and its own station.
+    pub fn secret(config: &Config) -> Result<PathBuf> {
+        let bus = config.bus()?;
+        Ok(bus.place()?.folder_of(&bus.robot).join(SECRET))
     }
 
     /// The page for an emulated body's time. A page that a killed robot has left is removed, so
@@ -115,6 +127,7 @@ impl RuntimeFolder {
             lock: Some(self.place.lock_name(&self.robot)?),
             place: self.place.clone(),
             folder: self.path.clone(),
+            secret: None,
         })
     }
 }
@@ -125,9 +138,23 @@ pub struct NameLock {
     lock: Option<Lock>,
     place: Place,
     folder: PathBuf,
+    /// What is in the folder for a station of the robot's own.
+    secret: Option<Secret>,
 }
 
 impl NameLock {
+    /// Makes a new secret for the robot and its own station, which only this user can read. It
+    /// lasts as long as the name is held.
+    ///
+    /// # Errors
+    /// The system has no random bytes, or the folder does not take it.
+    pub fn make_secret(&mut self) -> Result<Secret> {
+        let secret = Secret::random().context("the system gives no random bytes")?;
+        write_secret(&self.folder, &secret)?;
+        self.secret = Some(secret.clone());
+        Ok(secret)
+    }
+
     /// Whether the folder is still there, and the lock in it that everybody meets is this one.
     pub fn is_held(&self) -> bool {
         self.lock.as_ref().is_some_and(Lock::is_in_place)
@@ -147,9 +174,14 @@ impl NameLock {
     pub fn restore(&mut self, config: &Config) -> Result<()> {
         let folder = RuntimeFolder::create(config)?;
         if !self.is_held() {
+            let secret = self.secret.take();
             *self = folder.lock()?;
+            self.secret = secret;
         }
         folder.write_config(config)?;
+        if let Some(secret) = &self.secret {
+            write_secret(&self.folder, secret)?;
+        }
         if let Some(eeprom) = &config.chip.eeprom {
             fs::create_dir_all(eeprom)
                 .with_context(|| format!("cannot make {}", eeprom.display()))?;
@@ -163,7 +195,7 @@ impl Drop for NameLock {
     /// have written into their EEPROM.
     fn drop(&mut self) {
         if self.is_held() {
-            for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, QUEUE] {
+            for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, QUEUE, SECRET] {
                 let _ = fs::remove_file(self.folder.join(name));
             }
             // It stays when it has something in it.
@@ -176,4 +208,22 @@ impl Drop for NameLock {
         // It stays while anything else is in it.
         let _ = fs::remove_dir(&self.folder);
     }
+}
+
+/// Writes a file that only this user can read, whatever was there before.
+fn write_secret(folder: &Path, secret: &Secret) -> Result<()> {
+    let path = folder.join(SECRET);
+    let new = folder.join("secret.new");
+    let whole = || -> std::io::Result<()> {
+        let _ = fs::remove_file(&new);
+        let mut options = OpenOptions::new();
+        let mut file = options
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&new)?;
+        writeln!(file, "{}", secret.as_str())?;
+        fs::rename(&new, &path)
+    };
+    whole().with_context(|| format!("cannot write {}", path.display()))
 }

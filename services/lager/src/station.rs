@@ -8,7 +8,9 @@ use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use lager_comm::secrets_at;
 use lager_lines::Name;
+use lager_lines::secret::Secrets;
 use lager_panel::{Panel, Tokens};
 use lager_ports::Shutdown;
 use lager_station::files::Hold;
@@ -41,8 +43,11 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
             let server = Server::open(supervised(config)?)?;
             let panel = config.station.panel.and_then(|address| {
                 // Robots are served, whoever looks.
-                let panel = Panel::open(address, None, server.handle());
-                panel.inspect_err(|error| tracing::warn!("{error}")).ok()
+                let panel = tokens(config).and_then(|tokens| {
+                    let panel = Panel::open(address, tokens, server.handle());
+                    Ok(panel?)
+                });
+                panel.inspect_err(|error| tracing::warn!("{error:#}")).ok()
             });
             (server, panel)
         }
@@ -81,6 +86,10 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
     let server = Server::open(ServerConfig {
         name: name()?,
         listen: Listen::At(args.listen),
+        secrets: match &args.robots_secret {
+            Some(file) => secrets_at(file)?,
+            None => Secrets::default(),
+        },
         gag: Some(gag.clone()),
         queues: Some(Queues::beside(&path)),
         warehouse: Some(path),
@@ -88,9 +97,14 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
         fetch: orders.collect(),
     })?;
     crate::say(&format!(
-        "robots connect to {}, a GaG to {}; {told}",
+        "robots connect to {}, a GaG to {}; {told}; {}",
         server.address()?,
         gag.display(),
+        match args.robots_secret {
+            Some(_) => "robots prove who they are",
+            None =>
+                "whoever connects is believed to be the robot that he says he is; with --robots-secret FILE robots prove it",
+        },
     ))?;
     let panel = match args.no_panel {
         true => None,
@@ -105,20 +119,34 @@ fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
         Some(address) => address,
         None => usual_panel()?,
     };
-    if address.ip().is_loopback() {
-        let panel = Panel::open(address, None, server.handle())?;
-        crate::say(&format!("the panel is at http://{}", panel.address()?))?;
-        return Ok(panel);
-    }
     let tokens = Tokens::random()?;
-    let panel = Panel::open(address, Some(tokens.clone()), server.handle())?;
+    let panel = Panel::open(address, tokens.clone(), server.handle())?;
     let at = panel.address()?;
     crate::say(&format!(
-        "the panel is at http://{at}/?token={} for who drives, and at http://{at}/?token={} for who \
-         looks and stops",
-        tokens.driver, tokens.viewer
+        "the panel is at {} for who drives, and at http://{at}/?token={} for who looks and stops",
+        driver_at(at, &tokens),
+        tokens.viewer
     ))?;
     Ok(panel)
+}
+
+/// By what people get into the panel of the robot's own station. It follows from the secret in the
+/// robot's folder, so it stays the same for as long as `up` runs, whatever becomes of the station.
+///
+/// # Errors
+/// There is no such secret.
+pub fn tokens(config: &Config) -> Result<Tokens> {
+    let secrets = secrets_at(&RuntimeFolder::secret(config)?)?;
+    Ok(Tokens::of(
+        secrets
+            .of_all()
+            .context("the robot's folder has no secret")?,
+    ))
+}
+
+/// The address at which a driver opens the panel.
+pub fn driver_at(address: SocketAddr, tokens: &Tokens) -> String {
+    format!("http://{address}/?token={}", tokens.driver)
 }
 
 /// Where a panel answers on this machine if nobody says: the usual address, or a port that is free.
@@ -182,6 +210,10 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
     Ok(ServerConfig {
         name: name()?,
         listen: Listen::On(TcpListener::from(robots)),
+        secrets: match &config.comm.secret {
+            Some(file) => secrets_at(file)?,
+            None => bail!("a station that `up` has started is told no secret of its robot"),
+        },
         gag: fits.is_ok().then_some(gag),
         warehouse: config.station.warehouse.clone(),
         otherwise: Some(goods::configured(config)?),

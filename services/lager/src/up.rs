@@ -46,7 +46,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     rehearse(&config)?;
 
     let folder = RuntimeFolder::create(&config)?;
-    let lock = folder.lock()?;
+    let mut lock = folder.lock()?;
     if config.body != Body::Serial {
         config.serial.sensor = folder.sensor_port();
         config.serial.steering = folder.steering_port();
@@ -64,7 +64,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         true => folder.queue(),
         false => config.station.queue.take().unwrap_or_else(|| state.queue()),
     });
-    let mut external = external::choose(&mut config, args.headless)?;
+    let mut external = external::choose(&mut config, &mut lock, args.headless)?;
     if external.listener.is_none() {
         // What somebody else keeps is not known here.
         (config.station.warehouse, config.station.queue) = (None, None);
@@ -343,6 +343,9 @@ fn apply(config: &mut Config, args: &UpArgs) -> Result<()> {
     }
     if let Some(gag) = &args.gag {
         config.station.gag = Some(std::path::absolute(gag)?);
+    }
+    if let Some(secret) = &args.secret {
+        config.comm.secret = Some(secret.clone());
     }
     if let Some(panel) = args.panel {
         config.station.panel = Some(panel);

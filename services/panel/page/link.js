@@ -31,6 +31,8 @@ export const SPAN_MS = 60_000;
 
 /** How often the page says that it is there, in ms. */
 const HERE_MS = 1_000;
+/** Said where the panel no longer knows the browser: `up` was started anew, or the cookie is gone. */
+const NO_TOKEN = "this page has no token; open the address that `lager up` or `lager station` has printed";
 const RETRY_MS = [250, 500, 1_000, 2_000];
 
 /** What is known of one robot. */
@@ -138,9 +140,19 @@ export class Link extends EventTarget {
       this.waiting.clear();
       for (const robot of this.robots.values()) robot.connected = false;
       this.emit("link");
+      if (!reason) this.askWhy();
       const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
       setTimeout(() => this.connect(), wait);
     };
+  }
+
+  /** A browser does not say why a socket was refused; the page's own address does. */
+  async askWhy() {
+    const answer = await fetch(new URL("style.css", location.href), { cache: "no-store" }).catch(() => null);
+    if (this.open || !answer) return;
+    if (answer.status === 403) this.closed = NO_TOKEN;
+    else if (this.closed === NO_TOKEN) this.closed = null;
+    this.emit("link");
   }
 
   /**

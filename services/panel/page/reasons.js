@@ -32,6 +32,10 @@ const TABLE = [
   ["the page does not answer", "sidan svarar inte"],
   ["a page says lines of text", "en sida säger rader av text"],
   ["this page speaks another language; load it anew", "den här sidan talar ett annat språk; ladda om den"],
+  [
+    "this page has no token; open the address that `lager up` or `lager station` has printed",
+    "den här sidan har ingen nyckel; öppna adressen som `lager up` eller `lager station` har skrivit ut",
+  ],
   ["more is said than a person can", "mer sägs än vad en människa hinner"],
   ["the robot is moved by its driver alone; take the wheel first", "bara föraren rör roboten; ta ratten först"],
   ["the robot speaks only the document's language, or is away; it takes no actions", "roboten talar bara dokumentets språk, eller är borta; den kan inte styras härifrån"],

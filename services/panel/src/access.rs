@@ -1,16 +1,18 @@
 //! Who may open the page, and what he may do there.
 //!
-//! On loopback everybody may drive: who can connect there has a shell on this machine. Beyond it a
-//! token is asked for, one of two: a viewer's looks and stops, a driver's drives as well. The
-//! page's address carries it once (`http://HOST/?token=...`); from then on a cookie does.
+//! Other users of this machine can connect even to a panel on loopback, so everybody is asked for a
+//! token, one of two: a viewer's looks and stops, a driver's drives as well. The page's address
+//! carries it once (`http://HOST/?token=...`); from then on a cookie does. Cookies do not tell ports
+//! apart, so the cookie's name does, and two panels of one machine do not take each other's.
 //!
 //! A page of somebody else must not reach the panel through its reader's browser. So the `Host`
 //! that a browser sends must be an address of this panel and not a name that somebody has pointed
 //! here, and the socket's `Origin` must be that host.
 
-use std::fmt::Write as _;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
+
+use lager_lines::secret::{Secret, hex, random};
 
 /// What somebody may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +32,7 @@ impl Rank {
     }
 }
 
-/// The words that let people in from elsewhere: 128 bits each, in hexadecimal.
+/// The words that let people in: 128 bits each, in hexadecimal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tokens {
     /// Whoever has it may drive.
@@ -47,35 +49,36 @@ impl Tokens {
     /// When the system has none to give.
     pub fn random() -> io::Result<Self> {
         Ok(Self {
-            driver: random_word()?,
-            viewer: random_word()?,
+            driver: hex(&random::<16>()?),
+            viewer: hex(&random::<16>()?),
         })
     }
-}
 
-fn random_word() -> io::Result<String> {
-    let mut bytes = [0; 16];
-    let got = rustix::rand::getrandom(&mut bytes, rustix::rand::GetRandomFlags::empty())?;
-    if got != bytes.len() {
-        return Err(io::Error::other("the system gave too few random bytes"));
+    /// Those that follow from a secret: the same for each panel of the same station.
+    pub fn of(secret: &Secret) -> Self {
+        Self {
+            driver: secret.word("panel driver"),
+            viewer: secret.word("panel viewer"),
+        }
     }
-    Ok(bytes.iter().fold(String::new(), |mut word, byte| {
-        let _ = write!(word, "{byte:02x}");
-        word
-    }))
 }
 
 /// The rules of one panel.
 #[derive(Clone, Debug)]
 pub(crate) struct Access {
     address: SocketAddr,
-    tokens: Option<Tokens>,
+    tokens: Tokens,
 }
 
 impl Access {
-    /// The rules of a panel that listens at `address`; without tokens on loopback only.
-    pub(crate) fn new(address: SocketAddr, tokens: Option<Tokens>) -> Self {
+    /// The rules of a panel that listens at `address`.
+    pub(crate) fn new(address: SocketAddr, tokens: Tokens) -> Self {
         Self { address, tokens }
+    }
+
+    /// The name of the cookie that carries a token.
+    pub(crate) fn cookie(&self) -> String {
+        format!("lager-token-{}", self.address.port())
     }
 
     /// Whether a browser that asks this host asks this panel.
@@ -105,13 +108,10 @@ impl Access {
 
     /// What somebody with this token, or none, may do; `None`: nothing.
     pub(crate) fn rank(&self, token: Option<&str>) -> Option<Rank> {
-        let Some(tokens) = &self.tokens else {
-            return Some(Rank::Driver);
-        };
         let token = token?;
-        if is_same(token, &tokens.driver) {
+        if is_same(token, &self.tokens.driver) {
             Some(Rank::Driver)
-        } else if is_same(token, &tokens.viewer) {
+        } else if is_same(token, &self.tokens.viewer) {
             Some(Rank::Viewer)
         } else {
             None
@@ -149,7 +149,8 @@ mod tests {
     use super::*;
 
     fn loopback() -> Access {
-        Access::new("127.0.0.1:7410".parse().unwrap(), None)
+        let tokens = Tokens::random().unwrap();
+        Access::new("127.0.0.1:7410".parse().unwrap(), tokens)
     }
 
     #[test]
@@ -173,7 +174,7 @@ mod tests {
 
     #[test]
     fn everywhere_means_by_number() {
-        let access = Access::new("0.0.0.0:80".parse().unwrap(), None);
+        let access = Access::new("0.0.0.0:80".parse().unwrap(), Tokens::random().unwrap());
         for host in ["192.168.1.4", "192.168.1.4:80", "localhost", "[::1]"] {
             assert!(access.is_host(host), "{host}");
         }
@@ -203,12 +204,24 @@ mod tests {
         let tokens = Tokens::random().unwrap();
         assert_eq!(tokens.driver.len(), 32);
         assert_ne!(tokens.driver, tokens.viewer);
-        let access = Access::new("0.0.0.0:7410".parse().unwrap(), Some(tokens.clone()));
+        let access = Access::new("127.0.0.1:7410".parse().unwrap(), tokens.clone());
         assert_eq!(access.rank(Some(&tokens.driver)), Some(Rank::Driver));
         assert_eq!(access.rank(Some(&tokens.viewer)), Some(Rank::Viewer));
         assert_eq!(access.rank(Some("")), None);
         assert_eq!(access.rank(Some(&tokens.driver[1..])), None);
         assert_eq!(access.rank(None), None);
-        assert_eq!(loopback().rank(None), Some(Rank::Driver));
+        assert_eq!(loopback().rank(Some(&tokens.driver)), None);
+        assert_eq!(access.cookie(), "lager-token-7410");
+    }
+
+    #[test]
+    fn tokens_that_follow_from_a_secret_stay_the_same_and_are_not_the_secret() {
+        let [secret, other] = [(); 2].map(|()| Secret::random().unwrap());
+        let tokens = Tokens::of(&secret);
+        assert_eq!(tokens, Tokens::of(&secret));
+        assert_ne!(tokens, Tokens::of(&other));
+        assert_eq!((tokens.driver.len(), tokens.viewer.len()), (32, 32));
+        assert_ne!(tokens.driver, tokens.viewer);
+        assert!(!secret.as_str().contains(&tokens.driver));
     }
 }

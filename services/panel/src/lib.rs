@@ -9,7 +9,7 @@
 //! - [`Panel`]: the server, in one thread with tasks of its own.
 //! - `page`: the files, embedded, and `bundle`: their scripts as one.
 //! - `stop`: STOP by a form, which needs no script and no socket.
-//! - `door`: how many connections there may be, and `access`: who may open the files.
+//! - `access`: who may open the files. How many may ask, and for how long, is `lager_door`'s.
 //! - `speech`: the lines that page and panel say to each other.
 //! - `socket`: one page's conversation, and `visit`: what it may do, has asked and has been told.
 //! - `late`: how late what a page says comes, and `handover`: who asks whom for the wheel.
@@ -21,7 +21,6 @@
 
 mod access;
 mod bundle;
-mod door;
 mod handover;
 mod late;
 mod page;
@@ -41,6 +40,7 @@ use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State, WebSocketUpgr
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get, post};
+use lager_door::{Door, Limits, Visitor};
 use lager_lines::Name;
 use lager_station::Handle;
 use thiserror::Error;
@@ -48,17 +48,19 @@ use tokio::sync::watch;
 
 pub use access::Tokens;
 use access::{Access, Rank};
-use door::{Door, Stays};
 use handover::Handover;
 
 /// Pages that may look at once.
 const MOST_PAGES: usize = 32;
+/// Connections at once: those of the pages, and twice as many for their files.
+const LIMITS: Limits = Limits {
+    most: 96,
+    whose: "the panel",
+};
 /// The longest message of a page, in bytes: a warehouse with all its goods.
 const LONGEST_MESSAGE: usize = 64 * 1024;
 /// How often the end is looked for.
 const LOOK: Duration = Duration::from_millis(100);
-/// The cookie that carries a token.
-const COOKIE: &str = "lager-token";
 
 /// Why there is no panel.
 #[derive(Debug, Error)]
@@ -71,9 +73,6 @@ pub enum PanelError {
         /// Why.
         error: io::Error,
     },
-    /// It would drive for anybody on the network.
-    #[error("a panel at {0}, which others can reach, needs tokens")]
-    NoTokens(SocketAddr),
     /// The system does not let it run.
     #[error("the panel cannot run: {0}")]
     Run(#[from] io::Error),
@@ -101,19 +100,12 @@ pub(crate) struct Shared {
 }
 
 impl Panel {
-    /// Listens at `address`.
+    /// Listens at `address`, for whoever has one of the tokens.
     ///
     /// # Errors
     ///
-    /// When the address cannot be had, or others can reach it and there are no tokens.
-    pub fn open(
-        address: SocketAddr,
-        tokens: Option<Tokens>,
-        handle: Handle,
-    ) -> Result<Self, PanelError> {
-        if !address.ip().is_loopback() && tokens.is_none() {
-            return Err(PanelError::NoTokens(address));
-        }
+    /// When the address cannot be had.
+    pub fn open(address: SocketAddr, tokens: Tokens, handle: Handle) -> Result<Self, PanelError> {
         let listener =
             TcpListener::bind(address).map_err(|error| PanelError::Listen { address, error })?;
         Self::on(listener, tokens, handle)
@@ -124,11 +116,7 @@ impl Panel {
     /// # Errors
     ///
     /// When it is none.
-    pub fn on(
-        listener: TcpListener,
-        tokens: Option<Tokens>,
-        handle: Handle,
-    ) -> Result<Self, PanelError> {
+    pub fn on(listener: TcpListener, tokens: Tokens, handle: Handle) -> Result<Self, PanelError> {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         Ok(Self {
@@ -191,14 +179,14 @@ impl Panel {
                 .layer(DefaultBodyLimit::max(stop::LONGEST_BODY))
                 .fallback(get(file))
                 .with_state(self.shared)
-                .into_make_service_with_connect_info::<Stays>();
+                .into_make_service_with_connect_info::<Visitor>();
             let ended = async {
                 while !end.load(Ordering::Relaxed) {
                     tokio::time::sleep(LOOK).await;
                 }
             };
             tokio::select! {
-                served = axum::serve(Door::new(listener), router) => served,
+                served = axum::serve(Door::new(listener, LIMITS), router) => served,
                 () = ended => Ok(()),
             }
         })?;
@@ -207,31 +195,42 @@ impl Panel {
 }
 
 /// One of the page's files.
-async fn file(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+async fn file(
+    State(shared): State<Arc<Shared>>,
+    ConnectInfo(visitor): ConnectInfo<Visitor>,
+    request: Request,
+) -> Response {
+    visitor.has_asked();
     let headers = request.headers();
     if host(&shared.access, headers).is_none() {
         return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
     }
     let path = request.uri().path();
     // The token is taken out of the address, which people copy and histories keep.
-    if let Some(token) = request
-        .uri()
-        .query()
-        .and_then(|query| query.strip_prefix("token="))
-    {
+    if let Some((token, rest)) = request.uri().query().and_then(taken_out) {
         if shared.access.rank(Some(token)).is_none() {
             return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
         }
-        let cookie = format!("{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/");
-        let mut response = (StatusCode::SEE_OTHER, [(header::LOCATION, "/")]).into_response();
-        if let Ok(cookie) = HeaderValue::from_str(&cookie) {
-            response.headers_mut().insert(header::SET_COOKIE, cookie);
+        visitor.admit();
+        // Two slashes would be somebody else's address.
+        let path = format!("/{}", path.trim_start_matches('/'));
+        let mut response = StatusCode::SEE_OTHER.into_response();
+        let name = shared.access.cookie();
+        let cookie = format!("{name}={token}; HttpOnly; SameSite=Strict; Path=/");
+        for (name, value) in [
+            (header::LOCATION, path + &rest),
+            (header::SET_COOKIE, cookie),
+        ] {
+            if let Ok(value) = HeaderValue::from_str(&value) {
+                response.headers_mut().insert(name, value);
+            }
         }
         return guarded(response);
     }
     if rank(&shared.access, headers).is_none() {
         return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
     }
+    visitor.admit();
     let robot = chosen(&shared.handle, request.uri().query());
     let Some((kind, content)) = page::file(path, &robot) else {
         return refuse(
@@ -254,7 +253,13 @@ fn chosen(handle: &Handle, query: Option<&str>) -> String {
 }
 
 /// STOP by the page's form; the same doors as to the page's socket.
-async fn stop(State(shared): State<Arc<Shared>>, headers: HeaderMap, body: String) -> Response {
+async fn stop(
+    State(shared): State<Arc<Shared>>,
+    ConnectInfo(visitor): ConnectInfo<Visitor>,
+    headers: HeaderMap,
+    body: String,
+) -> Response {
+    visitor.has_asked();
     let Some(host) = host(&shared.access, &headers) else {
         return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
     };
@@ -264,6 +269,7 @@ async fn stop(State(shared): State<Arc<Shared>>, headers: HeaderMap, body: Strin
     if rank(&shared.access, &headers).is_none() {
         return refuse(StatusCode::FORBIDDEN, WRONG_TOKEN);
     }
+    visitor.admit();
     let became = stop::stop(&shared.handle, stop::names(&body)).await;
     let wants = text(&headers, &header::ACCEPT).unwrap_or_default();
     guarded(match wants.contains("text/html") {
@@ -283,6 +289,18 @@ fn is_ours(access: &Access, headers: &HeaderMap, host: &str) -> bool {
 /// How the page that asks stands to this panel, as browsers say it.
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
+/// The token in what follows the path, and the rest of that with its question mark.
+fn taken_out(query: &str) -> Option<(&str, String)> {
+    let token = |word: &str| word.starts_with("token=");
+    let found = query.split('&').find(|word| token(word))?;
+    let rest: Vec<_> = query.split('&').filter(|word| !token(word)).collect();
+    let rest = match rest.is_empty() {
+        true => String::new(),
+        false => format!("?{}", rest.join("&")),
+    };
+    Some((found.trim_start_matches("token="), rest))
+}
+
 /// The answer with what keeps others out of it.
 fn guarded(mut response: Response) -> Response {
     for (name, value) in page::HEADERS {
@@ -295,9 +313,9 @@ fn guarded(mut response: Response) -> Response {
     response
 }
 
-const WRONG_TOKEN: &str = "open the address with ?token= that `lager station` has printed; without \
-     it nobody gets in\nöppna adressen med ?token= som `lager station` har skrivit ut; utan den \
-     kommer ingen in";
+const WRONG_TOKEN: &str = "open the address with ?token= that `lager up` or `lager station` has \
+     printed; without it nobody gets in\nöppna adressen med ?token= som `lager up` eller `lager \
+     station` har skrivit ut; utan den kommer ingen in";
 
 const WRONG_HOST: &str = "the panel answers to its address and not to this name\npanelen svarar på \
      sin adress och inte på detta namn";
@@ -305,10 +323,11 @@ const WRONG_HOST: &str = "the panel answers to its address and not to this name\
 /// A page's socket.
 async fn live(
     State(shared): State<Arc<Shared>>,
-    ConnectInfo(stays): ConnectInfo<Stays>,
+    ConnectInfo(visitor): ConnectInfo<Visitor>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
+    visitor.has_asked();
     let Some(host) = host(&shared.access, &headers) else {
         return refuse(StatusCode::MISDIRECTED_REQUEST, WRONG_HOST);
     };
@@ -328,9 +347,11 @@ async fn live(
             "as many pages look as may; close one of them",
         );
     };
-    stays.allow();
+    visitor.let_stay();
     upgrade
         .max_message_size(LONGEST_MESSAGE)
+        // Half a frame is kept until the rest of it has come.
+        .max_frame_size(LONGEST_MESSAGE)
         .on_upgrade(move |socket| socket::converse(socket, place, rank))
 }
 
@@ -371,9 +392,10 @@ fn host<'h>(access: &Access, headers: &'h HeaderMap) -> Option<&'h str> {
 /// What the sender of these headers may do.
 fn rank(access: &Access, headers: &HeaderMap) -> Option<Rank> {
     let cookies = text(headers, &header::COOKIE).unwrap_or_default();
+    let name = access.cookie();
     let token = cookies
         .split("; ")
-        .find_map(|cookie| cookie.strip_prefix(COOKIE)?.strip_prefix('='));
+        .find_map(|cookie| cookie.strip_prefix(&name)?.strip_prefix('='));
     access.rank(token)
 }
 

@@ -170,6 +170,13 @@ impl Outlets {
         }
     }
 
+    /// Forgets who takes no news any more; each would keep the memory of his queue until then.
+    pub(crate) fn forget_gone(&mut self) {
+        // What he counts with is shared by both ends.
+        self.subscribers
+            .retain(|(_, lost)| Arc::strong_count(lost) > 1);
+    }
+
     /// Hands on what robots have said. It waits for nobody.
     pub(crate) fn hand_on(&mut self, news: Vec<News>) {
         for news in news
@@ -195,5 +202,22 @@ impl Outlets {
                     Err(TrySendError::Disconnected(_)) => false,
                 });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_takes_no_news_any_more_is_forgotten_though_no_robot_speaks() {
+        let mut outlets = Outlets::default();
+        let stays = outlets.subscribe(false);
+        for _ in 0..100 {
+            drop(outlets.subscribe(true));
+            outlets.forget_gone();
+            assert_eq!(outlets.subscribers.len(), 1);
+        }
+        assert_eq!(stays.lost(), 0);
     }
 }

@@ -21,9 +21,6 @@ const MOST_UNREAD: usize = 64 * 1024;
 /// waits for it.
 const SLOWEST: Duration = Duration::from_secs(5);
 
-/// How long a peer may be connected without having sent a line.
-const SILENT: Duration = Duration::from_secs(10);
-
 /// Bytes that are read at a time. What a peer sends beyond them waits for its next turn, so that
 /// one that never ends keeps nobody else waiting.
 const READ: usize = 4096;
@@ -75,16 +72,13 @@ pub(crate) struct Connection {
     unread_since: Instant,
     /// Since when a line is begun and not ended.
     begun_since: Option<Instant>,
-    opened: Instant,
-    /// Whether its first line is still awaited.
-    is_silent: bool,
     /// For how long what is read now may have waited, since this process was held up.
     late: Duration,
 }
 
 impl Connection {
-    /// A new connection; `speaks_first` is whether its peer has to say something soon.
-    pub(crate) fn new(stream: Stream, now: Instant, speaks_first: bool) -> Self {
+    /// A new connection.
+    pub(crate) fn new(stream: Stream, now: Instant) -> Self {
         Self {
             stream,
             splitter: LineSplitter::new(),
@@ -93,8 +87,6 @@ impl Connection {
             is_begun: false,
             unread_since: now,
             begun_since: None,
-            opened: now,
-            is_silent: speaks_first,
             late: Duration::ZERO,
         }
     }
@@ -156,7 +148,6 @@ impl Connection {
         let mut bytes = &buffer[..count];
         let mut ended = false;
         while let Some(line) = self.splitter.next(&mut bytes) {
-            self.is_silent = false;
             ended = true;
             hear(line);
         }
@@ -230,10 +221,8 @@ impl Connection {
         if (self.is_deaf || self.wants_to_write()) && over(self.unread_since, SLOWEST) {
             return Some("it does not read what it is told");
         }
-        if self.begun_since.is_some_and(|since| over(since, SLOWEST)) {
-            return Some("it has begun a line and does not end it");
-        }
-        (self.is_silent && over(self.opened, SILENT)).then_some("it says nothing")
+        let is_begun = self.begun_since.is_some_and(|since| over(since, SLOWEST));
+        is_begun.then_some("it has begun a line and does not end it")
     }
 }
 
@@ -259,7 +248,7 @@ mod tests {
         let (ours, mut theirs) = UnixStream::pair().expect("sockets");
         ours.set_nonblocking(true).expect("a socket");
         let now = Instant::now();
-        let mut connection = Connection::new(Stream::Unix(ours), now, false);
+        let mut connection = Connection::new(Stream::Unix(ours), now);
         theirs.write_all(b"fetchprod 2\n").expect("it is there");
         drop(theirs);
         connection
@@ -287,7 +276,7 @@ mod tests {
         let (ours, mut theirs) = UnixStream::pair().expect("sockets");
         ours.set_nonblocking(true).expect("a socket");
         let now = Instant::now();
-        let mut connection = Connection::new(Stream::Unix(ours), now, false);
+        let mut connection = Connection::new(Stream::Unix(ours), now);
         // One line that the machine takes in part only.
         let long = "x".repeat(4 << 20) + "\n";
         connection.unread.extend_from_slice(long.as_bytes());

@@ -353,6 +353,7 @@ impl State {
     fn turn(&mut self, now: Duration) {
         self.station.turn(now);
         self.hand_on();
+        self.outlets.forget_gone();
     }
 
     fn hand_on(&mut self) {

@@ -25,6 +25,7 @@ mod asked;
 mod awaited;
 mod connection;
 pub mod files;
+mod gate;
 mod given;
 mod handle;
 mod queues;
@@ -34,6 +35,7 @@ mod server;
 mod shown;
 mod station;
 mod unread;
+mod waiting;
 mod warehouse;
 mod wheel;
 

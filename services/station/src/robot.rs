@@ -424,6 +424,12 @@ impl Robot {
         None
     }
 
+    /// People are told this of it.
+    pub(crate) fn is_told(&mut self, why: &str) {
+        let text = Text::new(why.replace(['\r', '\n'], " "));
+        self.told_news.push(Told::Thought(text.unwrap_or_default()));
+    }
+
     fn asked(&mut self, query: Query) -> Option<StationLine> {
         let before = self.doing;
         self.doing = match query {

@@ -1,8 +1,11 @@
 //! The sockets: robots by TCP, one GaG by a unix socket of this user alone, in one thread that
 //! waits for all of them.
 //!
-//! - At most [`Server::MOST_ROBOTS`] connections of robots are open; a further one is closed at
-//!   once, and so is the one of a GaG while there is one.
+//! - Who connects waits until he has said who he is, and proved it where the station knows secrets
+//!   (`waiting.rs`, `gate.rs`); then he gets one of the robots' places (`station/links.rs`). A GaG
+//!   is closed at once while there is another one.
+//! - Where this process or the machine has no open file left, the newcomers wait in the system's
+//!   queue, and this thread does not turn meanwhile.
 //! - A peer that is too slow is closed (`connection.rs`). A peer that is gone without a word is
 //!   found by the kernel: it probes every silent peer after 5 s, and gives one up that has not
 //!   answered for 10 s, or has not confirmed for 10 s what it was sent.
@@ -13,7 +16,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::os::fd::AsFd;
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -21,21 +24,28 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lager_lines::{Called, LATEST_MOVE, Name, ProductId, UnknownProduct};
+use lager_lines::conversation::RobotLine;
+use lager_lines::secret::{Nonce, Secrets};
+use lager_lines::splitter::LineError;
+use lager_lines::{Called, LATEST_MOVE, Name, ProductId, UnknownProduct, to_line};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt;
 use thiserror::Error;
 
 use crate::connection::{Connection, Stream};
 use crate::files::{HeldBy, Hold, ReadError};
+use crate::gate::{Gate, Verdict};
 use crate::handle::Handle;
 use crate::queues::Queues;
 use crate::saver::{Changes, Saver};
 use crate::station::{Output, Peer, Station, WishRefused};
+use crate::waiting::Waiting;
 use crate::warehouse::{LoadError, Warehouse, WarehouseError, load};
 
 /// How often slow peers and the wish to end are looked for when nothing happens.
 const GLANCE: Duration = Duration::from_millis(50);
+/// How long nobody is let in after the system had no file to open for him.
+const REST: Duration = Duration::from_millis(250);
 /// When the kernel begins to ask a silent peer whether it is there, and how often.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 const KEEP_ALIVE_AGAIN: Duration = Duration::from_secs(2);
@@ -49,6 +59,8 @@ pub struct ServerConfig {
     pub name: Name,
     /// Where robots connect.
     pub listen: Listen,
+    /// By what robots prove who they are; where there are none they are taken at their word.
+    pub secrets: Secrets,
     /// Where a GaG connects, if one may.
     pub gag: Option<PathBuf>,
     /// The file of the warehouse, in which changes are saved. It need not be there yet.
@@ -144,16 +156,18 @@ pub struct Server {
     _hold: Option<Hold>,
     /// The queues as they are saved.
     saved: Queues,
+    secrets: Secrets,
     connections: BTreeMap<Peer, Connection>,
+    gates: BTreeMap<u64, Gate>,
+    waiting: Waiting,
     next_link: u64,
     /// How long this thread was held up before this turn, if that makes old what waits.
     pause: Option<Duration>,
+    /// Until when nobody is let in, where the system has no file to open for him; it has been said.
+    rests: Option<Instant>,
 }
 
 impl Server {
-    /// Connections of robots that are open at a time, at most.
-    pub const MOST_ROBOTS: usize = 64;
-
     /// Opens the sockets and reads the warehouse. Who connects waits until [`Server::run`].
     ///
     /// # Errors
@@ -218,9 +232,13 @@ impl Server {
             _hold: hold,
             saved,
             handle,
+            secrets: config.secrets,
             connections: BTreeMap::new(),
+            gates: BTreeMap::new(),
+            waiting: Waiting::default(),
             next_link: 0,
             pause: None,
+            rests: None,
         })
     }
 
@@ -246,7 +264,8 @@ impl Server {
     pub fn run(mut self, shutdown: &AtomicBool) -> Result<(), ServerError> {
         let mut turned = Instant::now();
         while !shutdown.load(Ordering::SeqCst) {
-            let ready = self.wait()?;
+            let lets_in = self.rests.is_none_or(|until| Instant::now() >= until);
+            let ready = self.wait(lets_in)?;
             let now = Instant::now();
             let pause = now.saturating_duration_since(turned);
             turned = now;
@@ -266,7 +285,9 @@ impl Server {
                 self.hear(now, peer);
             }
             self.say(now);
-            self.let_in(now);
+            if lets_in {
+                self.let_in(now);
+            }
             self.close_overdue(now);
             self.say(now);
             self.watch_gag();
@@ -291,19 +312,18 @@ impl Server {
     }
 
     /// Waits until there is something to do.
-    fn wait(&self) -> io::Result<Ready> {
-        let mut waited: Vec<PollFd<'_>> = vec![
-            PollFd::new(&self.robots, PollFlags::IN),
-            PollFd::new(&self.wakes, PollFlags::IN),
-        ];
+    fn wait(&self, lets_in: bool) -> io::Result<Ready> {
+        let mut waited: Vec<PollFd<'_>> = vec![PollFd::new(&self.wakes, PollFlags::IN)];
         let first = waited.len();
         for connection in self.connections.values() {
             let mut wants = PollFlags::IN;
             wants.set(PollFlags::OUT, connection.wants_to_write());
             waited.push(PollFd::from_borrowed_fd(connection.as_fd(), wants));
         }
-        if let Some((gag, _)) = &self.gag {
-            waited.push(PollFd::new(gag, PollFlags::IN));
+        if lets_in {
+            waited.push(PollFd::new(&self.robots, PollFlags::IN));
+            let gag = self.gag.iter();
+            waited.extend(gag.map(|(gag, _)| PollFd::new(gag, PollFlags::IN)));
         }
         let glance = Timespec {
             tv_sec: 0,
@@ -330,53 +350,98 @@ impl Server {
 
     /// Lets in who has connected.
     fn let_in(&mut self, now: Instant) {
-        while let Ok((stream, _)) = self.robots.accept() {
-            let robots = self.connections.keys().filter(|peer| **peer != Peer::Gag);
-            if robots.count() >= Self::MOST_ROBOTS {
-                tracing::warn!("a connection is refused: {} are open", Self::MOST_ROBOTS);
-                continue;
-            }
-            let peer = Peer::Robot(self.next_link);
-            self.next_link += 1;
-            match prepare(&stream) {
-                Ok(()) => self.greet(now, peer, Stream::Tcp(stream)),
-                Err(error) => tracing::warn!("a connection is refused: {error}"),
+        let mut failed = None;
+        // Whoever comes faster than that waits for the next turn, as robots do that speak.
+        for _ in 0..Waiting::MOST {
+            match self.robots.accept() {
+                Ok((stream, from)) => match prepare(&stream) {
+                    Ok(()) => self.greet_robot(now, stream, from.ip()),
+                    Err(error) => tracing::warn!("a connection is refused: {error}"),
+                },
+                Err(error) => {
+                    failed = Some(error);
+                    break;
+                }
             }
         }
-        while let Some(Ok((stream, _))) = self.gag.as_ref().map(|(gag, _)| gag.accept()) {
-            let is_own = sockopt::socket_peercred(&stream)
-                .is_ok_and(|peer| peer.uid == rustix::process::geteuid());
-            let is_free = !self.connections.contains_key(&Peer::Gag);
-            if is_own && is_free && stream.set_nonblocking(true).is_ok() {
-                self.greet(now, Peer::Gag, Stream::Unix(stream));
-            } else {
-                tracing::warn!("a GaG is refused: there is one, or it is another user's");
+        if let Some(accepted) = self.gag.as_ref().map(|(gag, _)| gag.accept()) {
+            match accepted {
+                Ok((stream, _)) => self.greet_gag(now, stream),
+                Err(error) => failed = failed.filter(is_short).or(Some(error)),
             }
+        }
+        // Whoever waits stays in the system's queue; to ask for him at once would be in vain.
+        let Some(error) = failed.filter(is_short) else {
+            self.rests = None;
+            return;
+        };
+        if self.rests.replace(now + REST).is_none() {
+            tracing::warn!(
+                "nobody else is let in for now: {error}; robots that are connected stay so. \
+                 `ulimit -n 4096` or LimitNOFILE= in the unit allows more open files"
+            );
         }
     }
 
-    fn greet(&mut self, now: Instant, peer: Peer, stream: Stream) {
-        // A GaG speaks when it is asked, which may take as long as it likes.
-        let speaks_first = peer != Peer::Gag;
-        let mut connection = Connection::new(stream, now, speaks_first);
+    /// A new connection; what waits there may have come while this thread was held up.
+    fn opened(&self, now: Instant, stream: Stream) -> Connection {
+        let mut connection = Connection::new(stream, now);
         if let Some(pause) = self.pause {
             connection.held_up(pause);
         }
+        connection
+    }
+
+    fn greet_robot(&mut self, now: Instant, stream: TcpStream, from: IpAddr) {
+        let link = self.next_link;
+        self.next_link += 1;
+        let peer = Peer::Robot(link);
+        if let Some(goes) = self.waiting.comes(link, from, now) {
+            self.end(Peer::Robot(goes), "others wait to say who they are");
+        }
+        self.gates.insert(link, Gate::new(&self.secrets));
+        let connection = self.opened(now, Stream::Tcp(stream));
         self.connections.insert(peer, connection);
-        self.handle.change(|station| station.connected(peer));
+        self.handle.change(|station| {
+            station.connected(peer);
+            station.comes_from(link, from);
+        });
+    }
+
+    fn greet_gag(&mut self, now: Instant, stream: UnixStream) {
+        let is_own = sockopt::socket_peercred(&stream)
+            .is_ok_and(|peer| peer.uid == rustix::process::geteuid());
+        let is_free = !self.connections.contains_key(&Peer::Gag);
+        if is_own && is_free && stream.set_nonblocking(true).is_ok() {
+            let connection = self.opened(now, Stream::Unix(stream));
+            self.connections.insert(Peer::Gag, connection);
+            self.handle.change(|station| station.connected(Peer::Gag));
+        } else {
+            tracing::warn!("a GaG is refused: there is one, or it is another user's");
+        }
     }
 
     fn hear(&mut self, now: Instant, peer: Peer) {
         let Some(connection) = self.connections.get_mut(&peer) else {
             return;
         };
-        let handle = &self.handle;
         let late = connection.late();
-        let heard = connection.read(now, |line| {
-            handle.change(|station| station.heard_late(peer, late, line));
+        let mut gate = match peer {
+            Peer::Robot(link) => self.gates.get_mut(&link),
+            Peer::Gag => None,
+        };
+        let (handle, secrets) = (&self.handle, &self.secrets);
+        let heard = connection.read(now, |line| match &mut gate {
+            Some(gate) => hear_robot(handle, secrets, gate, peer, line),
+            None => handle.change(|station| station.heard_late(peer, late, line)),
         });
         if let Err(error) = heard {
             self.end(peer, &error.to_string());
+        }
+        if let Peer::Robot(link) = peer
+            && self.handle.look(|station| station.is_seated(link))
+        {
+            self.waiting.goes(link);
         }
     }
 
@@ -426,11 +491,18 @@ impl Server {
         for (peer, why) in overdue {
             self.end(peer, why);
         }
+        for link in self.waiting.overdue(now) {
+            self.end(Peer::Robot(link), "it has not said who it is");
+        }
     }
 
     fn end(&mut self, peer: Peer, why: &str) {
         if self.connections.remove(&peer).is_some() {
             tracing::info!(?peer, "a connection has ended: {why}");
+            if let Peer::Robot(link) = peer {
+                self.gates.remove(&link);
+                self.waiting.goes(link);
+            }
             self.handle.change(|station| station.disconnected(peer));
         }
     }
@@ -449,6 +521,45 @@ impl Drop for Server {
 struct Ready {
     read: Vec<Peer>,
     write: Vec<Peer>,
+}
+
+/// Hears a line of a robot, as far as its gate lets it pass.
+fn hear_robot(
+    handle: &Handle,
+    secrets: &Secrets,
+    gate: &mut Gate,
+    peer: Peer,
+    line: Result<&str, LineError>,
+) {
+    let verdict = match line {
+        Ok(line) => gate.judge(secrets, line, Nonce::random),
+        Err(_) => Verdict::Pass,
+    };
+    handle.change(|station| match (verdict, peer) {
+        (Verdict::Pass, _) => station.heard(peer, line),
+        (Verdict::Ask(proof), _) => station.prove(peer, &proof),
+        (Verdict::Proved(proof, hello), Peer::Robot(link)) => {
+            station.prove(peer, &proof);
+            station.proved(link);
+            if let Ok(hello) = to_line(&RobotLine::Hello(hello)) {
+                station.heard(peer, Ok(hello.trim_end()));
+            }
+        }
+        (Verdict::Refuse(why), _) => {
+            tracing::warn!("{why}");
+            station.refuse(peer, &why);
+        }
+        (Verdict::Proved(..), Peer::Gag) => {}
+    });
+}
+
+/// Whether this process or the machine has no file left to open.
+fn is_short(error: &io::Error) -> bool {
+    use rustix::io::Errno;
+    let short = [Errno::MFILE, Errno::NFILE, Errno::NOBUFS, Errno::NOMEM];
+    error
+        .raw_os_error()
+        .is_some_and(|raw| short.contains(&Errno::from_raw_os_error(raw)))
 }
 
 /// Nothing has a name before there is a warehouse.

@@ -6,8 +6,8 @@
 //!   anything else of a robot          robot-1, robot-2 ..., the first that is free
 //! ```
 //!
-//! - A name has one connection, the newest: the one before is closed, because a robot that comes
-//!   back may have left a connection whose end this station has not noticed.
+//! - A name has one connection, and there are so many places (`station/links.rs`). Whether a robot
+//!   has proved its name is found out before its lines come here (`gate.rs`).
 //! - A line that breaks the grammar closes its connection; no part of it counts.
 //! - A GaG's language has no names of robots, so it speaks for one: the one that has been connected
 //!   for longest. The others are answered from the warehouse and their queues.
@@ -38,7 +38,10 @@ use crate::warehouse::{Warehouse, WarehouseError};
 
 mod actions;
 mod gag;
+mod links;
 mod told;
+
+use links::{Known, Link};
 
 pub use actions::News;
 pub use told::Uses;
@@ -117,8 +120,10 @@ pub struct Station {
     name: Name,
     warehouse: Option<Warehouse>,
     robots: BTreeMap<Name, Robot>,
-    /// The connections of robots, the oldest first, and the names of those that have spoken.
-    links: BTreeMap<u64, Option<Name>>,
+    /// The connections of robots, the oldest first.
+    links: BTreeMap<u64, Link>,
+    /// The names that are known.
+    known: BTreeMap<Name, Known>,
     gag: Option<Gag>,
     outputs: Vec<Output>,
     is_unsaved: bool,
@@ -164,6 +169,7 @@ impl Station {
             warehouse,
             robots: BTreeMap::new(),
             links: BTreeMap::new(),
+            known: BTreeMap::new(),
             gag: None,
             outputs: Vec::new(),
             is_unsaved: false,
@@ -243,6 +249,7 @@ impl Station {
             }
             robot.fetch(product)?;
             self.robots.insert(name.clone(), robot);
+            self.knows(name);
             return Ok(());
         }
         self.wish(name, Wish::Fetch(product))
@@ -280,9 +287,7 @@ impl Station {
     /// Somebody has connected.
     pub fn connected(&mut self, peer: Peer) {
         match peer {
-            Peer::Robot(link) => {
-                self.links.insert(link, None);
-            }
+            Peer::Robot(link) => self.has_connected(link),
             Peer::Gag => {
                 self.gag = Some(Gag::default());
                 self.seat_gag();
@@ -294,7 +299,9 @@ impl Station {
     pub fn disconnected(&mut self, peer: Peer) {
         match peer {
             Peer::Robot(link) => {
-                if let Some(Some(name)) = self.links.remove(&link)
+                if let Some(Link {
+                    name: Some(name), ..
+                }) = self.links.remove(&link)
                     && let Some(robot) = self.robots.get_mut(&name)
                 {
                     robot.disconnected();
@@ -327,7 +334,7 @@ impl Station {
     }
 
     fn robot_said(&mut self, link: u64, line: &str) {
-        let Some(named) = self.links.get(&link).cloned() else {
+        let Some(named) = self.hears(link) else {
             return;
         };
         let said = match RobotLine::read(line) {
@@ -338,7 +345,7 @@ impl Station {
             Some(name) => name,
             None => match self.introduce(link, &said) {
                 Ok(name) => name,
-                Err(why) => return self.close(Peer::Robot(link), why),
+                Err(why) => return self.refuse(Peer::Robot(link), &why),
             },
         };
         let signed = match &said {
@@ -367,66 +374,13 @@ impl Station {
         self.say(&name, answer);
         self.ask_gag(&name);
     }
-
-    /// Gives a connection the name of its robot.
-    fn introduce(&mut self, link: u64, said: &RobotLine) -> Result<Name, String> {
-        let name = match said {
-            RobotLine::Hello(hello) => hello.name.clone(),
-            _ => self.free_name(),
-        };
-        let before = |(_, named): &(&u64, &Option<Name>)| named.as_ref() == Some(&name);
-        if let Some((&old, _)) = self.links.iter().find(before) {
-            let why = format!("robot {name} has connected anew");
-            self.links.remove(&old);
-            self.close(Peer::Robot(old), why);
-        }
-        if !self.robots.contains_key(&name) {
-            self.forget_robots();
-            if self.robots.len() >= Self::MOST_ROBOTS {
-                let most = Self::MOST_ROBOTS;
-                return Err(format!(
-                    "{most} robots are known already; end one of them, or empty its queue"
-                ));
-            }
-        }
-        let robot = self.robots.entry(name.clone()).or_default();
-        robot.turn(self.now);
-        robot.connected();
-        if let Some(warehouse) = &self.warehouse {
-            // It has been checked, and nothing is asked yet.
-            let _ = robot.set_warehouse(warehouse);
-        }
-        self.links.insert(link, Some(name.clone()));
-        self.seat_gag();
-        Ok(name)
-    }
-
-    fn free_name(&self) -> Name {
-        let taken = |name: &Name| self.links.values().flatten().any(|other| other == name);
-        (1..)
-            .filter_map(|number| Name::new(format!("robot-{number}")).ok())
-            .find(|name| !taken(name))
-            .expect("there are more names than connections")
-    }
-
-    /// Makes room for a robot by forgetting one of which nothing needs to be remembered.
-    fn forget_robots(&mut self) {
-        if self.robots.len() >= Self::MOST_ROBOTS {
-            let links = &self.links;
-            self.robots.retain(|name, robot| {
-                robot.queue().next().is_some() || links.values().flatten().any(|one| one == name)
-            });
-        }
-    }
 }
 
 /// What is said.
 impl Station {
     /// Says a line to a robot, on the connection it has.
     fn say(&mut self, name: &Name, line: Option<StationLine>) {
-        let mut links = self.links.iter();
-        let link = links.find(|(_, named)| named.as_ref() == Some(name));
-        let (Some(line), Some((&link, _))) = (line, link) else {
+        let (Some(line), Some(link)) = (line, self.link_of(name)) else {
             return;
         };
         let to = Peer::Robot(link);

@@ -7,5 +7,6 @@ mod laws;
 mod malformed;
 mod productions;
 mod round_trip;
+mod secret;
 mod splitter;
 mod values;

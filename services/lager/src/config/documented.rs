@@ -192,6 +192,10 @@ wanted = {station_wanted}
 {station_panel}
 
 [comm]
+# The file of the secret by which the robot and its external computer prove to each other who they are:
+# one secret, or `<name> <secret>` for each robot, with mode 0600. Unset, a station that `lager up`
+# starts and the robot have one of their own, and whoever answers at [station] address is believed.
+{comm_secret}
 # What the robot does in autonomous mode while the external computer is out of reach: \"go-on\" (it
 # carries out its orders) or \"stand\" (it drives on to the next crossing and stands there until the
 # link is there again). In manual mode it stands at once.
@@ -275,6 +279,7 @@ debounce_ms = {debounce}
             buttons_reset = line("reset", self.buttons.reset),
             buttons_switch = line("switch", self.buttons.switch),
             debounce = self.buttons.debounce_ms,
+            comm_secret = unset_path("secret", &self.comm.secret),
             link_lost = match self.comm.link_lost {
                 WithoutLink::GoOn => "\"go-on\"",
                 WithoutLink::Stand => "\"stand\"",
@@ -391,6 +396,7 @@ mod tests {
                 panel: Some("127.0.0.1:7411".parse().expect("an address")),
             },
             comm: CommSection {
+                secret: Some("/etc/lager/secret".into()),
                 link_lost: WithoutLink::Stand,
             },
             buttons: ButtonsSection {

@@ -54,9 +54,13 @@ impl Default for StationSection {
 }
 
 /// `[comm]`: how the robot talks to it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CommSection {
+    /// The file of the secret by which robot and station prove who they are; unset, a station that
+    /// `up` starts and the robot have one of their own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub secret: Option<PathBuf>,
     /// What it does in autonomous mode while it is out of reach.
     pub link_lost: WithoutLink,
 }

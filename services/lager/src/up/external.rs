@@ -10,8 +10,12 @@
 //!   no port can be had, or no line can tell the warehouse: none
 //! ```
 //! A station of its own shows a panel, unless the robot is headless: at 127.0.0.1:7410, or at a
-//! port that is free. Everybody on this machine may drive from there, so it answers this machine
-//! alone.
+//! port that is free, to whoever has the token in the address that `up` prints.
+//!
+//! A robot and a station of its own prove to each other that they know a secret: the one in the
+//! robot's folder, which only this user can read, or the one in `--secret`. Another robot that
+//! joins the station of a robot on this bus is told where that one's secret lies. A station that is
+//! somebody else's is believed unless there is a `--secret`.
 //!
 //! The socket is opened here and handed to the station as its standard output, so the port stays
 //! the same when a station dies, and a robot that connects meanwhile waits for its successor.
@@ -24,12 +28,16 @@
 use std::fs;
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::FileTypeExt as _;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
+use lager_comm::secrets_at;
+use lager_lines::Name;
+use lager_panel::Tokens;
 
 use crate::config::{Config, StationSection};
 use crate::goods;
-use crate::runtime::RuntimeFolder;
+use crate::runtime::{NameLock, RuntimeFolder};
 use crate::station;
 
 /// The choice, and what to tell people about it.
@@ -48,17 +56,39 @@ pub struct External {
 /// Chooses, and puts into `config` what comm is to know.
 ///
 /// # Errors
-/// The place of the bus cannot be had.
-pub fn choose(config: &mut Config, headless: bool) -> Result<External> {
-    let mut external = station_for(config)?;
-    let address = config.station.panel.take().filter(|_| !headless);
-    if headless || external.listener.is_none() {
-        return Ok(external);
+/// The place of the bus cannot be had, or the secret that is asked for.
+pub fn choose(config: &mut Config, lock: &mut NameLock, headless: bool) -> Result<External> {
+    if let Some(file) = &mut config.comm.secret {
+        *file = std::path::absolute(&*file)?;
+        let name = Name::new(config.name.clone());
+        let is_there = secrets_at(file)?.of(&name?).is_some();
+        if config.station.wanted && !is_there {
+            bail!(
+                "{} holds no secret of robot {}",
+                file.display(),
+                config.name
+            );
+        }
     }
+    let mut external = station_for(config)?;
+    let tokens = match &external.listener {
+        Some(_) => {
+            let secret = lock.make_secret()?;
+            if config.comm.secret.is_none() {
+                config.comm.secret = Some(RuntimeFolder::secret(config)?);
+            }
+            Some(Tokens::of(&secret))
+        }
+        None => None,
+    };
+    let address = config.station.panel.take().filter(|_| !headless);
+    let Some(tokens) = tokens.filter(|_| !headless) else {
+        return Ok(external);
+    };
     external.panel = Some(match panel(address) {
         Ok(address) => {
             config.station.panel = Some(address);
-            format!("the panel is at http://{address}")
+            format!("the panel is at {}", station::driver_at(address, &tokens))
         }
         Err(error) => format!("there is no panel: {error:#}"),
     });
@@ -88,12 +118,19 @@ fn station_for(config: &mut Config) -> Result<External> {
             told: "there is no external computer; the warehouse is told here".into(),
         });
     }
-    if let Some(address) = &config.station.address {
+    if let Some(address) = config.station.address.clone() {
+        if config.comm.secret.is_none() {
+            config.comm.secret = secret_for(config, &address)?;
+        }
+        let believed = match config.comm.secret {
+            Some(_) => "",
+            None => "; whoever answers there is believed, with --secret FILE it proves who it is",
+        };
         return Ok(External {
             listener: None,
             panel: None,
             gateway: Vec::new(),
-            told: format!("the external computer is the one at {address}"),
+            told: format!("the external computer is the one at {address}{believed}"),
         });
     }
     if let Some(gag) = &config.station.gag {
@@ -117,14 +154,18 @@ fn station_for(config: &mut Config) -> Result<External> {
     };
     // Who wants a GaG of this robot's own wants a station of its own.
     if config.station.gag.is_none()
-        && let Some((robot, panel)) = neighbour(config)?
+        && let Some(theirs) = neighbour(config)?
     {
         let address = StationSection::USUAL.to_owned();
+        let robot = &theirs.name;
         let told = format!("the external computer is that of robot `{robot}`, at {address}");
         config.station.address = Some(address);
+        config.comm.secret.clone_from(&theirs.comm.secret);
+        let panel = theirs.station.panel.zip(station::tokens(&theirs).ok());
+        let panel = panel.map(|(at, tokens)| station::driver_at(at, &tokens));
         return Ok(External {
             listener: None,
-            panel: panel.map(|panel| format!("the panel is at http://{panel}")),
+            panel: panel.map(|panel| format!("the panel is at {panel}")),
             gateway: Vec::new(),
             told,
         });
@@ -161,30 +202,44 @@ fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
 }
 
 /// A robot of this user's on this bus that is up, has a station of its own at the usual address,
-/// and drives in the same warehouse; and where its panel is.
-fn neighbour(config: &Config) -> Result<Option<(String, Option<SocketAddr>)>> {
-    let bus = config.bus()?;
-    let place = bus.place()?;
+/// and drives in the same warehouse, as it was started.
+fn neighbour(config: &Config) -> Result<Option<Config>> {
     let warehouse = config.warehouse()?;
-    let it = |name: &str| {
-        let theirs = RuntimeFolder::running(&Config {
-            name: name.to_owned(),
-            ..config.clone()
-        });
-        let theirs = theirs.ok().flatten()?;
+    let is_it = |theirs: &Config| {
         let gag = match &theirs.station.gag {
             Some(gag) => Ok(gag.clone()),
-            None => RuntimeFolder::gag(&theirs),
+            None => RuntimeFolder::gag(theirs),
         };
         let serves = gag
             .and_then(|gag| Ok(fs::symlink_metadata(gag)?.file_type().is_socket()))
             .unwrap_or(false);
-        let is_it = serves
+        serves
             && theirs.station.address.as_deref() == Some(StationSection::USUAL)
-            && theirs.warehouse().is_ok_and(|theirs| theirs == warehouse);
-        is_it.then(|| (name.to_owned(), theirs.station.panel))
+            && theirs.warehouse().is_ok_and(|theirs| theirs == warehouse)
     };
-    let up = place.up();
-    let mut names = up.keys().map(lager_ports::RobotName::as_str);
-    Ok(names.find_map(it))
+    Ok(others(config)?.into_iter().find(is_it))
+}
+
+/// The file of the secret by which another robot on this bus talks to the station at `address`.
+fn secret_for(config: &Config, address: &str) -> Result<Option<PathBuf>> {
+    let talks = |theirs: &Config| theirs.station.address.as_deref() == Some(address);
+    let mut others = others(config)?.into_iter();
+    Ok(others.find(talks).and_then(|theirs| theirs.comm.secret))
+}
+
+/// The robots on this bus that are up, as they were started.
+fn others(config: &Config) -> Result<Vec<Config>> {
+    let bus = config.bus()?;
+    let up = bus.place()?.up();
+    let names = up.keys().map(lager_ports::RobotName::as_str);
+    let others = names
+        .filter(|name| *name != config.name)
+        .filter_map(|name| {
+            let theirs = Config {
+                name: name.to_owned(),
+                ..config.clone()
+            };
+            RuntimeFolder::running(&theirs).ok().flatten()
+        });
+    Ok(others.collect())
 }

@@ -11,7 +11,7 @@ use crate::scene::{Page, Running, WATCHDOG, server, status};
 
 #[test]
 fn a_page_that_says_what_nobody_understands_is_told_and_then_closed() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let mut page = panel.own_page();
     page.say("do r1 7 0 fly");
     let answer = page.line("answer ").unwrap();
@@ -28,7 +28,7 @@ fn a_page_that_says_what_nobody_understands_is_told_and_then_closed() {
 
 #[test]
 fn a_page_that_says_more_than_a_person_can_is_closed() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let mut page = panel.own_page();
     for number in 0..5_000 {
         if page
@@ -44,7 +44,7 @@ fn a_page_that_says_more_than_a_person_can_is_closed() {
 
 #[test]
 fn a_warehouse_is_described_and_shown_to_everybody() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let (mut page, mut other) = (panel.own_page(), panel.own_page());
     assert_eq!(other.line("warehouse ").unwrap(), "warehouse null");
     page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":0}"#);
@@ -61,13 +61,13 @@ fn a_warehouse_is_described_and_shown_to_everybody() {
 
 #[test]
 fn so_many_pages_look_at_once_and_one_that_goes_makes_room() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let mut pages: Vec<Page> = (0..32).map(|_| panel.own_page()).collect();
     let origin = format!("http://{}", panel.address);
-    assert_eq!(panel.page(&origin, "").err(), Some(503));
+    assert_eq!(panel.page(&origin, &panel.cookie()).err(), Some(503));
     pages.truncate(31);
     let give_up = Instant::now() + WATCHDOG;
-    while panel.page(&origin, "").is_err() {
+    while panel.page(&origin, &panel.cookie()).is_err() {
         assert!(Instant::now() < give_up);
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -80,7 +80,7 @@ fn a_page_is_told_that_the_disk_does_not_take_its_warehouse() {
     // Nothing can be written under the name of a folder, whoever asks.
     let in_the_way = folder.join("warehouse.toml.new");
     std::fs::create_dir_all(&in_the_way).unwrap();
-    let panel = Running::of(server(Some(file.clone())), None);
+    let panel = Running::of(server(Some(file.clone())));
     let mut page = panel.own_page();
     page.say(r#"warehouse 1 {"size":[2,3],"side_length_cm":40}"#);
     let answer = page.line("answer 1").unwrap();
@@ -100,7 +100,7 @@ fn a_page_is_told_that_the_disk_does_not_take_its_warehouse() {
 
 #[test]
 fn a_page_that_takes_nothing_in_is_dropped_though_it_says_that_it_is_there() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let mut page = panel.own_page();
     page.line("you ").unwrap();
     // 60 kB of news after the other, more than the system keeps for a socket.
@@ -125,8 +125,68 @@ fn a_page_that_takes_nothing_in_is_dropped_though_it_says_that_it_is_there() {
 }
 
 #[test]
+fn whoever_asks_slowly_keeps_no_page_out() {
+    let panel = Running::new();
+    // More than there is room for; each goes on with its request for as long as it may.
+    let crowd: Vec<_> = (0..200)
+        .map(|_| {
+            let mut slow = TcpStream::connect(panel.address).unwrap();
+            let _ = slow.write_all(b"GET / HTTP/1.1\r\nHost: ");
+            slow
+        })
+        .collect();
+    // While all of them are there.
+    for _ in 0..50 {
+        assert_eq!(status(&panel.ask_as_driver("/")), 200);
+    }
+    assert!(panel.own_page().line("you ").is_some());
+    drop(crowd);
+}
+
+/// A frame's head, as a browser masks it: text or its continuation, so long, and whether it is the
+/// last of its message.
+fn frame(is_first: bool, is_last: bool, length: u64) -> Vec<u8> {
+    let mut head = vec![u8::from(is_last) << 7 | u8::from(is_first), 0x80 | 127];
+    head.extend(length.to_be_bytes());
+    head.extend([0; 4]);
+    head
+}
+
+#[test]
+fn half_a_message_of_a_page_is_not_kept_beyond_what_a_page_says() {
+    let closes = |pieces: &[Vec<u8>]| {
+        let panel = Running::new();
+        let mut page = panel.own_page();
+        page.line("you ").unwrap();
+        let stream = page.0.get_mut();
+        for piece in pieces {
+            if stream.write_all(piece).is_err() {
+                return;
+            }
+        }
+        let end = Instant::now() + WATCHDOG;
+        while page.0.read().is_ok() {
+            assert!(Instant::now() < end, "it is kept");
+        }
+    };
+    // Told to come, and half of it there.
+    let mut half = frame(true, true, 15 << 20);
+    half.extend(vec![b'a'; 1 << 20]);
+    closes(&[half]);
+    // In parts that never end.
+    let part = |is_first| {
+        let mut part = frame(is_first, false, 32 * 1024);
+        part.extend(vec![b'a'; 32 * 1024]);
+        part
+    };
+    let mut parts = vec![part(true)];
+    parts.extend((0..64).map(|_| part(false)));
+    closes(&parts);
+}
+
+#[test]
 fn whoever_connects_and_asks_nothing_is_sent_away() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let mut silent = TcpStream::connect(panel.address).unwrap();
     let mut slow = TcpStream::connect(panel.address).unwrap();
     slow.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
@@ -148,5 +208,5 @@ fn whoever_connects_and_asks_nothing_is_sent_away() {
     // A page stays, and others are served.
     page.say("take r1 1");
     assert!(page.line("answer 1").is_some());
-    assert_eq!(status(&panel.ask("/", &[("Host", &panel.host())])), 200);
+    assert_eq!(status(&panel.ask_as_driver("/")), 200);
 }

@@ -5,16 +5,12 @@ mod scene;
 mod stop;
 mod wheel;
 
-use std::net::SocketAddr;
-
-use lager_panel::{Panel, PanelError, Tokens};
-
-use scene::{Running, server, status};
+use scene::{Running, status};
 
 #[test]
 fn the_page_comes_with_what_keeps_others_out() {
-    let panel = Running::new(None);
-    let answer = panel.ask("/", &[("Host", &panel.host())]);
+    let panel = Running::new();
+    let answer = panel.ask_as_driver("/");
     assert_eq!(status(&answer), 200);
     for header in [
         "content-security-policy: default-src 'none'; script-src 'self'",
@@ -23,19 +19,39 @@ fn the_page_comes_with_what_keeps_others_out() {
     ] {
         assert!(answer.contains(header), "{header}: {answer}");
     }
-    assert_eq!(
-        status(&panel.ask("/screen", &[("Host", &panel.host())])),
-        200
-    );
-    assert_eq!(
-        status(&panel.ask("/nothing", &[("Host", &panel.host())])),
-        404
-    );
+    assert_eq!(status(&panel.ask_as_driver("/screen")), 200);
+    assert_eq!(status(&panel.ask_as_driver("/nothing")), 404);
+}
+
+/// What stands in an answer's head under this name.
+fn head<'a>(answer: &'a str, name: &str) -> &'a str {
+    let mut lines = answer.lines();
+    let found = lines.find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
+    found.unwrap()
+}
+
+#[test]
+fn an_address_with_a_token_leads_to_the_same_page_without_it() {
+    let panel = Running::new();
+    let (host, token) = (panel.host(), &panel.tokens.driver);
+    for (asked, leads) in [
+        (format!("/?token={token}"), "/"),
+        (format!("/screen?token={token}"), "/screen"),
+        (format!("/screen?r2&token={token}"), "/screen?r2"),
+        (format!("/screen?token={token}&r2"), "/screen?r2"),
+        // Never to somebody else's page.
+        (format!("//evil.example/?token={token}"), "/evil.example/"),
+    ] {
+        let answer = panel.ask(&asked, &[("Host", &host)]);
+        assert_eq!(status(&answer), 303, "{asked}");
+        assert_eq!(head(&answer, "location"), leads, "{asked}");
+        assert!(head(&answer, "set-cookie").contains(token), "{asked}");
+    }
 }
 
 #[test]
 fn another_name_for_this_machine_is_refused() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let port = panel.address.port();
     for host in [format!("evil.example:{port}"), "127.0.0.1:1".into()] {
         let answer = panel.ask("/", &[("Host", &host)]);
@@ -52,40 +68,40 @@ fn another_name_for_this_machine_is_refused() {
 
 #[test]
 fn the_page_of_somebody_else_opens_no_socket() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     for origin in ["http://evil.example", "null", "http://127.0.0.1:1"] {
-        assert_eq!(panel.page(origin, "").err(), Some(403), "{origin}");
+        let opened = panel.page(origin, &panel.cookie());
+        assert_eq!(opened.err(), Some(403), "{origin}");
     }
     let line = panel.own_page().line("you ").unwrap();
     assert!(line.ends_with(" driver"), "{line}");
 }
 
 #[test]
-fn beyond_this_machine_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
-    let everywhere = SocketAddr::from(([0, 0, 0, 0], 0));
-    let refused = Panel::open(everywhere, None, server(None).handle());
-    assert!(matches!(refused, Err(PanelError::NoTokens(_))));
-
-    let tokens = Tokens::random().unwrap();
-    let panel = Running::new(Some(tokens.clone()));
-    let host = panel.host();
-    assert_eq!(status(&panel.ask("/", &[("Host", &host)])), 403);
+fn on_this_machine_too_a_token_is_needed_and_a_viewers_only_looks_and_stops() {
+    let panel = Running::new();
+    let (host, tokens) = (panel.host(), panel.tokens.clone());
+    let answer = panel.ask("/", &[("Host", &host)]);
+    assert_eq!(status(&answer), 403);
+    for part in ["`lager up`", "skrivit ut"] {
+        assert!(answer.contains(part), "{part}: {answer}");
+    }
     assert_eq!(status(&panel.ask("/?token=0", &[("Host", &host)])), 403);
     let answer = panel.ask(&format!("/?token={}", tokens.viewer), &[("Host", &host)]);
     assert_eq!(status(&answer), 303, "the address does not keep it");
-    let cookie = answer
-        .lines()
-        .find_map(|line| line.strip_prefix("set-cookie: "))
-        .unwrap();
+    let cookie = head(&answer, "set-cookie");
     assert!(
         cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"),
         "{cookie}"
     );
     let cookie = cookie.split(';').next().unwrap();
-    assert_eq!(
-        status(&panel.ask("/", &[("Host", &host), ("Cookie", cookie)])),
-        200
-    );
+    let with = |cookie: &str| status(&panel.ask("/", &[("Host", &host), ("Cookie", cookie)]));
+    assert_eq!(with(cookie), 200);
+    // That of a panel at another port of this machine, beside it or alone.
+    let (_, token) = cookie.split_once('=').unwrap();
+    let other = format!("lager-token-1={token}");
+    assert_eq!(with(&other), 403);
+    assert_eq!(with(&format!("lager-token-1=0; {cookie}")), 200);
 
     let origin = format!("http://{}", panel.address);
     assert_eq!(panel.page(&origin, "").err(), Some(403));

@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lager_lines::Name;
+use lager_lines::secret::Secrets;
 use lager_panel::{Panel, Tokens};
 use lager_station::{Handle, Listen, Server, ServerConfig};
 use tungstenite::client::IntoClientRequest as _;
@@ -23,6 +24,7 @@ pub(crate) struct Running {
     /// Where robots connect.
     pub(crate) station: SocketAddr,
     pub(crate) handle: Handle,
+    pub(crate) tokens: Tokens,
     end: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -31,6 +33,7 @@ pub(crate) fn server(warehouse: Option<PathBuf>) -> Server {
     Server::open(ServerConfig {
         name: Name::new("station").unwrap(),
         listen: Listen::At(SocketAddr::from(([127, 0, 0, 1], 0))),
+        secrets: Secrets::default(),
         gag: None,
         queues: warehouse.as_deref().map(lager_station::Queues::beside),
         warehouse,
@@ -41,14 +44,15 @@ pub(crate) fn server(warehouse: Option<PathBuf>) -> Server {
 }
 
 impl Running {
-    pub(crate) fn new(tokens: Option<Tokens>) -> Self {
-        Self::of(server(None), tokens)
+    pub(crate) fn new() -> Self {
+        Self::of(server(None))
     }
 
-    pub(crate) fn of(server: Server, tokens: Option<Tokens>) -> Self {
+    pub(crate) fn of(server: Server) -> Self {
+        let tokens = Tokens::random().unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let (handle, station) = (server.handle(), server.address().unwrap());
-        let panel = Panel::on(listener, tokens, handle.clone()).unwrap();
+        let panel = Panel::on(listener, tokens.clone(), handle.clone()).unwrap();
         let address = panel.address().unwrap();
         let end = Arc::new(AtomicBool::new(false));
         let (ends, too) = (Arc::clone(&end), Arc::clone(&end));
@@ -60,6 +64,7 @@ impl Running {
             address,
             station,
             handle,
+            tokens,
             end,
             threads,
         }
@@ -97,6 +102,18 @@ impl Running {
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).unwrap();
         String::from_utf8_lossy(&answer).into_owned()
+    }
+
+    /// The cookie of a driver's browser.
+    pub(crate) fn cookie(&self) -> String {
+        let port = self.address.port();
+        format!("lager-token-{port}={}", self.tokens.driver)
+    }
+
+    /// The answer to a driver's browser.
+    pub(crate) fn ask_as_driver(&self, path: &str) -> String {
+        let (host, cookie) = (self.host(), self.cookie());
+        self.ask(path, &[("Host", &host), ("Cookie", &cookie)])
     }
 
     pub(crate) fn host(&self) -> String {
@@ -149,7 +166,8 @@ impl Running {
     }
 
     pub(crate) fn own_page(&self) -> Page {
-        self.page(&format!("http://{}", self.address), "").unwrap()
+        let origin = format!("http://{}", self.address);
+        self.page(&origin, &self.cookie()).unwrap()
     }
 }
 

@@ -3,13 +3,11 @@
 use std::io::Write as _;
 use std::net::TcpStream;
 
-use lager_panel::Tokens;
-
 use crate::scene::{Running, status};
 
 #[test]
 fn a_form_of_the_panels_own_page_stops_and_says_what_became_of_it() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let _robots = [panel.robot("r1"), panel.robot("r2")];
     let mut page = panel.own_page();
     for name in ["r1", "r2"] {
@@ -17,7 +15,8 @@ fn a_form_of_the_panels_own_page_stops_and_says_what_became_of_it() {
             .unwrap();
     }
     let own = format!("http://{}", panel.host());
-    let origin = [("Origin", own.as_str())];
+    let cookie = panel.cookie();
+    let origin = [("Origin", own.as_str()), ("Cookie", cookie.as_str())];
     for (body, wanted) in [
         ("robot=r1", "r1 stands 7\n"),
         ("robot=", "r1 stands 7\nr2 stands 7\n"),
@@ -29,7 +28,7 @@ fn a_form_of_the_panels_own_page_stops_and_says_what_became_of_it() {
         assert!(answer.ends_with(wanted), "{body}: {answer}");
     }
     // A browser without a script is answered by a page, with STOP on it again.
-    let asks = [("Origin", own.as_str()), ("Accept", "text/html,*/*")];
+    let asks = [origin[0], origin[1], ("Accept", "text/html,*/*")];
     let answer = panel.stop("robot=r1", &asks);
     for part in [
         "text/html",
@@ -46,9 +45,10 @@ fn a_form_of_the_panels_own_page_stops_and_says_what_became_of_it() {
 
 #[test]
 fn what_the_robot_does_not_confirm_is_not_said_to_stand() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let own = format!("http://{}", panel.host());
-    let origin = [("Origin", own.as_str())];
+    let cookie = panel.cookie();
+    let origin = [("Origin", own.as_str()), ("Cookie", cookie.as_str())];
     let mut robot = TcpStream::connect(panel.station).unwrap();
     writeln!(robot, "lager 1 r1").unwrap();
     let mut page = panel.own_page();
@@ -66,10 +66,10 @@ fn what_the_robot_does_not_confirm_is_not_said_to_stand() {
 
 #[test]
 fn the_form_of_somebody_else_stops_nothing_and_a_viewers_does() {
-    let tokens = Tokens::random().unwrap();
-    let panel = Running::new(Some(tokens.clone()));
+    let panel = Running::new();
     let robot = panel.robot("r1");
-    let cookie = format!("lager-token={}", tokens.viewer);
+    let port = panel.address.port();
+    let cookie = format!("lager-token-{port}={}", panel.tokens.viewer);
     let own = format!("http://{}", panel.host());
     let mut page = panel.page(&own, &cookie).unwrap();
     page.line("about r1 connected=1 speaks=1").unwrap();

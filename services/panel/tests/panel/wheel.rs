@@ -10,7 +10,7 @@ use crate::scene::{Running, WATCHDOG};
 
 #[test]
 fn a_stop_counts_however_much_is_said_and_a_flood_of_them_closes_the_page() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let robot = panel.robot("r1");
     let mut page = panel.own_page();
     page.line("about r1 connected=1 speaks=1").unwrap();
@@ -37,7 +37,7 @@ fn a_stop_counts_however_much_is_said_and_a_flood_of_them_closes_the_page() {
 
 #[test]
 fn a_stop_that_the_robot_has_and_does_not_answer_is_not_told_as_refused() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let mut robot = TcpStream::connect(panel.station).unwrap();
     writeln!(robot, "lager 1 r1").unwrap();
     let mut page = panel.own_page();
@@ -54,7 +54,7 @@ fn a_stop_that_the_robot_has_and_does_not_answer_is_not_told_as_refused() {
 
 #[test]
 fn what_moves_a_robot_or_how_it_drives_is_its_drivers_while_there_is_one() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let robot = panel.robot("r1");
     let (mut anna, mut bo) = (panel.own_page(), panel.own_page());
     anna.line("about r1 connected=1 speaks=1").unwrap();
@@ -107,7 +107,7 @@ fn what_moves_a_robot_or_how_it_drives_is_its_drivers_while_there_is_one() {
 
 #[test]
 fn what_moves_a_robot_is_refused_when_it_was_held_up_on_the_way() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let robot = panel.robot("r1");
     let mut page = panel.own_page();
     page.line("about r1 connected=1 speaks=1").unwrap();
@@ -143,7 +143,7 @@ fn what_moves_a_robot_is_refused_when_it_was_held_up_on_the_way() {
 
 #[test]
 fn the_wheel_is_handed_over_when_its_driver_says_so() {
-    let panel = Running::new(None);
+    let panel = Running::new();
     let _robot = panel.robot("r1");
     let (mut anna, mut bo, mut cy) = (panel.own_page(), panel.own_page(), panel.own_page());
     anna.line("about r1 connected=1 speaks=1").unwrap();

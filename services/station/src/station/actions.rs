@@ -147,6 +147,7 @@ impl Station {
         for (name, line) in said {
             self.say(&name, Some(line));
         }
+        self.give_up_silent();
     }
 
     /// The moment of the last turn.

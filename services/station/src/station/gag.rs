@@ -224,10 +224,9 @@ impl Station {
 
 /// Who the GaG speaks for.
 impl Station {
-    /// Lets the GaG speak for the robot that has been connected for longest.
+    /// Lets the GaG speak for the robot whose turn it is.
     pub(super) fn seat_gag(&mut self) {
-        let mut named = self.links.iter();
-        let first = named.find_map(|(link, name)| Some((*link, name.clone()?)));
+        let first = self.first();
         let Some(gag) = &mut self.gag else { return };
         let (link, first) = first.unzip();
         // A plain robot's name may be another one's by now, but no connection comes twice.
@@ -279,8 +278,8 @@ impl Station {
     }
 }
 
-/// A sentence for a GaG.
-fn thought(why: &str) -> Request {
+/// A sentence for a GaG, or for a robot that has announced itself.
+pub(super) fn thought(why: &str) -> Request {
     let text = Text::new(why.replace(['\r', '\n'], " "));
     Request::Telemetry(Telemetry::Thought(text.unwrap_or_default()))
 }

@@ -62,8 +62,7 @@ impl Station {
             .collect();
         for it in &uses {
             if let Uses::Told(name) = it
-                && let Some((&link, _)) =
-                    self.links.iter().find(|(_, it)| it.as_ref() == Some(name))
+                && let Some(link) = self.link_of(name)
             {
                 let why = "the goods have changed: it asks for them anew".to_owned();
                 self.close(Peer::Robot(link), why);

@@ -103,7 +103,11 @@ fn what_a_robot_does_not_answer_is_lost_in_the_end() {
     };
     assert_eq!((given, refused), (64, ActRefused::Full.into()));
     assert!(station.stop(&r1()).is_ok(), "it is stopped all the same");
-    station.turn(at(60_000));
+    for seconds in (10..=60).step_by(10) {
+        station.turn(at(1_000 * seconds));
+        // It answers nothing, and is there.
+        station.heard(LINK, Ok("lager 1 r1"));
+    }
     assert_eq!(replies(&mut station).len(), 65);
     assert!(station.act(&r1(), Action::Clear).is_ok());
 }

@@ -391,7 +391,7 @@ fn a_gag_speaks_for_the_robot_that_has_been_there_for_longest() {
 }
 
 #[test]
-fn the_newest_connection_of_a_name_counts_and_its_queue_is_kept() {
+fn a_robot_that_comes_back_has_its_queue_and_its_dead_connection_counts_no_more() {
     let mut station = station();
     station.connected(R1);
     play(
@@ -402,6 +402,8 @@ fn the_newest_connection_of_a_name_counts_and_its_queue_is_kept() {
         station.wish(&name("north"), Wish::Fetch(product(7))),
         Ok(())
     );
+    // Its old connection has been silent.
+    station.turn(std::time::Duration::from_secs(1));
     station.connected(R2);
     play(
         &mut station,

@@ -8,5 +8,6 @@ mod file;
 mod gag;
 mod handle;
 mod late;
+mod links;
 mod sockets;
 mod transcript;

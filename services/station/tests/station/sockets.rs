@@ -11,6 +11,8 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use lager_lines::extension::Proof;
+use lager_lines::secret::{Meeting, Nonce, Secrets, Side};
 use lager_lines::{Called, Name};
 use lager_station::{Handle, Listen, Queues, Server, ServerConfig, ServerError, Wish, load};
 
@@ -30,13 +32,20 @@ pub(crate) struct Running {
 
 impl Running {
     pub(crate) fn new() -> Self {
+        Self::with(|_| {})
+    }
+
+    /// One of which something is otherwise.
+    pub(crate) fn with(change: impl FnOnce(&mut ServerConfig)) -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::SeqCst);
         let name = format!("lager-sockets-{}-{count}", std::process::id());
         let folder = std::env::temp_dir().join(name);
         fs::create_dir_all(&folder).expect("a folder");
         fs::write(folder.join("warehouse.toml"), WAREHOUSE).expect("a file");
-        let server = Server::open(config(&folder)).expect("a station");
+        let mut config = config(&folder);
+        change(&mut config);
+        let server = Server::open(config).expect("a station");
         let shutdown = Arc::new(AtomicBool::new(false));
         let ends = Arc::clone(&shutdown);
         Self {
@@ -94,6 +103,7 @@ fn config(folder: &std::path::Path) -> ServerConfig {
     ServerConfig {
         name: Name::new("lager").expect("a name"),
         listen: Listen::At(SocketAddr::from(([127, 0, 0, 1], 0))),
+        secrets: Secrets::default(),
         gag: Some(folder.join("gag")),
         warehouse: Some(folder.join("warehouse.toml")),
         otherwise: None,
@@ -291,25 +301,75 @@ fn who_sends_what_is_no_line_is_closed_and_nobody_else_notices() {
 pub(crate) static CROWD: Mutex<()> = Mutex::new(());
 
 #[test]
-fn a_thousand_connections_leave_room_for_nobody_but_the_first() {
+fn a_thousand_connections_that_say_nothing_keep_nobody_out() {
     let _crowd = CROWD.lock();
     let station = Running::new();
     let mut good = station.robot();
     assert_eq!(good.asks("sidelength"), "sidelength 40");
     let mut crowd: Vec<_> = (0..1000).map(|_| station.robot()).collect();
     assert_eq!(good.asks("karta"), "karta 4 3 0 0");
-    let mut last = crowd.pop().expect("there are some");
-    assert_eq!(last.hears(), None);
+    // All of them are there; one that says who it is is let in.
+    let mut next = station.robot();
+    assert_eq!(next.asks("lager 1 r1"), "lager 1 lager");
+    assert_eq!(crowd[0].hears(), None, "others wait");
+}
+
+#[test]
+fn who_says_one_line_and_stays_leaves_room_for_whoever_proves_who_he_is() {
+    let _crowd = CROWD.lock();
+    let secret = Secrets::read("r1 0123456789abcdef").expect("a secret");
+    let station = Running::with(|config| config.secrets = secret.clone());
+    let crowd: Vec<_> = (0..200)
+        .map(|_| {
+            let mut one = station.robot();
+            one.says(b"sidelength\n");
+            one
+        })
+        .collect();
+    let r1 = Name::new("r1").expect("a name");
+    let secret = secret.of(&r1).expect("it has one");
+    for _ in 0..3 {
+        let mut robot = station.robot();
+        let asked = robot.asks("lager 1 r1");
+        let Some(Ok(Proof::Asked(stations))) = Proof::read(&asked) else {
+            panic!("{asked}");
+        };
+        let meeting = Meeting {
+            robot: &r1,
+            stations,
+            robots: Nonce::random().expect("random bytes"),
+        };
+        let proof = Proof::Robot(meeting.robots, secret.code(Side::Robot, &meeting));
+        let answer = robot.asks(&proof.to_string());
+        let Some(Ok(Proof::Station(code))) = Proof::read(&answer) else {
+            panic!("{answer}");
+        };
+        assert!(secret.is_proved(Side::Station, &meeting, &code));
+        assert_eq!(robot.hears().as_deref(), Some("lager 1 lager"));
+        let view = station.handle.robots();
+        assert!(view.iter().any(|view| view.name == r1 && view.is_extended));
+        drop(robot);
+    }
     drop(crowd);
-    // Once they have gone there is room again.
-    let start = std::time::Instant::now();
-    loop {
-        let mut next = station.robot();
-        next.says(b"sidelength\n");
-        if next.hears().is_some() {
-            break;
-        }
-        assert!(start.elapsed() < WATCHDOG, "nobody is let in any more");
+}
+
+#[test]
+fn an_impostor_gets_neither_the_name_nor_its_stop_and_both_sides_are_told() {
+    let secret = Secrets::read("0123456789abcdef").expect("a secret");
+    let station = Running::with(|config| config.secrets = secret);
+    let r1 = Name::new("r1").expect("a name");
+    for second in ["sidelength", "styrcomm", "lager 1 r1", "stopped 1 3"] {
+        let mut impostor = station.robot();
+        assert!(impostor.asks("lager 1 r1").starts_with("prove "));
+        assert!(station.handle.stop(&r1).is_err(), "there is no robot");
+        impostor.says(format!("{second}\n").as_bytes());
+        let told = impostor.hears().expect("it is told why");
+        assert!(
+            told.starts_with("thought somebody says that he is robot r1"),
+            "{told}"
+        );
+        assert_eq!(impostor.hears(), None);
+        assert_eq!(station.handle.robots(), []);
     }
 }
 
