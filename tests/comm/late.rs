@@ -53,7 +53,10 @@ fn a_resume_that_comm_finds_when_it_thaws_releases_no_stop() {
             Some(health.stop_word).filter(|word| *word != 0)
         });
         let stop = wait_for("the stop to be shown", || {
-            station.state().and_then(shown).filter(|stop| *stop == in_force)
+            station
+                .state()
+                .and_then(shown)
+                .filter(|stop| *stop == in_force)
         });
         let comm = Frozen::new(scene.up.service("comm").expect("it runs"));
         let Ok(asked) = station.handle.act(&robot, Action::Resume { stop }) else {
