@@ -108,12 +108,9 @@ impl Connection {
         self.late
     }
 
-    /// Whether the peer, of a unix socket, has read all that it was told, and nothing waits here
-    /// that it has said: then what it says from now on it says after that.
+    /// Whether the peer, of a unix socket, has read all that it was told.
     pub(crate) fn has_read_all(&self) -> bool {
-        // In this order: what it says between the two waits here.
-        let has_read = self.unread.is_empty() && !is_unread(&self.stream);
-        has_read && !self.waits()
+        self.unread.is_empty() && !is_unread(&self.stream)
     }
 
     /// Whether something waits to be written.

@@ -422,6 +422,14 @@ impl Server {
     }
 
     fn hear(&mut self, now: Instant, peer: Peer) {
+        if peer == Peer::Gag {
+            self.watch_gag();
+        }
+        self.read(now, peer);
+    }
+
+    /// Reads what a peer has said, without a look at what it has read.
+    fn read(&mut self, now: Instant, peer: Peer) {
         let Some(connection) = self.connections.get_mut(&peer) else {
             return;
         };
@@ -455,6 +463,10 @@ impl Server {
             for output in outputs {
                 match output {
                     Output::Say { to, line } => {
+                        // What waits there was said before this.
+                        if to == Peer::Gag {
+                            self.read(now, to);
+                        }
                         let said = self.connections.get_mut(&to).map(|one| one.say(now, &line));
                         self.check(to, said);
                     }
@@ -475,7 +487,8 @@ impl Server {
             && self.handle.look(Station::watches_gag)
         {
             let all = gag.has_read_all();
-            self.handle.take(|station| station.gag_has_read(all));
+            self.handle
+                .take(|station| station.gag_has_read(all && !station.has_outputs()));
         }
     }
 

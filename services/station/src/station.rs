@@ -141,6 +141,8 @@ struct Gag {
     link: Option<u64>,
     /// What it says may still be meant for this robot, for which it spoke before.
     may_mean: Option<Name>,
+    /// It has been told something since it speaks for another one.
+    is_told: bool,
     /// Since when it has not read all that it has been told, by the station's clock.
     unread: Option<Duration>,
     /// When it was told something last.
@@ -180,6 +182,11 @@ impl Station {
     /// What is to be done, oldest first; it is then no longer here.
     pub fn outputs(&mut self) -> Vec<Output> {
         core::mem::take(&mut self.outputs)
+    }
+
+    /// Whether something is to be done.
+    pub(crate) fn has_outputs(&self) -> bool {
+        !self.outputs.is_empty()
     }
 
     /// The robots that are known, connected or not.
@@ -398,6 +405,7 @@ impl Station {
             Ok(line) => {
                 if let (Peer::Gag, Some(gag)) = (to, &mut self.gag) {
                     gag.told = self.now;
+                    gag.is_told = true;
                 }
                 self.outputs.push(Output::Say { to, line });
             }

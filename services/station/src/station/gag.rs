@@ -87,13 +87,13 @@ impl Station {
         self.robots.get(name)?.driver().map(str::to_owned)
     }
 
-    /// Whether the GaG has read all that it has been told, and nothing waits that it has said. To be
-    /// told whenever it may have changed, and again and again.
+    /// Whether the GaG has read all that it has been told. To be told before a line of it is heard,
+    /// and again and again.
     pub fn gag_has_read(&mut self, all: bool) {
         let Some(gag) = &mut self.gag else { return };
         if all {
             gag.unread = None;
-            if gag.robot.is_some() {
+            if gag.robot.is_some() && gag.is_told {
                 // It knows by now for whom it speaks.
                 gag.may_mean = None;
             }
@@ -237,6 +237,7 @@ impl Station {
         let before = core::mem::replace(&mut gag.robot, first.clone());
         if let Some(before) = before {
             gag.may_mean = Some(before.clone());
+            gag.is_told = false;
             gag.held.clear();
             self.unseat(&before);
         }

@@ -8,6 +8,7 @@ use lager_lines::command::read_wheels;
 use lager_lines::extension::{Action, Mode};
 use lager_station::{ActRefused, Given, Output, Peer, Station};
 
+use crate::sockets::Running;
 use crate::transcript::warehouse;
 
 const R1: Peer = Peer::Robot(1);
@@ -209,4 +210,27 @@ fn a_plain_robot_that_is_called_like_the_one_before_is_another_one() {
     station.gag_has_read(true);
     let drives = hears(&mut station, Peer::Gag, "styrcomm 2");
     assert_eq!(drives, ["r2: styrcomm 00000010"]);
+}
+
+#[test]
+fn a_gag_that_answers_at_once_is_soon_heard_for_the_next_robot() {
+    let station = Running::new();
+    let mut gag = station.gag();
+    let mut first = station.robot();
+    first.says(b"styrcomm\n");
+    assert_eq!(gag.hears().as_deref(), Some("styrcomm"));
+    drop(first);
+    let mut second = station.robot();
+    second.says(b"styrcomm\n");
+    // Whatever is refused it gives anew.
+    let answers = std::thread::spawn(move || {
+        while let Some(line) = gag.hears() {
+            if line == "styrcomm" {
+                gag.says(b"styrcomm 2\n");
+            }
+        }
+    });
+    assert_eq!(second.hears().as_deref(), Some("styrcomm 00000010"));
+    drop((second, station));
+    answers.join().expect("it ends with the station");
 }
