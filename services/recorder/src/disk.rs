@@ -8,6 +8,7 @@
 //! Somebody may remove the file or move it while it is written, or take its disk away. All writing
 //! succeeds then as before, so [`Disk::fate`] looks whether the file is still where it was made.
 
+use std::fmt;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsRawFd;
@@ -18,10 +19,34 @@ use rustix::fs::{FallocateFlags, fallocate};
 use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
-use crate::error::Fate;
-
 /// What is reserved at a time beyond what is needed, in bytes.
 const AHEAD: u64 = 4 << 20;
+
+/// What has become of a file that is no longer where it was made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It has no name any more.
+    Removed,
+    /// It has another name, if that is known.
+    Moved(Option<PathBuf>),
+}
+
+impl fmt::Display for Fate {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Removed => write!(
+                formatter,
+                "was removed while it was recorded, and what it had is lost"
+            ),
+            Self::Moved(Some(to)) => write!(
+                formatter,
+                "was moved to {} while it was recorded, and ends there",
+                to.display()
+            ),
+            Self::Moved(None) => write!(formatter, "was moved away while it was recorded"),
+        }
+    }
+}
 
 /// A file that is being written.
 #[derive(Debug)]

@@ -1,39 +1,12 @@
 //! Why a recording ends.
 
-use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use lager_journal::WriteError;
 use lager_ports::{IntrospectError, PortError, ReceiveError};
 
-use crate::disk::is_full;
-
-/// What has become of a file that is no longer where it was made.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Fate {
-    /// It has no name any more.
-    Removed,
-    /// It has another name, if that is known.
-    Moved(Option<PathBuf>),
-}
-
-impl fmt::Display for Fate {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Removed => write!(
-                formatter,
-                "was removed while it was recorded, and what it had is lost"
-            ),
-            Self::Moved(Some(to)) => write!(
-                formatter,
-                "was moved to {} while it was recorded, and ends there",
-                to.display()
-            ),
-            Self::Moved(None) => write!(formatter, "was moved away while it was recorded"),
-        }
-    }
-}
+use crate::disk::{Fate, is_full};
 
 /// Why a recording ended early or did not begin.
 #[derive(Debug, thiserror::Error)]

@@ -15,7 +15,8 @@ use std::time::Instant;
 use lager_journal::{CalendarStep, Scene, Start};
 
 use crate::config::RecordConfig;
-use crate::error::{Fate, RecordError};
+use crate::disk::Fate;
+use crate::error::RecordError;
 use crate::part::{Earlier, Part, Refused};
 use crate::tally::{Held, Item, Notes, QueueOut, Topics};
 

@@ -46,7 +46,8 @@ mod verify;
 
 pub use bag::BagError;
 pub use config::{RecordConfig, Split};
-pub use error::{Fate, RecordError};
+pub use disk::Fate;
+pub use error::RecordError;
 pub use export::export_csv;
 pub use lager_journal::utc;
 pub use look::{check, doubt, info};

@@ -8,8 +8,8 @@ use lager_journal::{
     CalendarStep, Channel, Count, Counts, Journal, Scene, Shown, Start, Times, View,
 };
 
-use crate::disk::{Disk, is_full};
-use crate::error::{Fate, RecordError};
+use crate::disk::{Disk, Fate, is_full};
+use crate::error::RecordError;
 use crate::tally::{Held, Item, Topic, Topics};
 
 /// A chunk is ended when it has so many bytes, flush or not.
