@@ -72,7 +72,7 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
     let (here, _) = scene.url.split_once("/?").expect("a token");
     for at in ["/screen?r77", "/?r77"] {
         page.call("Page.navigate", &json!({ "url": format!("{here}{at}") }));
-        page.wait_until("document.body.textContent.includes('r77 is not here')");
+        page.wait_until("document.body?.textContent.includes('r77 is not here')");
         scene.wait_to_move();
         page.wait_until("document.documentElement.dataset.stops !== undefined");
         page.key_down("Escape");

@@ -236,7 +236,7 @@ impl Visit {
         let driver = self.wheels.get(robot);
         let late = action.late;
         let asked = match (action.what, driver) {
-            (Action::Drive { .. } | Action::Arm(_) | Action::Mode(Mode::Manual), None) => {
+            (Action::Drive { .. } | Action::Arm(_), None) => {
                 return self.refuse(number, NOT_DRIVER);
             }
             // Its lease is the station's.
@@ -248,6 +248,8 @@ impl Visit {
                 let by = self.driver_of(robot).unwrap_or_default();
                 return self.refuse(number, &format!("{by} drives the robot; ask him"));
             }
+            // Whoever takes it by hand is there to drive it.
+            (Action::Mode(Mode::Manual), None) => return self.refuse(number, NOT_DRIVER),
             (_, _) => self.place.shared.handle.act(robot, action),
         };
         match asked {
