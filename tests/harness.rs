@@ -244,7 +244,7 @@ impl Domain {
     #[must_use]
     pub fn leftovers(&self) -> Vec<String> {
         let left = self.own.left().into_iter();
-        left.filter(|path| !is_released_stop(path))
+        left.filter(|path| !is_released_stop(path) && !is_kept(path))
             .map(|path| path.display().to_string())
             .collect()
     }
@@ -257,6 +257,15 @@ impl Domain {
         let left = self.leftovers();
         assert!(left.is_empty(), "left behind: {left:#?}");
     }
+}
+
+/// Orders and a warehouse that are to outlive the robot.
+fn is_kept(path: &Path) -> bool {
+    let is_state = path.components().any(|part| part.as_os_str() == ".state");
+    let is_file = path
+        .extension()
+        .is_some_and(|end| end == "toml" || end == "queue");
+    is_state && is_file && !path.ends_with("running.toml")
 }
 
 /// A stop word that stops nobody: it outlives every process, and only `up` tidies it away.

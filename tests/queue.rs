@@ -164,17 +164,123 @@ fn a_battery_that_nobody_charges_ends_the_mission_and_is_told() {
 }
 
 #[test]
+fn what_waits_outlives_up_and_a_script_leaves_it_alone() {
+    let domain = Domain::new();
+    let mut up = robot(&domain);
+    domain.done(&["queue", "add", "3"]);
+    domain.done(&["queue", "add", "2"]);
+    let kept = domain.bus_folder().join(".state/r1/orders.toml");
+    wait_for("them to be kept", || {
+        let text = std::fs::read_to_string(&kept).ok()?;
+        (text.matches("product = ").count() == 3).then_some(())
+    });
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    let before = std::fs::read_to_string(&kept).expect("they are kept");
+
+    // The stop has outlived the robot as well, and nothing that waits ends it.
+    let mut up = domain.start(&["up", "--headless", "--speed", "4"]);
+    wait_for("all three to wait", || {
+        (products(&domain) == ["1", "3", "2"] || listed(&domain).contains("product 1, under way"))
+            .then_some(())
+    });
+    assert!(
+        up.output()
+            .contains("3 orders wait from before, for products 1, 3, 2; `lager queue clear`"),
+        "{}",
+        up.output()
+    );
+    assert!(
+        !up.output().contains("the stop is released"),
+        "{}",
+        up.output()
+    );
+    let twice = said(&domain.run(&["queue", "add", "3"]));
+    assert!(twice.contains("product 3 is ordered already"), "{twice}");
+    domain.done(&["resume"]);
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+
+    let script = [
+        "up",
+        "--headless",
+        "--speed",
+        "6",
+        "--mission",
+        "2",
+        "--exit-when-done",
+        "--json",
+    ];
+    let mut up = domain.start(&script);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+    assert_eq!(up.json()["delivered"], serde_json::json!([2]));
+    assert_eq!(std::fs::read_to_string(&kept).expect("still kept"), before);
+
+    // A damaged file is moved out of the way, and the robot starts.
+    std::fs::write(&kept, "[[order]]\nid = ").expect("a file");
+    let mut up = domain.start(&["up", "--headless", "--speed", "4"]);
+    wait_for("the robot", || {
+        up.output().contains("fetches product 1").then_some(())
+    });
+    assert!(
+        up.output().contains("orders.toml.damaged-2"),
+        "{}",
+        up.output()
+    );
+    domain.done(&["stop"]);
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+}
+
+#[test]
+fn delivered_goods_are_shown_as_gone_and_not_fetched_again() {
+    let domain = Domain::new();
+    let mut up = domain.start(&["up", "--headless", "--speed", "6", "--mission", "1"]);
+    wait_for("the delivery", || {
+        up.output().contains("DELIVERED product 1").then_some(())
+    });
+    wait_for("it to be shown", || {
+        let map = said(&domain.run(&["map"]));
+        map.contains("it was delivered").then_some(())
+    });
+    let again = domain.run(&["fetch", "1"]);
+    assert!(!again.status.success());
+    let why = said(&again);
+    assert!(why.contains("product 1 was delivered "), "{why}");
+    assert!(
+        why.contains("put it back and say `lager map back 1`"),
+        "{why}"
+    );
+    // The simulated world knows that they lie elsewhere.
+    let back = said(&domain.run(&["map", "back", "1"]));
+    assert!(
+        back.contains("product 1 is not in its place in the simulated world"),
+        "{back}"
+    );
+    let back = said(&domain.run(&["map", "back", "2"]));
+    assert_eq!(back, "nobody has missed product 2");
+    up.signal(Signal::INT);
+    assert_eq!(up.wait(), Some(0), "{}", up.log());
+}
+
+#[test]
 fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
     let domain = Domain::new();
     let mut up = robot(&domain);
     for (product, answer) in [
         ("3", "logic fetches product 3 next"),
         ("2", "logic fetches product 2; waiting before it: 1"),
-        ("1", "logic fetches product 1; waiting before it: 2"),
     ] {
         assert_eq!(said(&domain.run(&["queue", "add", product])), answer);
     }
-    assert_eq!(products(&domain), ["3", "2", "1"]);
+    assert_eq!(products(&domain), ["3", "2"]);
+    for product in ["1", "3"] {
+        let twice = said(&domain.run(&["queue", "add", product]));
+        assert!(
+            twice.contains(&format!("product {product} is ordered already")),
+            "{twice}"
+        );
+    }
 
     let refused = domain.run(&["queue", "add", "99"]);
     assert!(!refused.status.success());
@@ -188,8 +294,7 @@ fn the_queue_is_shown_and_changed_and_outlives_the_navigator() {
 
     let numbers = waiting(&domain);
     domain.done(&["queue", "up", &numbers[1].0]);
-    assert_eq!(products(&domain), ["2", "3", "1"]);
-    domain.done(&["queue", "cancel", &numbers[2].0]);
+    assert_eq!(products(&domain), ["2", "3"]);
 
     let logic = up.service("logic").expect("a navigator");
     kill_process(pid(logic), Signal::KILL).expect("a living navigator");

@@ -281,7 +281,8 @@ fn it_stays_stopped_when_everything_is_killed_and_started_again() {
     wait_for("it to be told", || {
         let up = scene.up.as_ref().expect("it is up");
         let said = up.output() + &up.log();
-        (said.contains("STOPPED by the operator") && said.contains("lager resume")).then_some(())
+        (said.contains("STOPPED by a `lager` command") && said.contains("lager resume"))
+            .then_some(())
     });
     // A clean end keeps it as well.
     drop(scene.up.take());
@@ -328,7 +329,7 @@ fn a_resume_says_what_it_released() {
     let (code, out, _) = say(&["resume"]);
     assert_eq!(code, Some(0));
     assert!(
-        out.contains("by the operator") && out.contains("released"),
+        out.contains("by a `lager` command") && out.contains("released"),
         "{out}"
     );
     let (code, _, err) = say(&["--name", "nobody", "stop"]);

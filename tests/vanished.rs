@@ -301,6 +301,8 @@ fn robots_whose_machine_vanishes_are_shown_as_away_and_leave_their_places() {
         listen: Listen::At(format!("{OURS}:0").parse().expect("an address")),
         gag: None,
         warehouse: None,
+        otherwise: None,
+        queues: None,
         fetch: Vec::new(),
     });
     let server = server.expect("a station");

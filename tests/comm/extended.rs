@@ -199,6 +199,8 @@ impl Served {
             listen: Listen::On(scene.listener()),
             gag: None,
             warehouse: None,
+            otherwise: None,
+            queues: None,
             fetch: Vec::new(),
         });
         let server = server.expect("a station");

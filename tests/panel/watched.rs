@@ -68,7 +68,7 @@ impl Drop for Watcher {
 #[test]
 #[ignore = "it prints figures: tests/soak watched"]
 fn the_path_while_ten_pages_watch() {
-    let scene = Scene::new(1.0, &["--mission", "1,2,3,1,2,3,1,2,3,1,2,3"]);
+    let scene = Scene::new(1.0, &["--mission", "1,2,3"]);
     let page = scene.page();
     drop(page);
     compare(&scene.domain, "ten pages elsewhere", || {

@@ -54,8 +54,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "lager-comm",
         &["lager-lines", "lager-ports", "lager-topics", "lager-wire"],
     ),
-    // The external computer is on no bus.
-    ("lager-station", &["lager-lines", "lager-wire"]),
+    // The external computer is on no bus. It shares the warehouse's file with the simulated world.
+    (
+        "lager-station",
+        &["lager-lines", "lager-plant", "lager-wire"],
+    ),
     // It shows the station in a browser, so it is on no bus either.
     ("lager-panel", &["lager-lines", "lager-station"]),
     (

@@ -86,6 +86,7 @@
 //!                                      the robot's clock
 //! queue <int> {<order> <prodid>}       what is fetched next, likewise
 //! obstacles <int> {<edge>}             what stands on ways of a simulated world, likewise
+//! gone <int> {<prodid>}                products whose goods are not in their place, likewise
 //! event <event> <coord> <order> <prodid> [<text>]
 //!                                      at that node; `-` where there is no order or product
 //! past <int> <report>                  an `event` or `thinks` of so many ms ago, when a station
@@ -112,8 +113,9 @@
 //! is divided into four equal parts. Bucket 89 holds what took longer than 2^30 ns. A bucket
 //! counts the frames since the robot made such a line before, at most 999999.
 //!
-//! Here a list may be empty, and `route`, `blocked`, `queue`, `obstacles` and `sensors` are sent when
-//! they have changed. A line that cannot be read changes nothing; if it has a number the robot answers
+//! Here a list may be empty, and `route`, `blocked`, `queue`, `obstacles`, `gone` and `sensors` are
+//! sent when they have changed. A line that cannot be read changes nothing; if it has a number the
+//! robot answers
 //! `refused`.
 //!
 //! ```

@@ -29,6 +29,28 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
+/// What a serde error of a mistyped key or value is to be followed by: `; did you mean `side`?`, or
+/// nothing if no name that would have been right is like it.
+///
+/// ```
+/// let why = "unknown field `sied`, expected one of `id`, `square`, `side`";
+/// assert_eq!(lager_lines::hint(why), "; did you mean `side`?");
+/// assert_eq!(lager_lines::hint("invalid type: string"), "");
+/// ```
+pub fn hint(message: &str) -> String {
+    let is_of_names =
+        message.starts_with("unknown field") || message.starts_with("unknown variant");
+    // What stands between every other pair of marks: the typed one, and those that there are.
+    let mut names = message.split('`').skip(1).step_by(2);
+    match names.next().filter(|_| is_of_names) {
+        Some(typed) => match nearest(typed, names) {
+            Some(meant) => format!("; did you mean `{meant}`?"),
+            None => String::new(),
+        },
+        None => String::new(),
+    }
+}
+
 /// How many letters have to be changed, added, left out or exchanged with the next one.
 fn distance(from: &[char], to: &[char]) -> usize {
     // Three rows of the table suffice: an exchange looks two back.

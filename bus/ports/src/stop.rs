@@ -146,7 +146,7 @@ impl Stop {
 impl fmt::Display for Stop {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.origin() {
-            Some(role) => write!(formatter, "by the {role}: {}", self.cause()),
+            Some(role) => write!(formatter, "by {}: {}", role.as_author(), self.cause()),
             None => write!(formatter, "by nobody known: {}", self.cause()),
         }
     }
@@ -384,7 +384,7 @@ mod tests {
             assert_eq!(Stop::of_word(stop.word()), Some(stop));
         }
         let said = Stop::new(Role::Operator, StopCause::Ordered, 0).to_string();
-        assert_eq!(said, "by the operator: it was ordered");
+        assert_eq!(said, "by a `lager` command: it was ordered");
     }
 
     #[test]

@@ -136,6 +136,9 @@ class FailureKind(enum.IntEnum):
     MarkUnseen = 29
     CornerUnseen = 30
     LineUnseen = 31
+    AlreadyOrdered = 32
+    GoodsDelivered = 33
+    GoodsAway = 34
 
 
 class Remedy(enum.IntEnum):
@@ -153,6 +156,7 @@ class Remedy(enum.IntEnum):
     Mode = 11
     Link = 12
     Calibrate = 13
+    PutBack = 14
 
 
 class Phase(enum.IntEnum):
@@ -251,6 +255,14 @@ class ToldKind(enum.IntEnum):
     Mode = 17
     Renewed = 18
     Repeated = 19
+    Goods = 20
+
+
+class GoneWhy(enum.IntEnum):
+    Delivered = 0
+    PickedUp = 1
+    NotFound = 2
+    Told = 3
 
 
 class EventKind(enum.IntEnum):
@@ -279,6 +291,8 @@ class InputKind(enum.IntEnum):
     SwitchedToAutonomous = 11
     PickByHand = 12
     PickByItself = 13
+    GoodsGone = 14
+    GoodsBack = 15
 
 
 class ThoughtKind(enum.IntEnum):
@@ -341,6 +355,9 @@ class ThoughtKind(enum.IntEnum):
     PicksByHand = 56
     PicksByItself = 57
     OrderKept = 58
+    GoodsBack = 59
+    AllGoodsBack = 60
+    GoodsGone = 61
 
 
 class Joint(enum.IntEnum):
@@ -567,7 +584,7 @@ class Health(Layout):
 
 class Failure(Layout):
     _type_name_ = "lager::Failure"
-    _hash_ = 0x75263013B255ADC2
+    _hash_ = 0x9E6CD244B755E4C8
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("remedy", ctypes.c_uint8),
@@ -587,7 +604,7 @@ class Failure(Layout):
 
 class NavigatorStatus(Layout):
     _type_name_ = "lager::NavigatorStatus"
-    _hash_ = 0x414DBF7AFDA3ABFA
+    _hash_ = 0x3231D9D18DC65B83
     _fields_ = [
         ("frames_lost", ctypes.c_uint64),
         ("frames", ctypes.c_uint64),
@@ -767,7 +784,7 @@ class Sent(Layout):
 
 class Told(Layout):
     _type_name_ = "lager::Told"
-    _hash_ = 0x47CAD9A876504954
+    _hash_ = 0x44368F18AF474376
     _fields_ = [
         ("time_ns", ctypes.c_uint64),
         ("number", ctypes.c_uint64),
@@ -795,7 +812,7 @@ class Told(Layout):
 
 class ToldInputs(Layout):
     _type_name_ = "lager::ToldInputs"
-    _hash_ = 0x4E9BCEB73D6ED77B
+    _hash_ = 0x71C0A11A07B132DD
     _fields_ = [
         ("first", ctypes.c_uint64),
         ("commands", Sent),
@@ -854,29 +871,49 @@ class WaitingOrder(Layout):
     }
 
 
+class GoneGoods(Layout):
+    _type_name_ = "lager::GoneGoods"
+    _hash_ = 0xA62C4245DFB44F20
+    _fields_ = [
+        ("product", ctypes.c_int32),
+        ("since_s", ctypes.c_uint32),
+        ("why", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8 * 3),
+    ]
+    _enums_ = {"why": GoneWhy}
+    _dtype_ = {
+        "names": ["product", "since_s", "why", "reserved"],
+        "formats": ["<i4", "<u4", "<u1", ("<u1", (3,))],
+        "offsets": [0, 4, 8, 9],
+        "itemsize": 12,
+    }
+
+
 class OrderQueue(Layout):
     _type_name_ = "lager::OrderQueue"
-    _hash_ = 0x5CD0293F38C40EC5
+    _hash_ = 0xF73014E06E95930F
     _fields_ = [
         ("order_id", ctypes.c_uint32),
         ("product", ctypes.c_int32),
         ("under_way", ctypes.c_uint8),
         ("count", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8 * 2),
+        ("gone_count", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
         ("orders", WaitingOrder * 32),
+        ("gone", GoneGoods * 96),
     ]
     _enums_ = {}
     _dtype_ = {
-        "names": ["order_id", "product", "under_way", "count", "reserved", "orders"],
-        "formats": ["<u4", "<i4", "<u1", "<u1", ("<u1", (2,)), (WaitingOrder._dtype_, (32,))],
-        "offsets": [0, 4, 8, 9, 10, 12],
-        "itemsize": 396,
+        "names": ["order_id", "product", "under_way", "count", "gone_count", "reserved", "orders", "gone"],
+        "formats": ["<u4", "<i4", "<u1", "<u1", "<u1", "<u1", (WaitingOrder._dtype_, (32,)), (GoneGoods._dtype_, (96,))],
+        "offsets": [0, 4, 8, 9, 10, 11, 12, 396],
+        "itemsize": 1548,
     }
 
 
 class Event(Layout):
     _type_name_ = "lager::Event"
-    _hash_ = 0x49F20980C3D1C902
+    _hash_ = 0xA1CA29E2F219615A
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -897,7 +934,7 @@ class Event(Layout):
 
 class Input(Layout):
     _type_name_ = "lager::Input"
-    _hash_ = 0x7C9D9D864C8F2C8D
+    _hash_ = 0x88E5E05C5B61411D
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("x", ctypes.c_uint8),
@@ -917,7 +954,7 @@ class Input(Layout):
 
 class Thought(Layout):
     _type_name_ = "lager::Thought"
-    _hash_ = 0x0F333177D01A9294
+    _hash_ = 0x99542D081AF03BDF
     _fields_ = [
         ("kind", ctypes.c_uint8),
         ("from_", ctypes.c_uint8),

@@ -126,6 +126,9 @@ class FailureKind(enum.IntEnum):
     MarkUnseen = 29
     CornerUnseen = 30
     LineUnseen = 31
+    AlreadyOrdered = 32
+    GoodsDelivered = 33
+    GoodsAway = 34
 
 class Remedy(enum.IntEnum):
     None_ = 0
@@ -142,6 +145,7 @@ class Remedy(enum.IntEnum):
     Mode = 11
     Link = 12
     Calibrate = 13
+    PutBack = 14
 
 class Phase(enum.IntEnum):
     WaitingForMap = 0
@@ -230,6 +234,13 @@ class ToldKind(enum.IntEnum):
     Mode = 17
     Renewed = 18
     Repeated = 19
+    Goods = 20
+
+class GoneWhy(enum.IntEnum):
+    Delivered = 0
+    PickedUp = 1
+    NotFound = 2
+    Told = 3
 
 class EventKind(enum.IntEnum):
     InPosition = 0
@@ -256,6 +267,8 @@ class InputKind(enum.IntEnum):
     SwitchedToAutonomous = 11
     PickByHand = 12
     PickByItself = 13
+    GoodsGone = 14
+    GoodsBack = 15
 
 class ThoughtKind(enum.IntEnum):
     None_ = 0
@@ -317,6 +330,9 @@ class ThoughtKind(enum.IntEnum):
     PicksByHand = 56
     PicksByItself = 57
     OrderKept = 58
+    GoodsBack = 59
+    AllGoodsBack = 60
+    GoodsGone = 61
 
 class Joint(enum.IntEnum):
     Base = 0
@@ -575,13 +591,21 @@ class WaitingOrder(Layout):
     put_off: int
     reserved: Sequence[int]
 
+class GoneGoods(Layout):
+    product: int
+    since_s: int
+    why: int
+    reserved: Sequence[int]
+
 class OrderQueue(Layout):
     order_id: int
     product: int
     under_way: int
     count: int
-    reserved: Sequence[int]
+    gone_count: int
+    reserved: int
     orders: Sequence[WaitingOrder]
+    gone: Sequence[GoneGoods]
 
 class Event(Layout):
     kind: int

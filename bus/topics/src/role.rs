@@ -70,6 +70,23 @@ impl Role {
         }
     }
 
+    /// What a person calls who has stopped the robot, or changed its mode, in this role: the
+    /// program that he knows.
+    pub const fn as_author(self) -> &'static str {
+        match self {
+            Self::Comm | Self::Station => "the external computer or its panel",
+            Self::Operator => "a `lager` command",
+            Self::Supervisor => "`lager up`",
+            Self::Bridge => "the bridge",
+            Self::Logic => "logic",
+            Self::Recorder => "the recorder",
+            Self::Monitor => "the monitor",
+            Self::Gateway => "the gateway",
+            Self::Simulator => "the simulated robot",
+            Self::Observer | Self::Guest => "another program",
+        }
+    }
+
     /// Whether the process only looks. Observers share the 64 places a topic has for them;
     /// all other roles have places of their own, so that looking can never keep the robot
     /// from working.

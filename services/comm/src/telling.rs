@@ -34,6 +34,7 @@ pub(crate) struct Telling {
     blocked: Option<Report>,
     queue: Option<Report>,
     obstacles: Option<Report>,
+    gone: Option<Report>,
     sensors: Option<Report>,
     /// What was counted when the latency was told last.
     latency: Durations,
@@ -75,6 +76,7 @@ impl Telling {
             (&mut self.blocked, blocks.as_deref().map(blocked)),
             (&mut self.queue, known.queue.as_ref().map(queue)),
             (&mut self.obstacles, truth.as_deref().map(obstacles)),
+            (&mut self.gone, known.queue.as_ref().map(gone)),
             (&mut self.sensors, known.health.as_ref().and_then(sensors)),
         ];
         for (told, list) in lists {
@@ -88,7 +90,7 @@ impl Telling {
 }
 
 /// Kinds of reports of which a newer one replaces an older one.
-pub(crate) const KINDS: usize = 8;
+pub(crate) const KINDS: usize = 9;
 
 /// Which of the kinds a report is, the first to be told first; `None` where each counts.
 pub(crate) const fn kind(report: &Report) -> Option<usize> {
@@ -101,6 +103,7 @@ pub(crate) const fn kind(report: &Report) -> Option<usize> {
         Report::Latency(_) => Some(5),
         Report::Sensors(_) => Some(6),
         Report::Obstacles(_) => Some(7),
+        Report::Gone(_) => Some(8),
         Report::Stopped { .. }
         | Report::Done { .. }
         | Report::Refused { .. }
@@ -371,6 +374,14 @@ fn queue(queue: &OrderQueue) -> Report {
         })
         .collect();
     Report::Queue(Listed::<Queued>::new(&orders))
+}
+
+fn gone(queue: &OrderQueue) -> Report {
+    let products = queue.gone().iter();
+    let products: Vec<_> = products
+        .filter_map(|gone| ProductId::new(gone.product))
+        .collect();
+    Report::Gone(Listed::<ProductId>::new(&products))
 }
 
 /// What the line sensors read while they are calibrated, once all have been heard.

@@ -22,6 +22,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use crate::config::{Body, Config};
 use crate::hands::Hands;
 use crate::keepers::Keepers;
+use crate::kept::{Gift, Kept, Returned};
 use crate::map::bus_map;
 use crate::mission::{Helper, Mission, Watch};
 use crate::report::Narrator;
@@ -139,6 +140,10 @@ struct Attendant {
     map: Option<Publisher<NavMap>>,
     watch: Option<Watch>,
     told: Option<Mission>,
+    returned: Returned,
+    /// What was told to be kept.
+    kept: Option<Kept>,
+    body: Body,
     ears: Ears,
     inventory: Inventory,
     complaints: Complaints,
@@ -174,6 +179,9 @@ impl Attendant {
                 .mission
                 .map(|mission| Watch::new(mission, helper(config.body))),
             told: None,
+            returned: Returned::new(begin.kept),
+            kept: None,
+            body: config.body,
             ears: Ears::default(),
             inventory: Inventory::default(),
             complaints: Complaints::default(),
@@ -232,6 +240,7 @@ impl Attendant {
         }
         // Late joiners get it, too.
         self.map.iter().for_each(Publisher::tick);
+        self.return_orders()?;
         self.watch_mission()?;
         self.listen()?;
         for note in self.narrator.take_notes() {
@@ -268,6 +277,34 @@ impl Attendant {
             return Ok(());
         };
         self.line.send(&Word::Damaged(why))?;
+        Ok(())
+    }
+
+    /// Gives the robot back what it had to do before, and tells what is to be kept of it.
+    fn return_orders(&mut self) -> Result<()> {
+        let gift = self.returned.step(self.clock.now(), self.narrator.seen());
+        if let Some(gift) = gift {
+            let given = match gift {
+                Gift::Order(order) => self.hands.fetch(order),
+                Gift::Gone(input) => self.hands.press(input),
+            };
+            self.complain(given);
+        }
+        self.tell_kept()
+    }
+
+    fn tell_kept(&mut self) -> Result<()> {
+        let seen = self.narrator.seen();
+        let (Some(queue), Some(status)) = (&seen.queue, &seen.status) else {
+            return Ok(());
+        };
+        let left = self.returned.left();
+        let mut all = Kept::of(queue, status, self.body);
+        all.add_kept(&left);
+        if self.kept.as_ref() != Some(&all) {
+            self.kept = Some(all.clone());
+            self.line.send(&Word::Kept { left, all })?;
+        }
         Ok(())
     }
 
@@ -322,6 +359,7 @@ impl Attendant {
     fn last_words(mut self) -> Result<()> {
         let looked = self.narrator.look(self.clock.now() - self.robot_start);
         self.complain(looked);
+        self.tell_kept()?;
         let mission = self.watch.iter().map(Watch::mission);
         let delivered = mission.flat_map(Mission::delivered).copied();
         let misplaced = delivered.filter(|id| self.narrator.truly_delivered(*id) == Some(false));

@@ -5,11 +5,11 @@ mod changes;
 mod gateway;
 pub mod help;
 mod realtime;
+mod simulate;
 mod top;
 mod topic;
 mod values;
 
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
@@ -19,9 +19,10 @@ use lager_lines::Called;
 use lager_wire::OperatorCommand;
 
 pub use bag::{BagArgs, BagCommand, PlayArgs, RecordArgs, StampsArg};
-pub use changes::{ObstacleChange, QueueChange};
+pub use changes::{MapChange, ObstacleChange, QueueChange};
 pub use gateway::GatewayArgs;
 pub use realtime::{ServiceArgs, UpRealtimeArgs};
+pub use simulate::SimulateArgs;
 pub use top::TopArgs;
 pub use topic::{TopicArgs, TopicCommand};
 
@@ -74,6 +75,10 @@ pub struct GlobalArgs {
     /// /dev/shm/lager-UID]
     #[arg(long, global = true, value_name = "FOLDER", help_heading = "Bus")]
     pub bus: Option<PathBuf>,
+    /// Folder that keeps the warehouse as it was saved and the orders that wait [default: .state in
+    /// the folder of --bus, else $STATE_DIRECTORY, $XDG_STATE_HOME/lager or ~/.local/state/lager]
+    #[arg(long, global = true, value_name = "FOLDER", help_heading = "Robot")]
+    pub state: Option<PathBuf>,
     /// Append traces to this file: those RUST_LOG asks for, or `info`
     #[arg(long, global = true, value_name = "FILE", help_heading = "Output")]
     pub log: Option<PathBuf>,
@@ -145,10 +150,19 @@ pub enum Command {
         #[arg(value_name = "ORDER")]
         id: u32,
     },
-    /// Show the warehouse, its goods and the ways that are blocked
+    /// Show the warehouse, its goods and the ways that are blocked, or say that goods are back
     #[command(after_help = "Examples:
-  lager map                   the floor, where each product stands, and what is in the way")]
-    Map,
+  lager map                   the floor, where each product stands, and what is in the way
+  lager map back 3            product 3, which was delivered, is in its place again
+  lager map back              so are all goods
+
+The robot remembers which goods it has delivered or has not found in their place, and refuses to
+fetch them until they are back.")]
+    Map {
+        /// What to change [default: nothing, show it]
+        #[command(subcommand)]
+        change: Option<MapChange>,
+    },
     /// Show the orders, add one, take one back, or have one carried out earlier
     #[command(after_help = "Examples:
   lager queue                 the orders with their numbers, the next one first
@@ -442,10 +456,11 @@ pub struct StationArgs {
     /// Where a GaG connects: the path of a unix socket [default: gag in the folder of the bus]
     #[arg(long, value_name = "SOCKET", help_heading = "Station")]
     pub gag: Option<PathBuf>,
-    /// The warehouse's file, in which changes are saved; it need not be there yet [default: none,
-    /// and nothing is saved]
+    /// The warehouse's file, in which changes are saved and which need not be there yet, or a
+    /// built-in warehouse, whose changes are kept in the state folder [default: a GaG or the panel
+    /// describes it, and it is kept in the state folder]
     #[arg(long, value_name = "FILE", help_heading = "Station")]
-    pub warehouse: Option<PathBuf>,
+    pub warehouse: Option<String>,
     /// Products that a robot is to fetch after what waits for it already, by number or name, such
     /// as r1=3,screws; may be given several times
     #[arg(long, value_name = "ROBOT=GOODS,GOODS", value_parser = values::fetch, help_heading = "Station")]
@@ -462,36 +477,6 @@ pub struct StationArgs {
     /// End when the supervisor ends; standard output is then the socket for robots
     #[arg(long, value_name = "PID@NS", hide = true)]
     pub parent: Option<Parent>,
-}
-
-/// `lager simulate`.
-#[derive(Debug, Args)]
-pub struct SimulateArgs {
-    /// Seeds to run, one run each: `7` or `1..20` (both ends run)
-    #[arg(long, value_name = "A..B", default_value = "1", allow_negative_numbers = true, value_parser = values::seeds, help_heading = "Body")]
-    pub seeds: RangeInclusive<u64>,
-    /// Built-in warehouse or warehouse file; may be given several times
-    #[arg(long, value_name = "FILE", help_heading = "Mission")]
-    pub warehouse: Vec<String>,
-    /// The products to fetch, by number or name, in this order [default: the first of the
-    /// warehouse]
-    #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
-    pub mission: Vec<Called>,
-    /// What is left of the battery's charge at the start [default: what the seed says]
-    #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(0..=100), help_heading = "Body")]
-    pub battery: Option<u8>,
-    /// Calibrate the line sensors first, as a person does who moves the robot over the tape
-    #[arg(long, help_heading = "Body")]
-    pub calibrate: bool,
-    /// Give up after this much virtual time
-    #[arg(long, value_name = "SECONDS", default_value_t = 3600, allow_negative_numbers = true, value_parser = values::limit, help_heading = "Mission")]
-    pub limit: u64,
-    /// So many things stand on edges at random, and come and go; squares must be 50 cm or more
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = values::obstacles, help_heading = "Body")]
-    pub obstacles: u32,
-    /// One line of JSON a run
-    #[arg(long, help_heading = "Output")]
-    pub json: bool,
 }
 
 /// `lager bench`.

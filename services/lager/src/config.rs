@@ -13,15 +13,16 @@ mod logic;
 mod realtime;
 mod station;
 
-use std::fs;
+use std::io::Read as _;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use lager_lines::check_names;
+use lager_lines::{check_names, nearest};
 use lager_plant::{MOST_OBSTACLES, Warehouse};
 use lager_ports::{BusConfig, RobotName};
+use lager_station::files;
 use lager_wire::ArmProfile;
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +56,9 @@ pub struct Config {
     pub body: Body,
     /// A built-in warehouse (`small`, `curved`, `large`) or the path of a warehouse file.
     pub warehouse: String,
+    /// Where it keeps what outlives it; unset, as `state.rs` has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<PathBuf>,
     /// Where the traces go.
     pub log: LogSection,
     /// Where the bus lives.
@@ -149,6 +153,7 @@ impl Default for Config {
             speed: 1.0,
             body: Body::Sim,
             warehouse: "small".into(),
+            state: None,
             log: LogSection::default(),
             bus: BusSection::default(),
             realtime: RealtimeSection::default(),
@@ -195,18 +200,20 @@ impl Config {
             None if Path::new("lager.toml").is_file() => Path::new("lager.toml"),
             None => return Ok(Self::default()),
         };
-        let text = match path == Path::new("-") {
-            true => std::io::read_to_string(std::io::stdin()),
-            false => fs::read_to_string(path),
-        };
-        let text =
-            text.with_context(|| format!("cannot read the configuration {}", path.display()))?;
-        toml::from_str(&text).with_context(|| {
+        let invalid = || {
             format!(
                 "the configuration {} is not valid; `lager config` prints one with every key",
                 path.display()
             )
-        })
+        };
+        if path != Path::new("-") {
+            return files::read_toml(path).with_context(invalid);
+        }
+        let mut text = String::new();
+        let input = std::io::stdin().take(files::MOST_BYTES);
+        let read = { input }.read_to_string(&mut text);
+        read.with_context(|| format!("cannot read the configuration {}", path.display()))?;
+        files::parse_toml(path, &text).with_context(invalid)
     }
 
     /// Refuses values no process could work with, each with a sentence.
@@ -303,19 +310,26 @@ impl Config {
     }
 }
 
+/// The built-in warehouse that was meant, in the middle of a sentence.
+fn meant(name: &str) -> String {
+    let meant = nearest(name, Warehouse::BUILTIN.iter().copied());
+    meant.map_or_else(String::new, |meant| format!(" (did you mean `{meant}`?)"))
+}
+
 /// A warehouse by the name of a built-in one or by its file.
 pub fn warehouse(name: &str) -> Result<Warehouse> {
     if let Some(warehouse) = Warehouse::builtin(name) {
         return Ok(warehouse);
     }
-    let text = fs::read_to_string(name).with_context(|| {
-        format!(
-            "there is no warehouse `{name}`: the built-in ones are {}, anything else is read as a file",
+    let read = files::read_toml::<Warehouse>(Path::new(name));
+    let warehouse = read.with_context(|| match Path::new(name).exists() {
+        true => format!("the warehouse file {name} is not valid"),
+        false => format!(
+            "there is no warehouse `{name}`{}: the built-in ones are {}, anything else is read as a file",
+            meant(name),
             Warehouse::BUILTIN.join(", ")
-        )
+        ),
     })?;
-    let warehouse: Warehouse =
-        toml::from_str(&text).with_context(|| format!("the warehouse file {name} is not valid"))?;
     warehouse
         .validate()
         .with_context(|| format!("the warehouse file {name} cannot be built"))?;
@@ -467,5 +481,41 @@ mod tests {
             error.to_string().contains("small, curved, large"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn the_warehouse_file_of_the_readme_is_one_for_station_and_simulated_world() {
+        let readme = include_str!("../../../README.md");
+        let (_, rest) = readme
+            .split_once("```toml\n# hall.toml")
+            .expect("the example");
+        let (example, _) = rest.split_once("```").expect("its end");
+        let text = format!("# hall.toml{example}");
+        let world: Warehouse = toml::from_str(&text).expect("a warehouse");
+        world.validate().expect("it can be built");
+        let told: lager_station::Warehouse = toml::from_str(&text).expect("the same");
+        told.check().expect("it can be told");
+        assert_eq!(
+            crate::goods::described_by(&world)
+                .expect("the same")
+                .products,
+            told.products
+        );
+    }
+
+    #[test]
+    fn a_mistyped_warehouse_is_refused_with_the_one_that_was_meant() {
+        let refused = format!("{:#}", warehouse("smal").expect_err("there is none"));
+        assert!(
+            refused.contains("no warehouse `smal` (did you mean `small`?)"),
+            "{refused}"
+        );
+        let path = std::env::temp_dir().join(format!("lager-sied-{}.toml", std::process::id()));
+        let text = "size = [2, 1]\nside_length_cm = 50\n[[products]]\nid = 1\n";
+        std::fs::write(&path, text).expect("a file");
+        let refused = warehouse(&path.to_string_lossy()).expect_err("no such key");
+        std::fs::remove_file(path).expect("it is there");
+        let refused = format!("{refused:#}");
+        assert!(refused.ends_with("; did you mean `product`?"), "{refused}");
     }
 }

@@ -12,7 +12,6 @@ use lager_lines::Called;
 use lager_station::{Warehouse, load};
 
 use crate::config::Config;
-use crate::runtime::RuntimeFolder;
 
 /// The number of what a person calls so, for the robot that runs with `config`.
 ///
@@ -30,11 +29,11 @@ pub fn number(config: &Config, called: &Called) -> Result<i32> {
 /// # Errors
 /// It is not known here.
 pub fn described(config: &Config) -> Result<Warehouse> {
-    let kept = RuntimeFolder::warehouse(config)?;
-    if kept.is_file() {
-        return Ok(load(&kept)?);
+    let kept = &config.station.warehouse;
+    if let Some(kept) = kept.as_ref().filter(|kept| kept.is_file()) {
+        return Ok(load(kept)?);
     }
-    if config.station.wanted {
+    if config.station.wanted && kept.is_none() {
         bail!(
             "the names of goods are known to the external computer alone, which is not the robot's own; give the number, which `lager map` shows"
         );
@@ -47,7 +46,15 @@ pub fn described(config: &Config) -> Result<Warehouse> {
 /// # Errors
 /// No station can describe it.
 pub fn configured(config: &Config) -> Result<Warehouse> {
-    let described: Warehouse = toml::from_str(&toml::to_string(&config.warehouse()?)?)?;
+    described_by(&config.warehouse()?)
+}
+
+/// A simulated world's warehouse as a station describes it: both read the same file.
+///
+/// # Errors
+/// No station can describe it.
+pub fn described_by(warehouse: &lager_plant::Warehouse) -> Result<Warehouse> {
+    let described: Warehouse = toml::from_str(&toml::to_string(warehouse)?)?;
     described.check()?;
     Ok(described)
 }

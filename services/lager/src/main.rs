@@ -22,6 +22,7 @@ mod gateway;
 mod goods;
 mod hands;
 mod keepers;
+mod kept;
 mod map;
 mod mission;
 mod outcome;
@@ -33,6 +34,7 @@ mod services;
 mod signals;
 mod simulate;
 mod stack;
+mod state;
 mod station;
 mod steer;
 mod stop;
@@ -57,8 +59,8 @@ use lager_topics::{Mode, Role};
 use lager_wire::OperatorCommand;
 
 use crate::cli::{
-    Button, Cli, Command, GlobalArgs, ModeName, ObstacleChange, QueueChange, ServiceArgs,
-    TopicArgs, TopicCommand,
+    Button, Cli, Command, GlobalArgs, MapChange, ModeName, ObstacleChange, QueueChange,
+    ServiceArgs, TopicArgs, TopicCommand,
 };
 use crate::config::{ChipSection, Config};
 use crate::patience::Patience;
@@ -293,7 +295,10 @@ fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
         })?,
         Command::Fetch { product } => operator()?.fetch(&product)?,
         Command::Cancel { id } => operator()?.cancel(id)?,
-        Command::Map => operator()?.map()?,
+        Command::Map { change: None } => operator()?.map()?,
+        Command::Map {
+            change: Some(MapChange::Back { product }),
+        } => operator()?.back(product.as_ref())?,
         Command::Queue { change } => {
             let operator = operator()?;
             match change {
@@ -345,6 +350,9 @@ fn configure(global: &GlobalArgs) -> Result<Config> {
     }
     if global.bus.is_some() {
         config.bus.folder.clone_from(&global.bus);
+    }
+    if let Some(state) = &global.state {
+        config.state = Some(std::path::absolute(state)?);
     }
     if global.log.is_some() {
         config.log.file.clone_from(&global.log);

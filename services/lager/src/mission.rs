@@ -107,6 +107,11 @@ impl Mission {
         }
     }
 
+    /// The same, where somebody else orders these products.
+    pub fn leave(&mut self, ordered: impl Fn(i32) -> bool) {
+        self.unseen.retain(|(_, product)| !ordered(*product));
+    }
+
     /// The products delivered so far, in order.
     pub fn delivered(&self) -> &[i32] {
         &self.delivered

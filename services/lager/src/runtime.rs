@@ -1,13 +1,12 @@
 //! What a running robot keeps in its folder of the bus ([`Place`]): the lock of its `up`, the
 //! effective configuration, the links to the simulated or emulated ports, an emulated body's clock
-//! and EEPROMs, and what a station of its own keeps.
+//! and EEPROMs, and what a station of its own has open. What outlives `up` is `state.rs`'s.
 
 use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use lager_ports::{Lock, Place, RobotName, StopPage, StopWord};
-use lager_station::Queues;
 
 use crate::config::Config;
 
@@ -19,9 +18,10 @@ const STEERING: &str = "steering.tty";
 /// An emulated body's page of time, and the folder of its boards' EEPROMs.
 const CLOCK: &str = "clock";
 const EEPROM: &str = "eeprom";
-/// The socket for a GaG of the robot's own station, and its warehouse.
+/// The socket for a GaG of the robot's own station, and what waits there for the length of a
+/// script.
 const GAG: &str = "gag";
-const WAREHOUSE: &str = "warehouse.toml";
+const QUEUE: &str = "queue.toml";
 
 /// The folder of one robot on one bus.
 #[derive(Clone, Debug)]
@@ -60,10 +60,9 @@ impl RuntimeFolder {
         Ok(bus.place()?.folder_of(&bus.robot).join(GAG))
     }
 
-    /// Where the own station of `config`'s robot keeps its warehouse.
-    pub fn warehouse(config: &Config) -> Result<PathBuf> {
-        let bus = config.bus()?;
-        Ok(bus.place()?.folder_of(&bus.robot).join(WAREHOUSE))
+    /// Where the own station keeps what waits if nothing of it is to outlive the robot.
+    pub fn queue(&self) -> PathBuf {
+        self.path.join(QUEUE)
     }
 
     /// The page for an emulated body's time. A page that a killed robot has left is removed, so
@@ -164,10 +163,9 @@ impl Drop for NameLock {
     /// have written into their EEPROM.
     fn drop(&mut self) {
         if self.is_held() {
-            for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, WAREHOUSE] {
+            for name in [CONFIG, SENSOR, STEERING, CLOCK, GAG, QUEUE] {
                 let _ = fs::remove_file(self.folder.join(name));
             }
-            let _ = fs::remove_file(Queues::beside(&self.folder.join(WAREHOUSE)));
             // It stays when it has something in it.
             let _ = fs::remove_dir(self.folder.join(EEPROM));
             StopWord::tidy(&self.folder.join(StopPage::FILE));

@@ -1,9 +1,8 @@
 //! `lager station`: the external computer in this process, until it is told to end.
 //!
 //! Alone it listens where it is told. As a child of `lager up` its standard output is the socket at
-//! which robots connect, and what it keeps lies in the robot's folder.
+//! which robots connect. Where it keeps the warehouse and what waits, `state.rs` says.
 
-use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
@@ -12,12 +11,14 @@ use anyhow::{Context, Result, bail};
 use lager_lines::Name;
 use lager_panel::{Panel, Tokens};
 use lager_ports::Shutdown;
-use lager_station::{Listen, Queues, Server, ServerConfig, save};
+use lager_station::files::Hold;
+use lager_station::{Listen, Queues, Server, ServerConfig, Warehouse};
 
 use crate::cli::StationArgs;
 use crate::config::{Config, StationSection};
 use crate::goods;
 use crate::runtime::RuntimeFolder;
+use crate::state::StateFolder;
 use crate::supervisor;
 
 /// What a station calls itself towards robots.
@@ -75,18 +76,21 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
             .iter()
             .map(|it| (fetch.robot.clone(), it.clone()))
     });
+    let (path, otherwise) = own_warehouse(config, args.warehouse.as_deref())?;
+    let told = warehouse(&path, args.warehouse.as_deref(), otherwise.is_some());
     let server = Server::open(ServerConfig {
         name: name()?,
         listen: Listen::At(args.listen),
         gag: Some(gag.clone()),
-        warehouse: args.warehouse.clone(),
+        queues: Some(Queues::beside(&path)),
+        warehouse: Some(path),
+        otherwise,
         fetch: orders.collect(),
     })?;
     crate::say(&format!(
-        "robots connect to {}, a GaG to {}; {}",
+        "robots connect to {}, a GaG to {}; {told}",
         server.address()?,
         gag.display(),
-        warehouse(args.warehouse.as_deref()),
     ))?;
     let panel = match args.no_panel {
         true => None,
@@ -128,27 +132,45 @@ pub fn usual_panel() -> Result<SocketAddr> {
     Ok(socket.local_addr()?)
 }
 
-/// Writes what the station that `lager up` starts begins with: the robot's warehouse, and what the
-/// robot is to fetch.
+/// What an earlier station of the robot's own had not told it to fetch yet.
 ///
 /// # Errors
-/// The robot's folder does not take it.
+/// The file is there and is not read.
+pub fn waits(config: &Config) -> Result<Vec<i32>> {
+    let Some(queue) = &config.station.queue else {
+        return Ok(Vec::new());
+    };
+    let mut queues = Queues::load(queue)?;
+    Ok(queues.0.remove(&config.name).unwrap_or_default())
+}
+
+/// Writes what the station that `lager up` starts begins with: what the robot is to fetch, besides
+/// what other robots of the same station wait for.
+///
+/// # Errors
+/// The disk does not take it, or another station keeps the same warehouse.
 pub fn prepare(config: &Config, products: &[i32]) -> Result<()> {
-    let kept = RuntimeFolder::warehouse(config)?;
-    save(&kept, &goods::configured(config)?)?;
-    let queue = BTreeMap::from([(config.name.clone(), products.to_vec())]);
-    Queues(queue).save(&Queues::beside(&kept))?;
+    let section = &config.station;
+    if let Some(warehouse) = &section.warehouse {
+        // The station takes it for good; here somebody can still be told.
+        Hold::of(warehouse)?;
+    }
+    let Some(queue) = &section.queue else {
+        return Ok(());
+    };
+    let mut queues = Queues::load(queue)?;
+    let name = config.name.clone();
+    match products {
+        [] => queues.0.remove(&name),
+        products => queues.0.insert(name, products.to_vec()),
+    };
+    queues.save(queue)?;
     Ok(())
 }
 
 /// As `lager up` has started it: with what was prepared, or what the one before it has saved.
 fn supervised(config: &Config) -> Result<ServerConfig> {
     let robots = std::io::stdout().as_fd().try_clone_to_owned()?;
-    let kept = RuntimeFolder::warehouse(config)?;
-    if !kept.exists() {
-        // The robot's folder was removed.
-        prepare(config, &[])?;
-    }
     let gag = match &config.station.gag {
         Some(gag) => gag.clone(),
         None => RuntimeFolder::gag(config)?,
@@ -161,9 +183,27 @@ fn supervised(config: &Config) -> Result<ServerConfig> {
         name: name()?,
         listen: Listen::On(TcpListener::from(robots)),
         gag: fits.is_ok().then_some(gag),
-        warehouse: Some(kept),
+        warehouse: config.station.warehouse.clone(),
+        otherwise: Some(goods::configured(config)?),
+        queues: config.station.queue.clone(),
         fetch: Vec::new(),
     })
+}
+
+/// The warehouse of a station that runs by itself: its file, and what it is as long as there is
+/// none.
+fn own_warehouse(config: &Config, named: Option<&str>) -> Result<(PathBuf, Option<Warehouse>)> {
+    let Some(name) = named else {
+        let folder = StateFolder::of_station(config)?;
+        return Ok((folder.warehouse_of_nobody(), None));
+    };
+    let builtin = lager_plant::Warehouse::builtin(name);
+    let path = match builtin {
+        Some(_) => StateFolder::of_station(config)?.warehouse(name)?,
+        None => PathBuf::from(name),
+    };
+    let builtin = builtin.as_ref().map(goods::described_by).transpose()?;
+    Ok((path, builtin))
 }
 
 /// Refuses a path that no socket can have.
@@ -194,13 +234,18 @@ pub fn default_gag(config: &Config) -> Result<PathBuf> {
 }
 
 /// What is known of the warehouse, as the end of a sentence.
-fn warehouse(path: Option<&Path>) -> String {
-    match path {
-        None => "a GaG describes the warehouse, which is not saved".into(),
-        Some(path) if path.exists() => format!("the warehouse is {}", path.display()),
-        Some(path) => format!(
-            "there is no {} yet: a GaG describes the warehouse, which is saved there",
-            path.display()
+fn warehouse(path: &Path, named: Option<&str>, is_built_in: bool) -> String {
+    let at = path.display();
+    match (path.exists(), named.filter(|_| is_built_in)) {
+        (true, None) => format!("the warehouse is {at}"),
+        (true, Some(name)) => {
+            format!("the warehouse is {at}, where the built-in `{name}` was saved with changes")
+        }
+        (false, Some(name)) => {
+            format!("the warehouse is the built-in `{name}`, whose changes are saved in {at}")
+        }
+        (false, None) => format!(
+            "there is no {at} yet: a GaG or the panel describes the warehouse, which is saved there"
         ),
     }
 }

@@ -88,7 +88,7 @@ pub fn at_start(config: &Config) -> Result<()> {
 
 /// A stop in words: who, when, why.
 pub fn describe(origin: Option<Role>, cause: StopCause, at_ns: u64) -> String {
-    let who = origin.map_or("nobody known".to_owned(), |origin| format!("the {origin}"));
+    let who = origin.map_or("nobody known", Role::as_author);
     let when = match at_ns {
         0 => String::new(),
         at_ns => format!(" {} ago", span(StopTold::age(Clock::monotonic_ns(), at_ns))),

@@ -20,9 +20,11 @@ use crate::config::{Body, ChipSection, Config, PickBy, StationSection};
 use crate::exit;
 use crate::gateway;
 use crate::hands::Hands;
+use crate::kept::{Kept, KeptFile};
 use crate::mission::Mission;
 use crate::runtime::RuntimeFolder;
 use crate::signals::Signals;
+use crate::state::{self, StateFolder, World};
 use crate::station;
 use crate::stop;
 use crate::terminal::Terminal;
@@ -34,6 +36,8 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let signals = Signals::listen()?;
     apply(&mut config, args)?;
     config.validate()?;
+    let state = StateFolder::of_robot(&config)?;
+    let mut notes = choose_warehouse(&mut config, &state)?;
     let products = products(&config, args)?;
     if args.script {
         // Nobody is to be in its way, so nobody is there who would move the arm.
@@ -53,14 +57,37 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
         // The ports may be those of an emulator that somebody else runs.
         Body::Serial => {}
     }
+    state.make()?;
+    let _tidy = Tidy(&state);
+    let world = run_in_copy(&mut config, &state)?;
+    config.station.queue = Some(match args.exit_when_done {
+        true => folder.queue(),
+        false => config.station.queue.take().unwrap_or_else(|| state.queue()),
+    });
     let mut external = external::choose(&mut config, args.headless)?;
+    if external.listener.is_none() {
+        // What somebody else keeps is not known here.
+        (config.station.warehouse, config.station.queue) = (None, None);
+    }
     external.gateway = gateway::promise(&config)?;
     folder.write_config(&config)?;
-    let mission = ordered(&config, &external, products)?;
+    let mut kept: Kept = state::read_kept(&state.orders(), &mut notes)?;
+    if args.exit_when_done && !kept.is_nothing() {
+        // A script does what it is told, and leaves the rest to whoever drives next.
+        notes
+            .push("the orders that wait from before are left for an `up` that is no script".into());
+        kept = Kept::default();
+    }
+    let mission = ordered(&config, &external, products, args, &mut kept)?;
+    notes.extend(kept.sentence());
 
     stop::at_start(&config)?;
     let terminal = Terminal::new(args.json)?;
     let mut robot = Robot::new(config, lock, external, mission, signals, terminal)?;
+    (robot.first_notes, robot.world) = (notes, world);
+    if !args.exit_when_done {
+        robot.goes_on_with(kept, KeptFile::new(state.orders()));
+    }
     let ran = robot.run(args.exit_when_done);
     let outcome = robot.finish(args.exit_when_done, args.json);
     ran?;
@@ -69,6 +96,41 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// Leaves nothing in the state folder that is of no use to the next `up`.
+struct Tidy<'a>(&'a StateFolder);
+
+impl Drop for Tidy<'_> {
+    fn drop(&mut self) {
+        self.0.tidy();
+    }
+}
+
+/// Has the robot run in a copy of its warehouse's file, so that a process that is started again
+/// finds the world as it is now. A built-in one needs none.
+fn run_in_copy(config: &mut Config, state: &StateFolder) -> Result<Option<World>> {
+    if Warehouse::builtin(&config.warehouse).is_some() {
+        return Ok(None);
+    }
+    let world = World {
+        folder: state.clone(),
+        warehouse: config.warehouse()?,
+    };
+    config.warehouse = world.write()?.display().to_string();
+    Ok(Some(world))
+}
+
+/// Chooses the warehouse, and where its changes are kept; what to tell people of it.
+fn choose_warehouse(config: &mut Config, state: &StateFolder) -> Result<Vec<String>> {
+    if config.station.warehouse.is_none() {
+        config.station.warehouse = Some(state.warehouse(&config.warehouse)?);
+    }
+    let (saved, note) = state.saved(&config.warehouse);
+    if let Some(saved) = saved {
+        config.warehouse = saved;
+    }
+    Ok(note.into_iter().collect())
 }
 
 /// What the robot is to fetch from the start, if anybody is to see to that. Real boards do not move
@@ -109,18 +171,48 @@ fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
 }
 
 /// Puts what is to be fetched into the queue of the robot's own station. Where there is none, the
-/// robot's own queue is given it.
+/// robot's own queue is given it. What waits from before goes first, in the robot's own queue; the
+/// first product of the warehouse is fetched only if nothing else is to be.
 fn ordered(
     config: &Config,
     external: &External,
-    products: Option<Vec<i32>>,
+    mut products: Option<Vec<i32>>,
+    args: &UpArgs,
+    kept: &mut Kept,
 ) -> Result<Option<Mission>> {
-    if external.listener.is_none() {
-        let first_id = Hands::fresh_id();
-        return Ok(products.map(|products| Mission::of_robot(&products, first_id)));
+    let known: Vec<i32> = config
+        .warehouse()?
+        .products
+        .iter()
+        .map(|it| it.id)
+        .collect();
+    kept.orders.retain(|order| known.contains(&order.product));
+    if config.body != Body::Serial {
+        // Its world is a new one.
+        kept.gone.clear();
     }
-    station::prepare(config, products.as_deref().unwrap_or_default())?;
-    Ok(products.map(|products| Mission::of_station(&products)))
+    let is_own = external.listener.is_some();
+    let waited = match is_own && !args.exit_when_done {
+        true => station::waits(config)?,
+        false => Vec::new(),
+    };
+    let mut waiting = kept.add(&waited);
+    if args.mission.is_empty() && !kept.orders.is_empty() {
+        products = products.map(|_| Vec::new());
+    }
+    let wanted = products.clone().unwrap_or_default();
+    waiting.extend(wanted.iter().filter(|product| !kept.has(**product)));
+    if is_own {
+        station::prepare(config, &waiting)?;
+    }
+    Ok(products.map(|products| match is_own {
+        true => Mission::of_station(&products),
+        false => {
+            let mut mission = Mission::of_robot(&products, Hands::fresh_id());
+            mission.leave(|product| kept.has(product));
+            mission
+        }
+    }))
 }
 
 /// Refuses before anything runs what the services would be refused, again and again, at every
@@ -164,6 +256,14 @@ pub fn mission(warehouse: &Warehouse, wanted: &[Called]) -> Result<Vec<i32>> {
             "--mission: at most {} products wait in a queue",
             lager_station::Robot::MOST_PRODUCTS
         )));
+    }
+    for (place, called) in wanted.iter().enumerate() {
+        let is_it = |id: &ProductId| Some(id) == found.get(place);
+        if found[..place].iter().any(is_it) {
+            bail!(exit::Usage(format!(
+                "--mission: product {called} is named twice; there is one piece of goods for each number, so each is fetched once"
+            )));
+        }
     }
     if wanted.is_empty() {
         return Ok(known.take(1).map(|(id, _)| id).collect());

@@ -29,6 +29,7 @@ use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::kept::Kept;
 use crate::mission::Mission;
 use crate::report::Note;
 use crate::services::Service;
@@ -56,6 +57,8 @@ pub struct Begin {
     pub robot_start: Option<Duration>,
     /// The mission, if there is one.
     pub mission: Option<Mission>,
+    /// What the robot is to be given back.
+    pub kept: Kept,
     /// What is to be removed first.
     pub sweep: Sweep,
 }
@@ -91,6 +94,13 @@ pub enum Word {
     Damaged(String),
     /// How far the mission has come.
     Mission(Mission),
+    /// What is to be kept of the robot's orders changes.
+    Kept {
+        /// What the robot has not been given back yet.
+        left: Kept,
+        /// All of it.
+        all: Kept,
+    },
     /// Products that the mission has delivered and that do not lie at the delivery station.
     Misplaced(Vec<i32>),
 }

@@ -15,6 +15,7 @@ pub mod blocks;
 mod by_hand;
 mod command;
 mod config;
+mod goods;
 pub mod heading;
 mod holding;
 pub mod judge;

@@ -29,13 +29,14 @@ mod ways;
 use core::time::Duration;
 
 use lager_topics::{
-    EventKind, Failure, FailureKind, Goal, Heading, Order, Phase, Pick, Route, Thought,
+    EventKind, Failure, FailureKind, Goal, GoneWhy, Heading, Order, Phase, Pick, Route, Thought,
     ThoughtKind, WarehouseMap,
 };
 
 use crate::battery::Battery;
 use crate::blocks::Blocks;
 use crate::config::LogicConfig;
+use crate::goods::Gone;
 use crate::heading::{Compass, Spin};
 use crate::map::{Map, PickStation};
 use crate::marks::Sides;
@@ -73,6 +74,8 @@ pub(crate) struct Mission {
     pub(crate) order: Order,
     /// The orders that wait.
     pub(crate) queue: Queue,
+    /// The goods that no order can be for.
+    gone: Gone,
     /// Blocks and queue, by their revisions, with which no waiting order could be begun.
     none_reachable: Option<(u32, u32)>,
     pub(crate) delivered: u32,
@@ -111,6 +114,7 @@ impl Mission {
             goal: Goal::None,
             order: Order::default(),
             queue: Queue::default(),
+            gone: Gone::default(),
             none_reachable: None,
             delivered: 0,
             misses: 0,
@@ -174,6 +178,9 @@ impl Mission {
             (Phase::Picking, Outcome::Failed(kind, expected, seen))
                 if kind != FailureKind::DrivenByHand =>
             {
+                if kind == FailureKind::GoodsMissing {
+                    self.goods_are_gone(GoneWhy::NotFound, out);
+                }
                 self.wait_for_hand(kind, expected.round() as i32, seen.round() as i32, out);
             }
             (_, Outcome::Failed(kind, expected, seen)) => {

@@ -39,7 +39,7 @@ use crate::config::LogicConfig;
 use crate::latency::FrameMeter;
 use crate::navigator::{Input, Navigator};
 use crate::node::Node;
-use crate::told::{Beginning, Kept};
+use crate::told::{Beginning, Kept, goods_of};
 use crate::traced::Traced;
 use journal::{Journal, Places};
 
@@ -297,6 +297,14 @@ impl Shell {
                         self.decide(Input::MoveUp(input.order_id), cause);
                     }
                     Some(InputKind::QueueCleared) => self.decide(Input::ClearQueue, cause),
+                    Some(InputKind::GoodsGone) => {
+                        if let Some(product) = goods_of(input.order_id) {
+                            self.decide(Input::GoodsGone(product), cause);
+                        }
+                    }
+                    Some(InputKind::GoodsBack) => {
+                        self.decide(Input::GoodsBack(goods_of(input.order_id)), cause);
+                    }
                     Some(kind @ (InputKind::LinkLost | InputKind::LinkBack)) => {
                         let lost = kind == InputKind::LinkLost;
                         self.decide(Input::Link { lost }, cause);

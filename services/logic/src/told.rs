@@ -88,6 +88,14 @@ pub(crate) fn entry(now: Duration, input: &Input<'_>) -> Told {
             ToldKind::MoveUp
         }
         Input::ClearQueue => ToldKind::ClearQueue,
+        Input::GoodsGone(product) => {
+            told.number = coded_goods(Some(product)).into();
+            ToldKind::Goods
+        }
+        Input::GoodsBack(product) => {
+            (told.number, told.flag) = (coded_goods(product).into(), 1);
+            ToldKind::Goods
+        }
         Input::PickupDone { order_id, forced } => {
             (told.number, told.flag) = (order_id.into(), forced.into());
             ToldKind::PickupDone
@@ -154,6 +162,16 @@ pub(crate) fn order_of(told: &Told) -> Order {
     }
 }
 
+/// A product, or all of them, as `operator/input` and entries have it.
+fn coded_goods(product: Option<i32>) -> u32 {
+    product.map_or(lager_topics::Input::ALL_GOODS, i32::cast_unsigned)
+}
+
+/// The product of such a number; `None` = all of them.
+pub(crate) fn goods_of(coded: u32) -> Option<i32> {
+    (coded != lager_topics::Input::ALL_GOODS).then(|| coded.cast_signed())
+}
+
 /// The input of an entry; `None` if it makes no sense, or is none.
 pub(crate) fn input<'a>(told: &Told, beside: &Beside<'a>) -> Option<Input<'a>> {
     let flag = told.flag != 0;
@@ -170,6 +188,8 @@ pub(crate) fn input<'a>(told: &Told, beside: &Beside<'a>) -> Option<Input<'a>> {
         ToldKind::Cancel => Input::Cancel(id),
         ToldKind::MoveUp => Input::MoveUp(id),
         ToldKind::ClearQueue => Input::ClearQueue,
+        ToldKind::Goods if flag => Input::GoodsBack(goods_of(id)),
+        ToldKind::Goods => Input::GoodsGone(goods_of(id)?),
         ToldKind::PickupDone => Input::PickupDone {
             order_id: id,
             forced: flag,
@@ -277,6 +297,10 @@ mod tests {
             Input::Cancel(u32::MAX),
             Input::MoveUp(4),
             Input::ClearQueue,
+            Input::GoodsGone(0),
+            Input::GoodsGone(i32::MAX),
+            Input::GoodsBack(Some(7)),
+            Input::GoodsBack(None),
             Input::PickupDone {
                 order_id: 5,
                 forced: true,

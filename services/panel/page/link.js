@@ -8,7 +8,7 @@
 //   from <robot> <a line of the extension, such as state ...>
 //   from <robot> asked <who> <what>   a person here wants an action, stop, take or free
 //   past <robot> <ms> <an event, a thought or what was asked so long ago>
-//   answer <number> done | refused <reason> | stopped <ms> | lost <reason>
+//   answer <number> done [<text>] | refused <reason> | stopped <ms> | lost <reason>
 //
 // What the page says:
 //
@@ -226,7 +226,7 @@ export class Link extends EventTarget {
     const settle = this.waiting.get(number);
     this.waiting.delete(number);
     if (!settle) return;
-    if (what === "done") settle({ done: true });
+    if (what === "done") settle({ done: true, told: rest.join(" ") });
     else if (what === "stopped") settle({ stopped: Number(rest[0]) });
     else settle({ refused: rest.join(" "), isUnknown: what === "lost" });
   }
@@ -242,6 +242,8 @@ export class Link extends EventTarget {
       remember(robot, now);
     } else if (word === "route") {
       robot.route = rest.slice(1).reduce(pairs, []);
+    } else if (word === "gone") {
+      robot.gone = new Set(rest.slice(1));
     } else if (word === "blocked") {
       robot.blocked = new Map();
       for (let i = 1; i + 3 < rest.length; i += 4) {

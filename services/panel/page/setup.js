@@ -117,7 +117,8 @@ export class Setup {
     const why = this.wrong(warehouse);
     const answer = why ? {} : await this.link.ask("warehouse", null, JSON.stringify(warehouse));
     const refused = why ?? (answer.refused && reason(answer.refused));
-    put(this.parts.said, refused ?? say("saved_here"));
+    const told = (answer.told ?? "").split("; ").map(reason).join("; ");
+    put(this.parts.said, refused ?? (told || say("saved_here")));
     if (refused) return false;
     if (undoable && before) this.past.push(before);
     this.drawUndo();

@@ -25,16 +25,17 @@
 //! from <robot> <report>             a line of the extension, `thought <text>`, or `asked <name>
 //!                                   <what>`: a person here wants an action, `stop`, `take` or `free`
 //! past <robot> <ms> <report>        an event, a thought or what was asked, so long ago
-//! answer <number> done | stopped <ms> | refused <text> | lost <text>
+//! answer <number> done [<text>] | stopped <ms> | refused <text> | lost <text>
 //! ```
 //!
+//! `done` says of a warehouse where it is kept, and what robots do with it that know another one.
 //! `lost`: it was given to the robot, and nobody knows what came of it.
 //!
 //! A line that cannot be read is refused if it has a number; a page that goes on like this is
 //! closed.
 
-use lager_lines::Name;
 use lager_lines::extension::{Action, Order};
+use lager_lines::{Name, hint};
 use lager_station::Warehouse;
 
 /// What a page says.
@@ -107,8 +108,10 @@ pub(crate) fn read(line: &str) -> Result<Said, Unread> {
 fn read_warehouse(rest: &str) -> Result<Said, Unread> {
     let (number, json) = rest.split_once(' ').unwrap_or((rest, ""));
     let number = read_number(number)?;
-    let warehouse = serde_json::from_str(json)
-        .map_err(|error| Unread::new(Some(number), format!("this is no warehouse: {error}")))?;
+    let warehouse = serde_json::from_str(json).map_err(|error: serde_json::Error| {
+        let hint = hint(&error.to_string());
+        Unread::new(Some(number), format!("this is no warehouse: {error}{hint}"))
+    })?;
     Ok(Said::Warehouse {
         number,
         warehouse: Box::new(warehouse),
@@ -214,9 +217,10 @@ mod tests {
         };
         assert_eq!(warehouse.size, [2, 3]);
         assert_eq!(warehouse.products.len(), 1);
-        assert!(
-            warehouse.rest.contains_key("exit"),
-            "what else is there stays"
-        );
+        assert_eq!(warehouse.exit.map(|exit| exit.length_cm), Some(80));
+        let Err(unread) = read(&line.replace("side\":", "sied\":")) else {
+            panic!("a mistyped key is taken");
+        };
+        assert!(unread.why.ends_with("; did you mean `side`?"), "{unread:?}");
     }
 }

@@ -64,7 +64,7 @@ pub(crate) struct Visit {
 /// When what a page was told of a robot last was new.
 #[derive(Debug, Default)]
 struct LastTold {
-    at: [Option<Duration>; 8],
+    at: [Option<Duration>; 9],
 }
 
 impl Visit {
@@ -314,7 +314,7 @@ impl Visit {
         for (number, saving) in std::mem::take(&mut self.saving) {
             match saving.wait(Duration::ZERO) {
                 None => self.saving.push((number, saving)),
-                Some(Ok(())) => self.answer(number, "done"),
+                Some(Ok(())) => self.answer(number, &format!("done {}", saving.sentence())),
                 Some(Err(why)) => self.refuse(number, &why),
             }
         }
@@ -413,6 +413,9 @@ impl Visit {
         }
         if let Some(seen) = &shown.obstacles {
             tell(7, seen.at, &|| Report::Obstacles(seen.value.clone()));
+        }
+        if let Some(seen) = &shown.gone {
+            tell(8, seen.at, &|| Report::Gone(seen.value.clone()));
         }
     }
 }

@@ -2,6 +2,7 @@
 //! takes.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -10,7 +11,7 @@ use std::time::Duration;
 use lager_lines::{Name, Text};
 
 use crate::shown::{Reply, Told};
-use crate::station::News;
+use crate::station::{News, Uses};
 
 /// What a robot tells of earlier is what it told then, if that was so near to it: it is counted from
 /// when each was read.
@@ -33,6 +34,8 @@ impl Awaited {
 #[derive(Debug)]
 pub struct Saving {
     saved: Receiver<Result<(), String>>,
+    kept_in: Option<PathBuf>,
+    robots: Vec<Uses>,
 }
 
 /// The other end.
@@ -43,6 +46,18 @@ impl Saving {
     /// taken. A station without a file has nothing to save, and is done.
     pub fn wait(&self, timeout: Duration) -> Option<Result<(), String>> {
         self.saved.recv_timeout(timeout).ok()
+    }
+
+    /// Where it is kept once it is saved, and what robots do with it, in a sentence.
+    pub fn sentence(&self) -> String {
+        let mut sentence = match &self.kept_in {
+            Some(path) => format!("saved in {}", path.display()),
+            None => "taken, and lost when the station ends".to_owned(),
+        };
+        for uses in &self.robots {
+            sentence.push_str(&format!("; {uses}"));
+        }
+        sentence
     }
 }
 
@@ -90,10 +105,14 @@ impl Outlets {
     }
 
     /// Waits until the warehouse of this moment is saved.
-    pub(crate) fn save(&mut self) -> Saving {
+    pub(crate) fn save(&mut self, kept_in: Option<PathBuf>, robots: Vec<Uses>) -> Saving {
         let (to, saved) = sync_channel(1);
         self.savings.push(to);
-        Saving { saved }
+        Saving {
+            saved,
+            kept_in,
+            robots,
+        }
     }
 
     /// Who waits for that; it is then no longer here.

@@ -23,6 +23,7 @@
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -54,6 +55,8 @@ pub(crate) struct Shared {
     changed: Condvar,
     /// Wakes the thread of the sockets.
     waker: UnixStream,
+    /// The warehouse's file, if it has one.
+    kept_in: Option<PathBuf>,
     /// The origin of the station's clock.
     start: Instant,
 }
@@ -178,15 +181,18 @@ impl Handle {
     }
 
     /// Gives the station another warehouse, which is then saved. It is in force even if the disk
-    /// does not take it.
+    /// does not take it. What robots do with it that know another one already, the sentence of the
+    /// [`Saving`] says.
     ///
     /// # Errors
     ///
     /// When there can be no such warehouse.
     pub fn set_warehouse(&self, warehouse: Warehouse) -> Result<Saving, WarehouseError> {
+        let kept_in = self.shared.kept_in.clone();
         let result = self.work(|state| {
             state.station.set_warehouse(warehouse)?;
-            Ok(state.outlets.save())
+            let robots = state.station.tell_goods();
+            Ok(state.outlets.save(kept_in, robots))
         });
         self.wake();
         result
@@ -257,7 +263,7 @@ impl Drop for Driver {
 
 /// The station as it is.
 impl Handle {
-    pub(crate) fn new(station: Station, waker: UnixStream) -> Self {
+    pub(crate) fn new(station: Station, waker: UnixStream, kept_in: Option<PathBuf>) -> Self {
         Self {
             shared: Arc::new(Shared {
                 state: Mutex::new(State {
@@ -267,6 +273,7 @@ impl Handle {
                 }),
                 changed: Condvar::new(),
                 waker,
+                kept_in,
                 start: Instant::now(),
             }),
         }

@@ -13,6 +13,7 @@
 //! - [`Station`]: the robots by their names and the GaG that speaks for one of them, as pure.
 //! - [`Warehouse`]: squares, delivery and goods, as they lie in a file that is saved atomically.
 //! - [`Queues`]: what waits to be fetched by each robot, in a file beside it.
+//! - [`files`]: how files that a person has named are read, replaced and held.
 //! - [`Server`]: the sockets, in one thread that waits for all of them.
 //! - [`Handle`]: what another thread sees of the station and does with it: the last that each robot
 //!   has shown and when, a [`Subscription`] to events and thoughts, actions whose answer is
@@ -23,6 +24,7 @@
 mod asked;
 mod awaited;
 mod connection;
+pub mod files;
 mod given;
 mod handle;
 mod queues;
@@ -42,6 +44,6 @@ pub use queues::Queues;
 pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};
 pub use server::{Listen, Server, ServerConfig, ServerError};
 pub use shown::{Reply, Seen, Shown, Told};
-pub use station::{News, Output, Peer, Station, Wish, WishRefused};
+pub use station::{News, Output, Peer, Station, Uses, Wish, WishRefused};
 pub use warehouse::{LoadError, SaveError, StoredProduct, Warehouse, WarehouseError, load, save};
 pub use wheel::Key;

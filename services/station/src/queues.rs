@@ -10,13 +10,13 @@
 //! may still be in the file and be told again, but none is lost.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::warehouse::{LoadError, SaveError, replace_with};
+use crate::files::{self, ReadError};
+use crate::warehouse::{SaveError, save_toml};
 
 /// The products that wait, by robot; robots for which none waits are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,24 +26,31 @@ pub struct Queues(pub BTreeMap<String, Vec<i32>>);
 impl Queues {
     /// Where they lie for the warehouse of `warehouse`.
     pub fn beside(warehouse: &Path) -> PathBuf {
-        let mut path = OsString::from(warehouse);
-        path.push(".queue");
-        path.into()
+        files::beside(warehouse, "queue")
     }
 
-    /// Reads them; none where there is no file.
+    /// Reads them; none where there is no file. A file that holds something else is moved out of
+    /// the way, which is said: what waited is lost, and everything else goes on.
     ///
     /// # Errors
     ///
-    /// When the file is not read or holds something else.
-    pub fn load(path: &Path) -> Result<Self, LoadError> {
-        if !path.exists() {
-            return Ok(Self::default());
+    /// When the file is there and is not read.
+    pub fn load(path: &Path) -> Result<Self, ReadError> {
+        match files::read_toml(path) {
+            Err(ReadError::Read { error, .. }) if error.kind() == io::ErrorKind::NotFound => {
+                Ok(Self::default())
+            }
+            Err(error) if error.is_damage() => {
+                let aside = files::set_aside(path).map_err(|error| ReadError::Read {
+                    path: path.to_owned(),
+                    error,
+                })?;
+                let aside = aside.display();
+                tracing::warn!("what waited to be fetched is lost: {error}; it is now {aside}");
+                Ok(Self::default())
+            }
+            read => read,
         }
-        let at = || path.to_owned();
-        let text =
-            fs::read_to_string(path).map_err(|error| LoadError::Read { path: at(), error })?;
-        toml::from_str(&text).map_err(|error| LoadError::Toml { path: at(), error })
     }
 
     /// Saves them as the warehouse is saved.
@@ -52,7 +59,6 @@ impl Queues {
     ///
     /// When the disk does not take them.
     pub fn save(&self, path: &Path) -> Result<(), SaveError> {
-        let text = toml::to_string(self)?;
-        replace_with(path, &text)
+        save_toml(path, self)
     }
 }

@@ -34,7 +34,9 @@ use std::time::Duration;
 use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
 use lager_lines::extension::{Hello, Order};
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{Coord, Direction, Map, ProductId, Products, SideLength, Text, TooLate};
+use lager_lines::{
+    Coord, Direction, Map, Name, ProductId, Products, SideLength, Text, TooLate,
+};
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 
@@ -45,6 +47,8 @@ use crate::wheel::Wheel;
 
 mod actions;
 mod known;
+
+pub(crate) use known::Other;
 
 /// What a robot is doing, as far as its questions tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -117,7 +121,7 @@ pub enum ActRefused {
 }
 
 /// Why a product is not put in a robot's queue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum FetchRefused {
     /// There is no such product.
     #[error("there is no product {product} in the warehouse")]
@@ -125,12 +129,48 @@ pub enum FetchRefused {
         /// Its number.
         product: ProductId,
     },
+    /// It waits already, or is under way. There is one piece of goods for each number.
+    #[error("product {product} is ordered already")]
+    Ordered {
+        /// Its number.
+        product: ProductId,
+    },
+    /// Its goods were delivered, or were not found.
+    #[error(
+        "product {product} is not in its place, as robot {robot} has seen; put it back and say \
+         `lager map back {product}`"
+    )]
+    Gone {
+        /// Its number.
+        product: ProductId,
+        /// Who has seen it.
+        robot: Name,
+    },
     /// Too many wait.
     #[error(
         "{} products wait already; wait until some are delivered",
         Robot::MOST_PRODUCTS
     )]
     Full,
+}
+
+/// What a robot was told of the warehouse.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    side: Option<SideLength>,
+    map: Option<Map>,
+    products: Option<Products>,
+}
+
+impl Known {
+    fn take(&mut self, answer: &Answer) {
+        match answer {
+            Answer::SideLength(side) => self.side = Some(*side),
+            Answer::Map(map) => self.map = Some(*map),
+            Answer::Products(_, products) => self.products = Some(products.clone()),
+            _ => {}
+        }
+    }
 }
 
 /// One robot.
@@ -141,6 +181,8 @@ pub struct Robot {
     /// As it has announced itself, if it speaks the extension.
     hello: Option<Hello>,
     warehouse: Option<(SideLength, Map, Products)>,
+    /// What of it, and of those before it, the robot was told last.
+    known: Known,
     queue: VecDeque<ProductId>,
     /// The product that it was told last.
     told: Option<ProductId>,
@@ -248,11 +290,40 @@ impl Robot {
         if !products.into_iter().any(|one| one.id == product) {
             return Err(FetchRefused::Unknown { product });
         }
+        if self.is_ordered(product) {
+            return Err(FetchRefused::Ordered { product });
+        }
+        let gone = self.shown.gone.as_ref().map(|gone| gone.value.first());
+        if let Some(hello) = &self.hello
+            && gone.is_some_and(|gone| gone.contains(&product))
+        {
+            let robot = hello.name.clone();
+            return Err(FetchRefused::Gone { product, robot });
+        }
         if self.queue.len() == Self::MOST_PRODUCTS {
             return Err(FetchRefused::Full);
         }
         self.queue.push_back(product);
         Ok(self.answer())
+    }
+
+    /// Whether this product waits here, or the robot that is connected is told to fetch it.
+    fn is_ordered(&self, product: ProductId) -> bool {
+        if self.queue.contains(&product) {
+            return true;
+        }
+        if self.doing == Doing::Away {
+            return false;
+        }
+        let is_told = matches!(self.doing, Doing::Fetching | Doing::Picking)
+            && self.told == Some(product)
+            && self.hello.is_none();
+        let state = self.shown.state.as_ref();
+        let queue = self.shown.queue.as_ref();
+        let mut waiting = queue.iter().flat_map(|queue| queue.value.first());
+        let shows = state.is_some_and(|state| state.value.product == Some(product))
+            || waiting.any(|waits| waits.product == product);
+        is_told || shows && self.hello.is_some()
     }
 
     /// Takes the first of the products that wait with this number out of the queue; tells whether
@@ -279,6 +350,7 @@ impl Robot {
     /// When the robot asks nothing, or something else. It is not told.
     pub fn given(&mut self, answer: Answer) -> Result<StationLine, AnswerRefused> {
         let query = self.held.answer(&answer)?;
+        self.known.take(&answer);
         match answer {
             Answer::Fetch(product) => {
                 self.begin(product);
@@ -365,6 +437,15 @@ impl Robot {
         if self.doing != Doing::Picking {
             self.is_picked = false;
         }
+        if self.doing != Doing::Starting
+            && let Some((side, map, products)) = &self.warehouse
+        {
+            // What it does not ask for it has been told by a station before this one.
+            self.known.side.get_or_insert(*side);
+            self.known.map.get_or_insert(*map);
+            let known = &mut self.known.products;
+            known.get_or_insert_with(|| products.clone());
+        }
         // One of this project asks for either kind of command in a mode of its own.
         let has_turned = self.hello.is_some() && self.doing != before;
         if has_turned || !self.doing.takes_commands() {
@@ -448,6 +529,7 @@ impl Robot {
             },
         };
         self.held.clear();
+        self.known.take(&answer);
         Some(StationLine::Answer(answer))
     }
 }

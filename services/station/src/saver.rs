@@ -35,9 +35,9 @@ impl Changes {
         self.waits.extend(newer.waits);
     }
 
-    /// Saves it and tells who waits; where there is no `path` nothing is saved. What the disk has
+    /// Saves warehouse and queues and tells who waits; where there is no path nothing is saved. What the disk has
     /// not taken stays, and why is returned.
-    fn save(&mut self, path: Option<&Path>) -> Vec<SaveError> {
+    fn save(&mut self, [path, queues]: [Option<&Path>; 2]) -> Vec<SaveError> {
         let mut errors = Vec::new();
         let saved = path.zip(self.warehouse.as_ref());
         let saved = saved.map(|(path, warehouse)| save(path, warehouse));
@@ -56,8 +56,8 @@ impl Changes {
             // Whoever has asked may have given up.
             let _ = to.try_send(told.clone());
         }
-        let saved = path.zip(self.queues.as_ref());
-        match saved.map(|(path, queues)| queues.save(&Queues::beside(path))) {
+        let saved = queues.zip(self.queues.as_ref());
+        match saved.map(|(path, queues)| queues.save(path)) {
             Some(Err(error)) => errors.push(error),
             _ => self.queues = None,
         }
@@ -66,7 +66,7 @@ impl Changes {
 }
 
 /// Saves what changes, until nothing more can.
-fn work(path: Option<&Path>, changes: &Receiver<Changes>, handle: &Handle) {
+fn work(paths: [Option<&Path>; 2], changes: &Receiver<Changes>, handle: &Handle) {
     let mut open = Changes::default();
     let mut has_ended = false;
     while !has_ended {
@@ -78,7 +78,7 @@ fn work(path: Option<&Path>, changes: &Receiver<Changes>, handle: &Handle) {
         has_ended = matches!(received, Err(RecvTimeoutError::Disconnected));
         received.into_iter().for_each(|newer| open.add(newer));
         changes.try_iter().for_each(|newer| open.add(newer));
-        for error in open.save(path) {
+        for error in open.save(paths) {
             // Who was told of it once knows.
             if is_new {
                 tracing::error!("{error}; it is tried again");
@@ -96,12 +96,14 @@ pub(crate) struct Saver {
 }
 
 impl Saver {
-    /// Saves to `path`, and beside it, from now on; nothing where there is none.
-    pub(crate) fn new(path: Option<PathBuf>, handle: Handle) -> Self {
+    /// Saves to these files from now on; nothing where there is none.
+    pub(crate) fn new(warehouse: Option<PathBuf>, queues: Option<PathBuf>, handle: Handle) -> Self {
         let (sender, changes) = channel();
         Self {
             changes: Some(sender),
-            thread: Some(spawn(move || work(path.as_deref(), &changes, &handle))),
+            thread: Some(spawn(move || {
+                work([warehouse.as_deref(), queues.as_deref()], &changes, &handle);
+            })),
         }
     }
 

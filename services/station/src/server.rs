@@ -27,6 +27,7 @@ use rustix::net::sockopt;
 use thiserror::Error;
 
 use crate::connection::{Connection, Stream};
+use crate::files::{HeldBy, Hold, ReadError};
 use crate::handle::Handle;
 use crate::queues::Queues;
 use crate::saver::{Changes, Saver};
@@ -50,9 +51,13 @@ pub struct ServerConfig {
     pub listen: Listen,
     /// Where a GaG connects, if one may.
     pub gag: Option<PathBuf>,
-    /// The file of the warehouse, in which changes are saved. It need not be there yet: then a GaG
-    /// or another user of the station describes the warehouse. The robots' queues lie beside it.
+    /// The file of the warehouse, in which changes are saved. It need not be there yet.
     pub warehouse: Option<PathBuf>,
+    /// The warehouse as long as it has no file. Without it a GaG or another user of the station
+    /// describes the warehouse.
+    pub otherwise: Option<Warehouse>,
+    /// The file of the robots' queues.
+    pub queues: Option<PathBuf>,
     /// What robots are to fetch after what waits for them already. A name needs the warehouse's
     /// file.
     pub fetch: Vec<(Name, Called)>,
@@ -95,6 +100,12 @@ pub enum ServerError {
     /// The warehouse's file is none.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// The queues' file is not read.
+    #[error(transparent)]
+    Queues(#[from] ReadError),
+    /// Another station saves in that file.
+    #[error(transparent)]
+    Held(#[from] HeldBy),
     /// There can be no such warehouse.
     #[error(transparent)]
     Warehouse(#[from] WarehouseError),
@@ -129,6 +140,8 @@ pub struct Server {
     wakes: UnixStream,
     handle: Handle,
     saver: Saver,
+    /// The warehouse's file is this station's as long as it saves in it: dropped after the saver.
+    _hold: Option<Hold>,
     /// The queues as they are saved.
     saved: Queues,
     connections: BTreeMap<Peer, Connection>,
@@ -147,9 +160,14 @@ impl Server {
     ///
     /// When a socket cannot be had or the warehouse cannot be.
     pub fn open(config: ServerConfig) -> Result<Self, ServerError> {
-        let mut station = Station::new(config.name.clone(), read(config.warehouse.as_deref())?)?;
-        let saved = match &config.warehouse {
-            Some(warehouse) => Queues::load(&Queues::beside(warehouse))?,
+        let hold = match &config.warehouse {
+            Some(warehouse) => Hold::of(warehouse)?,
+            None => None,
+        };
+        let warehouse = read(config.warehouse.as_deref())?.or(config.otherwise);
+        let mut station = Station::new(config.name.clone(), warehouse)?;
+        let saved = match &config.queues {
+            Some(queues) => Queues::load(queues)?,
             None => Queues::default(),
         };
         put_back(&mut station, &saved);
@@ -165,6 +183,11 @@ impl Server {
                 }
                 (called, None) => return Err(no_warehouse(robot, called)),
             };
+            let waits = saved.0.get(robot.as_str());
+            if waits.is_some_and(|waits| waits.contains(&product.get())) {
+                // It was asked for at an earlier start, and waits still.
+                continue;
+            }
             let put = station.fetch(&robot, product);
             put.map_err(|why| ServerError::Fetch {
                 robot,
@@ -186,12 +209,13 @@ impl Server {
         let (wakes, waker) = UnixStream::pair()?;
         wakes.set_nonblocking(true)?;
         waker.set_nonblocking(true)?;
-        let handle = Handle::new(station, waker);
+        let handle = Handle::new(station, waker, config.warehouse.clone());
         Ok(Self {
             robots,
             gag,
             wakes,
-            saver: Saver::new(config.warehouse, handle.clone()),
+            saver: Saver::new(config.warehouse, config.queues, handle.clone()),
+            _hold: hold,
             saved,
             handle,
             connections: BTreeMap::new(),
@@ -464,9 +488,13 @@ fn put_back(station: &mut Station, queues: &Queues) {
 }
 
 fn read(path: Option<&Path>) -> Result<Option<Warehouse>, LoadError> {
-    match path {
-        Some(path) if path.exists() => load(path).map(Some),
-        _ => Ok(None),
+    match path.map(load) {
+        Some(Err(LoadError::Read(ReadError::Read { error, .. })))
+            if error.kind() == io::ErrorKind::NotFound =>
+        {
+            Ok(None)
+        }
+        read => read.transpose(),
     }
 }
 

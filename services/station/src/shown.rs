@@ -5,7 +5,7 @@ use std::time::Duration;
 use lager_lines::extension::{
     Block, Edge, Event, Latency, Listed, Queued, Report, State, Thinks, TruePose,
 };
-use lager_lines::{Coord, Text};
+use lager_lines::{Coord, ProductId, Text};
 use lager_wire::LineReading;
 
 /// A value that a robot has told, and when.
@@ -39,6 +39,8 @@ pub struct Shown {
     pub queue: Option<Seen<Listed<Queued>>>,
     /// What stands on ways of its simulated world.
     pub obstacles: Option<Seen<Listed<Edge>>>,
+    /// The products whose goods are not in their place.
+    pub gone: Option<Seen<Listed<ProductId>>>,
     /// How long it takes to react, about once a second.
     pub latency: Option<Seen<Box<Latency>>>,
     /// What each line sensor has read in the last calibration, the leftmost first.
@@ -103,6 +105,7 @@ impl Shown {
             Report::Route(value) => self.route = Some(Seen { value, at }),
             Report::Blocked(value) => self.blocked = Some(Seen { value, at }),
             Report::Queue(value) => self.queue = Some(Seen { value, at }),
+            Report::Gone(value) => self.gone = Some(Seen { value, at }),
             Report::Latency(value) => self.latency = Some(Seen { value, at }),
             Report::Sensors(value) => self.sensors = Some(Seen { value, at }),
             Report::Obstacles(value) => self.obstacles = Some(Seen { value, at }),

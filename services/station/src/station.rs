@@ -38,8 +38,10 @@ use crate::warehouse::{Warehouse, WarehouseError};
 
 mod actions;
 mod gag;
+mod told;
 
 pub use actions::News;
+pub use told::Uses;
 
 /// Who is at the other end of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -13,11 +13,11 @@
 //! side = "down"                 # from where it is reached: left, up, right, down
 //! ```
 //!
-//! What else stands in the file, such as the way out of a simulated warehouse, is kept as it is.
-//! Comments are not.
+//! What only a simulated world reads (`[exit]`, `[floor]`, `[[obstacle]]`) is kept as it is.
+//! Comments are not. Any other key is an error, as in the simulated world's reading of the file
+//! (`lager_plant::Warehouse`): a mistyped one would leave a hall without its goods.
 
-use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use lager_lines::gag::{Answer, ListWord};
@@ -25,11 +25,16 @@ use lager_lines::{
     Called, Coord, Direction, Map, MapError, NamesError, Product, ProductId, Products,
     ProductsError, SideLength, UnknownProduct, check_names, to_line,
 };
+use lager_plant::{Exit, Floor, Obstacle};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::files::{self, ReadError};
+
 /// A warehouse as its file has it. [`Warehouse::check`] says what of it cannot be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Warehouse {
     /// Squares in x and in y, 1 to 255 each.
     pub size: [u8; 2],
@@ -41,13 +46,20 @@ pub struct Warehouse {
     /// The goods.
     #[serde(default, rename = "product", skip_serializing_if = "Vec::is_empty")]
     pub products: Vec<StoredProduct>,
-    /// What only others read.
-    #[serde(flatten)]
-    pub rest: toml::Table,
+    /// The way out of a simulated one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exit: Option<Exit>,
+    /// How light a simulated one looks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor: Option<Floor>,
+    /// What stands in the way in a simulated one.
+    #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
+    pub obstacles: Vec<Obstacle>,
 }
 
 /// One product of the file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StoredProduct {
     /// Its number, 0 to 2 147 483 647.
     pub id: i32,
@@ -177,22 +189,9 @@ impl Warehouse {
 /// Why a warehouse is not read.
 #[derive(Debug, Error)]
 pub enum LoadError {
-    /// The file is not read.
-    #[error("cannot read {}: {error}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        error: io::Error,
-    },
-    /// It is no warehouse.
-    #[error("{}: {error}", .path.display())]
-    Toml {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, and where.
-        error: toml::de::Error,
-    },
+    /// The file is not read, or is no warehouse.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// There can be no such warehouse.
     #[error("{}: {error}", .path.display())]
     Warehouse {
@@ -209,17 +208,16 @@ pub enum LoadError {
 ///
 /// When the file is not read, is no warehouse, or describes one that cannot be.
 pub fn load(path: &Path) -> Result<Warehouse, LoadError> {
-    let at = || path.to_owned();
-    let text = fs::read_to_string(path).map_err(|error| LoadError::Read { path: at(), error })?;
-    let warehouse: Warehouse =
-        toml::from_str(&text).map_err(|error| LoadError::Toml { path: at(), error })?;
+    let warehouse: Warehouse = files::read_toml(path)?;
     let checked = warehouse.check();
-    checked.map_err(|error| LoadError::Warehouse { path: at(), error })?;
+    checked.map_err(|error| LoadError::Warehouse {
+        path: path.to_owned(),
+        error,
+    })?;
     Ok(warehouse)
 }
 
-/// Why a warehouse or a queue is not saved. The file is as it was; if only its folder could not be
-/// synchronised it is the new one, which a loss of power may undo.
+/// Why a warehouse or a queue is not saved. The file is as it was ([`files::replace`]).
 #[derive(Debug, Error)]
 pub enum SaveError {
     /// There can be no such warehouse.
@@ -228,6 +226,12 @@ pub enum SaveError {
     /// It cannot be written as TOML.
     #[error("it is not saved: {0}")]
     Toml(#[from] toml::ser::Error),
+    /// What would be written could not be read again.
+    #[error("{} is not saved: it could not be read again", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+    },
     /// The disk did not take it.
     #[error("{} is not saved: {error}", .path.display())]
     Write {
@@ -238,43 +242,30 @@ pub enum SaveError {
     },
 }
 
-/// Saves a warehouse so that whoever reads the file, even after a loss of power, finds the one
-/// before or this one and nothing between: a new file beside it is written and synchronised, takes
-/// its name, and the folder is synchronised.
-///
-/// One process saves at a time. If it is killed half way, the file beside stays and is replaced by
-/// the next one that saves.
+/// Saves a warehouse as [`files::replace`] does.
 ///
 /// # Errors
 ///
 /// When there can be no such warehouse or the disk does not take it.
 pub fn save(path: &Path, warehouse: &Warehouse) -> Result<(), SaveError> {
     warehouse.check()?;
-    replace_with(path, &toml::to_string(warehouse)?)
+    save_toml(path, warehouse)
 }
 
-/// Replaces a file by one with `text` in it, as [`save`] has it.
-pub(crate) fn replace_with(path: &Path, text: &str) -> Result<(), SaveError> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".new");
-    let beside = PathBuf::from(beside);
-    replace(path, &beside, text.as_bytes()).map_err(|error| {
-        // What could not be finished is of no use, and its name is free again.
-        let _ = fs::remove_file(&beside);
-        SaveError::Write {
+/// Saves a value as TOML, once it has been read from that text again.
+pub(crate) fn save_toml<T>(path: &Path, value: &T) -> Result<(), SaveError>
+where
+    T: Serialize + DeserializeOwned + PartialEq,
+{
+    let text = toml::to_string(value)?;
+    let is_too_long = text.len() as u64 > files::MOST_BYTES;
+    if is_too_long || toml::from_str::<T>(&text).ok().as_ref() != Some(value) {
+        return Err(SaveError::Unreadable {
             path: path.to_owned(),
-            error,
-        }
+        });
+    }
+    files::replace(path, &text).map_err(|error| SaveError::Write {
+        path: path.to_owned(),
+        error,
     })
-}
-
-fn replace(path: &Path, beside: &Path, text: &[u8]) -> io::Result<()> {
-    let mut file = File::create(beside)?;
-    file.write_all(text)?;
-    file.sync_all()?;
-    fs::rename(beside, path)?;
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }

@@ -39,6 +39,7 @@ listed!(Coord, 120);
 listed!(Block, 40);
 listed!(Queued, 45);
 listed!(Edge, 64);
+listed!(ProductId, 85);
 
 impl<T> Listed<T> {
     /// How many there are.
@@ -133,6 +134,12 @@ pub struct Queued {
     pub order: u32,
     /// What is fetched.
     pub product: ProductId,
+}
+
+impl ProductId {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, Misread> {
+        Self::from_word(reader.word())
+    }
 }
 
 impl Queued {

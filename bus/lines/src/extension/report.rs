@@ -47,6 +47,8 @@ pub enum Report {
     Queue(Listed<Queued>),
     /// What stands on ways of a simulated world.
     Obstacles(Listed<Edge>),
+    /// Products whose goods are not in their place: delivered, or not found there.
+    Gone(Listed<ProductId>),
     /// Something has happened.
     Event(Event),
     /// Something has happened, or was thought, before this connection was there.
@@ -240,6 +242,7 @@ impl Report {
             "obstacles" => {
                 |reader: &mut Reader<'_>| Ok(Self::Obstacles(Listed::<Edge>::read(reader)?))
             }
+            "gone" => |reader: &mut Reader<'_>| Ok(Self::Gone(Listed::<ProductId>::read(reader)?)),
             "event" => |reader: &mut Reader<'_>| Event::read(reader).map(Self::Event),
             "past" => read_past,
             "latency" => {
@@ -380,6 +383,7 @@ impl fmt::Display for Report {
             Self::Blocked(ways) => write!(formatter, "blocked {ways}"),
             Self::Queue(orders) => write!(formatter, "queue {orders}"),
             Self::Obstacles(edges) => write!(formatter, "obstacles {edges}"),
+            Self::Gone(products) => write!(formatter, "gone {products}"),
             Self::Event(event) => write!(formatter, "event {event}"),
             Self::Past { ago_ms, report } => write!(formatter, "past {ago_ms} {report}"),
             Self::Thinks(thinks) => write!(formatter, "thinks{thinks}"),

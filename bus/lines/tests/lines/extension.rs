@@ -208,6 +208,7 @@ fn the_longest_lists_fit_in_a_line_and_tell_how_many_there_are() {
         Report::Route(route),
         Report::Blocked(blocked),
         Report::Queue(queue),
+        Report::Gone(Listed::<ProductId>::new(&[product; 86])),
     ] {
         let line = to_line(&report).expect("it fits");
         assert_eq!(Report::read(line.trim_end()), Some(Ok(report)));

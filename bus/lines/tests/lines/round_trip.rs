@@ -270,10 +270,12 @@ fn report() -> impl Strategy<Value = Report> {
             .prop_map(|all| Report::Route(Listed::<Coord>::new(&all))),
         prop::collection::vec(block(), many.clone())
             .prop_map(|all| Report::Blocked(Listed::<Block>::new(&all))),
-        prop::collection::vec(queued, many)
+        prop::collection::vec(queued, many.clone())
             .prop_map(|all| Report::Queue(Listed::<Queued>::new(&all))),
         prop::collection::vec(edge(), 0..200_usize)
             .prop_map(|all| Report::Obstacles(Listed::<Edge>::new(&all))),
+        prop::collection::vec(product_id(), many)
+            .prop_map(|all| Report::Gone(Listed::<ProductId>::new(&all))),
         event(),
         past(),
         (

@@ -81,6 +81,13 @@ coded! {
         /// No tape has been seen since the robot was put down, in `seen` mm; `expected` is the most
         /// that is borne.
         LineUnseen = 31,
+        /// An order is for product `seen`, which another order is for already.
+        AlreadyOrdered = 32,
+        /// An order is for product `seen`, which was delivered `expected` s ago.
+        GoodsDelivered = 33,
+        /// An order is for product `seen`, which is not in its place, as is known since `expected`
+        /// s.
+        GoodsAway = 34,
     }
 }
 
@@ -115,6 +122,8 @@ coded! {
         Link = 12,
         /// The line sensors are calibrated, and the robot is put on a node as for a reset.
         Calibrate = 13,
+        /// A person puts goods back in their place and says so.
+        PutBack = 14,
     }
 }
 
@@ -164,7 +173,8 @@ impl FailureKind {
             | Self::TooManyProducts
             | Self::ProductOutside
             | Self::ProductTwice => Remedy::Map,
-            Self::QueueFull => Remedy::Later,
+            Self::QueueFull | Self::AlreadyOrdered => Remedy::Later,
+            Self::GoodsDelivered | Self::GoodsAway => Remedy::PutBack,
             Self::ClawUnheard
             | Self::ClawEmpty
             | Self::ClawSlack
@@ -310,6 +320,17 @@ impl fmt::Display for Failure {
                  again {seen} times"
             ),
             FailureKind::ProductTwice => write!(formatter, "product number {seen} is given twice"),
+            FailureKind::AlreadyOrdered => write!(formatter, "product {seen} is ordered already"),
+            FailureKind::GoodsDelivered => write!(
+                formatter,
+                "product {seen} was delivered {expected} s ago; put it back and say \
+                 `lager map back {seen}`"
+            ),
+            FailureKind::GoodsAway => write!(
+                formatter,
+                "product {seen} is not in its place, as known for {expected} s; put it back and \
+                 say `lager map back {seen}`"
+            ),
         }
     }
 }
@@ -337,6 +358,7 @@ impl fmt::Display for Remedy {
             Self::Calibrate => {
                 "Put me on the delivery node, looking into the warehouse, calibrate and press reset."
             }
+            Self::PutBack => "Put the goods back in their place and say that they are there.",
         })
     }
 }

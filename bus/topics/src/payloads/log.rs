@@ -133,6 +133,12 @@ coded! {
         PicksByItself = 57,
         /// The order is taken back too late: its goods are held, or being gripped (`product`).
         OrderKept = 58,
+        /// The goods are in their place again (`product`).
+        GoodsBack = 59,
+        /// All goods are in their places again.
+        AllGoodsBack = 60,
+        /// The goods are not in their place, as it was told (`product`).
+        GoodsGone = 61,
     }
 }
 
@@ -252,6 +258,9 @@ impl fmt::Display for Thought {
                 to,
                 "I bring product {product} all the same: it is in my claw, or about to be."
             ),
+            ThoughtKind::GoodsBack => write!(to, "Product {product} is in its place again."),
+            ThoughtKind::AllGoodsBack => write!(to, "All goods are in their places again."),
+            ThoughtKind::GoodsGone => write!(to, "Product {product} is not in its place."),
             ThoughtKind::OrderMovedUp => write!(to, "I shall fetch product {product} earlier."),
             ThoughtKind::QueueCleared => write!(to, "I shall fetch none of what was waiting."),
             ThoughtKind::OrderWaitsForCharge => write!(

@@ -33,10 +33,39 @@ payload! {
     }
 }
 
+coded! {
+    /// Why goods are not in their place.
+    pub enum GoneWhy {
+        /// They were delivered.
+        Delivered = 0,
+        /// They were picked up, and not delivered.
+        PickedUp = 1,
+        /// They were not found there.
+        NotFound = 2,
+        /// A person has said so, or an earlier run of the robot has seen it.
+        Told = 3,
+    }
+}
+
 payload! {
-    /// All orders that are not carried out yet (F3): what observers want to see and a restarted
-    /// navigator needs.
-    pub struct OrderQueue: 396 bytes {
+    /// Goods that are not in their place on the map.
+    pub struct GoneGoods: 12 bytes {
+        /// The product's number on the map.
+        pub product: i32,
+        /// Since when, in seconds of robot time.
+        pub since_s: u32,
+        /// Why.
+        pub why: Tag<GoneWhy>,
+        /// Always 0.
+        #[serde(skip)]
+        pub reserved: [u8; 3],
+    }
+}
+
+payload! {
+    /// All orders that are not carried out yet (F3), and the goods that none can be for: what
+    /// observers want to see and a restarted navigator needs.
+    pub struct OrderQueue: 1548 bytes {
         /// The order under way, if `under_way` is 1.
         pub order_id: u32,
         /// The product of that order.
@@ -45,12 +74,17 @@ payload! {
         pub under_way: u8,
         /// How many of `orders` are used.
         pub count: u8,
+        /// How many of `gone` are used.
+        pub gone_count: u8,
         /// Always 0.
         #[serde(skip)]
-        pub reserved: [u8; 2],
+        pub reserved: u8,
         /// The orders that wait, the next one first.
         #[serde(with = "crate::list")]
         pub orders: [WaitingOrder; 32],
+        /// The goods that are not in their place, those first of which it has been known longest.
+        #[serde(with = "crate::list")]
+        pub gone: [GoneGoods; 96],
     }
 }
 
@@ -58,6 +92,11 @@ impl OrderQueue {
     /// The orders that wait.
     pub fn orders(&self) -> &[WaitingOrder] {
         &self.orders[..usize::from(self.count).min(self.orders.len())]
+    }
+
+    /// The goods that are not in their place.
+    pub fn gone(&self) -> &[GoneGoods] {
+        &self.gone[..usize::from(self.gone_count).min(self.gone.len())]
     }
 
     /// Whether the order `id` is under way.
@@ -181,6 +220,10 @@ coded! {
         PickByHand = 12,
         /// The robot picks the goods up by itself from now on ([`Pick::Auto`](super::Pick)).
         PickByItself = 13,
+        /// The goods of a product are not in their place; `order_id` is the product's number.
+        GoodsGone = 14,
+        /// They are there again; [`Input::ALL_GOODS`] = all of them.
+        GoodsBack = 15,
     }
 }
 
@@ -195,10 +238,16 @@ payload! {
         pub y: u8,
         /// Where the robot looks that was put down.
         pub heading: Tag<Heading>,
-        /// The order it concerns, 0 = none.
+        /// The order it concerns, 0 = none; of goods the product's number.
         pub order_id: u32,
         /// Distinguishes this press from another one; a repeated sample has the same. A switch
         /// without one (0) is not taken.
         pub id: u32,
     }
+}
+
+impl Input {
+    /// The `order_id` of [`InputKind::GoodsBack`] that means all goods. No product has it, since
+    /// their numbers are not negative.
+    pub const ALL_GOODS: u32 = u32::MAX;
 }

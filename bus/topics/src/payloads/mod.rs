@@ -18,7 +18,9 @@ pub use failure::{Failure, FailureKind, Remedy};
 pub use latency::{CommandLatency, Durations, PathLatency};
 pub use link::{ArmProfileState, BoardHealth, CalibratedSensor, Calibration, Health, Mode};
 pub use log::{Joint, Thought, ThoughtKind};
-pub use mission::{Event, EventKind, Input, InputKind, Order, OrderQueue, WaitingOrder};
+pub use mission::{
+    Event, EventKind, GoneGoods, GoneWhy, Input, InputKind, Order, OrderQueue, WaitingOrder,
+};
 pub use nav::{
     BlockSource, BlockedWay, BlockedWays, Goal, Heading, Hold, MapProduct, NavigatorStatus, Phase,
     Pick, Route, RouteNode, Side, Step, WarehouseMap,

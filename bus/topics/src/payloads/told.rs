@@ -61,6 +61,9 @@ coded! {
         Renewed = 18,
         /// No input: the status was published again, because it was due.
         Repeated = 19,
+        /// Goods are not in their place, or there again (`number`: the product, or
+        /// [`Input::ALL_GOODS`](super::Input::ALL_GOODS); `flag`: there again).
+        Goods = 20,
     }
 }
 

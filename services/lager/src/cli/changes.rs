@@ -23,6 +23,17 @@ pub enum ObstacleChange {
     },
 }
 
+/// What a person says of the goods.
+#[derive(Debug, Subcommand)]
+pub enum MapChange {
+    /// Say that goods are in their place again
+    Back {
+        /// The product's number, or its name in the warehouse's file [default: all goods]
+        #[arg(allow_negative_numbers = true, value_parser = values::product)]
+        product: Option<Called>,
+    },
+}
+
 /// What a person changes about the orders that wait.
 #[derive(Debug, Subcommand)]
 pub enum QueueChange {

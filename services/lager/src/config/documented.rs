@@ -38,6 +38,11 @@ speed = {speed:?}
 body = {body}
 # A built-in warehouse (small, curved, large) or the path of a warehouse file.
 warehouse = {warehouse}
+# The folder that keeps what outlives `lager up`: a built-in warehouse as it was saved in the panel (a
+# file's changes are saved in the file), the orders that wait, and which goods a real robot has not
+# found in their place. Unset, .state in the folder of the bus if one is named, else $STATE_DIRECTORY,
+# else $XDG_STATE_HOME/lager, else ~/.local/state/lager.
+{state}
 
 [log]
 # File that all processes of the robot append their traces to: those that RUST_LOG asks for, or
@@ -177,6 +182,11 @@ wanted = {station_wanted}
 {station_listen}
 # The path of the socket at which a GaG connects to it. Unset, it is in the robot's folder of the bus.
 {station_gag}
+# The file in which it keeps the warehouse as it was saved in the panel. Unset, the file that
+# `warehouse` names, or for a built-in one NAME.toml in the state folder.
+{station_warehouse}
+# The file in which it keeps what waits to be fetched. Unset, queue.toml in the state folder.
+{station_queue}
 # Where the operator panel of such a station answers browsers of this machine. Unset, 127.0.0.1:7410,
 # or another port where that is taken.
 {station_panel}
@@ -274,6 +284,9 @@ debounce_ms = {debounce}
                 self.station.listen.map(|listen| listen.to_string()).as_deref()
             ),
             station_gag = unset_path("gag", &self.station.gag),
+            station_warehouse = unset_path("warehouse", &self.station.warehouse),
+            station_queue = unset_path("queue", &self.station.queue),
+            state = unset_path("state", &self.state),
             gateway_metrics = unset(
                 "metrics",
                 self.gateway.metrics.map(|metrics| metrics.to_string()).as_deref()
@@ -332,6 +345,7 @@ mod tests {
             speed: 2.5,
             body: Body::Serial,
             warehouse: "a \"quoted\" name".into(),
+            state: Some("/var/lib/lager".into()),
             log: LogSection {
                 file: Some("/var/log/lager".into()),
                 json: true,
@@ -372,6 +386,8 @@ mod tests {
                 address: Some("192.168.1.5:7420".into()),
                 listen: Some("127.0.0.1:7421".parse().expect("an address")),
                 gag: Some("/run/gag".into()),
+                warehouse: Some("/srv/hall.toml".into()),
+                queue: Some("/srv/queue.toml".into()),
                 panel: Some("127.0.0.1:7411".parse().expect("an address")),
             },
             comm: CommSection {

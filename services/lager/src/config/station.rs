@@ -21,6 +21,12 @@ pub struct StationSection {
     /// The socket at which a GaG connects to it; unset, it is in the robot's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gag: Option<PathBuf>,
+    /// The file in which it keeps the warehouse; unset, `up` chooses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub warehouse: Option<PathBuf>,
+    /// The file in which it keeps what waits to be fetched; unset, `up` chooses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub queue: Option<PathBuf>,
     /// Where a station that `up` starts shows its panel; unset, `up` chooses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panel: Option<SocketAddr>,
@@ -40,6 +46,8 @@ impl Default for StationSection {
             address: None,
             listen: None,
             gag: None,
+            warehouse: None,
+            queue: None,
             panel: None,
         }
     }

@@ -2,10 +2,13 @@
 
 use std::fmt::Write;
 
-use anyhow::Result;
-use lager_topics::{BlockSource, BlockedWays, Heading, NavBlocks, NavMap, Side, Tag, WarehouseMap};
-
+use anyhow::{Result, bail};
+use lager_lines::Called;
 use lager_station::Warehouse;
+use lager_topics::{
+    BlockSource, BlockedWays, GoneGoods, GoneWhy, GoodState, Heading, Input, InputKind,
+    MissionQueue, NavBlocks, NavMap, OrderQueue, Side, Tag, TruthPose, WarehouseMap,
+};
 
 use super::{Operator, first};
 use crate::goods;
@@ -28,12 +31,75 @@ impl Operator {
         )?;
         // Where no name is known there are numbers.
         let names = goods::described(&self.running).ok();
-        Ok(described(&map, &ways, names.as_ref()))
+        let queue = first(
+            &mut self.bus.subscriber::<MissionQueue>()?,
+            &self.bus,
+            &self.patience,
+        )?;
+        Ok(described(&map, &ways, queue.gone(), names.as_ref()))
+    }
+
+    /// `lager map back`: goods are in their place again, as logic then shows.
+    ///
+    /// # Errors
+    /// Nobody is called so, or logic does not react.
+    pub fn back(&self, product: Option<&Called>) -> Result<String> {
+        let id = product.map(|product| goods::number(&self.running, product));
+        let id = id.transpose()?;
+        let is_gone = |queue: &OrderQueue| match id {
+            Some(id) => queue.gone().iter().any(|gone| gone.product == id),
+            None => !queue.gone().is_empty(),
+        };
+        let mut queue = self.bus.subscriber::<MissionQueue>()?;
+        if !is_gone(&first(&mut queue, &self.bus, &self.patience)?) {
+            return Ok(match id {
+                Some(id) => format!("nobody has missed product {id}"),
+                None => "no goods are missed".into(),
+            });
+        }
+        self.must_be_there(id)?;
+        let coded = id.map_or(Input::ALL_GOODS, i32::cast_unsigned);
+        self.say_until(InputKind::GoodsBack, coded, &mut queue, |queue| {
+            !is_gone(queue)
+        })?;
+        Ok(match id {
+            Some(id) => format!("product {id} is in its place again"),
+            None => "all goods are in their places again".into(),
+        })
+    }
+}
+
+impl Operator {
+    /// A simulated world knows whether goods are on their shelves, and nobody puts them back there.
+    fn must_be_there(&self, product: Option<i32>) -> Result<()> {
+        if self.running.body.service().is_none() {
+            return Ok(());
+        }
+        let mut truth = self.bus.subscriber::<TruthPose>()?;
+        let world = first(&mut truth, &self.bus, &self.patience)?;
+        let mut goods = world.goods().iter();
+        let away = goods.find(|good| {
+            let is_meant = product.is_none_or(|product| product == good.id);
+            is_meant && good.state != GoodState::Shelf
+        });
+        match away {
+            None => Ok(()),
+            Some(good) => bail!(
+                "product {} is not in its place in the simulated world, where nobody puts it back; \
+                 all goods are there when `lager up` is started again",
+                good.id
+            ),
+        }
     }
 }
 
 /// The warehouse in lines: the floor, each of its goods, each blocked way.
-fn described(map: &WarehouseMap, ways: &BlockedWays, names: Option<&Warehouse>) -> String {
+fn described(
+    map: &WarehouseMap,
+    ways: &BlockedWays,
+    gone: &[GoneGoods],
+    names: Option<&Warehouse>,
+) -> String {
     let name = |id| {
         let products = names.map_or(&[][..], |names| &names.products);
         let product = products.iter().find(|product| product.id == id);
@@ -55,9 +121,16 @@ fn described(map: &WarehouseMap, ways: &BlockedWays, names: Option<&Warehouse>) 
         let side = side(product.side);
         let (id, x, y) = (product.id, product.x, product.y);
         let name = name(id).map_or(String::new(), |name| format!(" ({name})"));
+        let gone = gone.iter().find(|gone| gone.product == id);
+        let gone = match gone.map(|gone| gone.why.get()) {
+            None => "",
+            Some(Some(GoneWhy::Delivered)) => "; it was delivered",
+            Some(Some(GoneWhy::PickedUp)) => "; the robot has picked it up",
+            Some(_) => "; it is not there",
+        };
         let _ = write!(
             text,
-            "\nproduct {id}{name}: at the {side} of square ({x}, {y})"
+            "\nproduct {id}{name}: at the {side} of square ({x}, {y}){gone}"
         );
     }
     for way in ways.ways() {
@@ -119,12 +192,19 @@ mod tests {
         let floor = "2 x 1 squares of 50 cm; delivery at (0, 0)\n\
                      product 7: at the upper side of square (1, 0)\n";
         let mut ways = BlockedWays::default();
-        let told = described(&map, &ways, None);
+        let told = described(&map, &ways, &[], None);
         assert_eq!(told, format!("{floor}no way is blocked"));
+        let gone = GoneGoods {
+            product: 7,
+            why: GoneWhy::Delivered.into(),
+            ..GoneGoods::default()
+        };
+        let told = described(&map, &ways, &[gone], None);
+        assert!(told.contains("square (1, 0); it was delivered\n"), "{told}");
         let names = "size = [2, 1]\nside_length_cm = 50\n[[product]]\nid = 7\nname = \"screws\"\n\
                      square = [1, 0]\nside = \"up\"";
         let names: Warehouse = toml::from_str(names).expect("a warehouse");
-        let told = described(&map, &ways, Some(&names));
+        let told = described(&map, &ways, &[], Some(&names));
         assert!(told.contains("\nproduct 7 (screws): at"), "{told}");
         ways.count = 1;
         ways.ways[0] = BlockedWay {
@@ -133,7 +213,7 @@ mod tests {
             source: BlockSource::Person.into(),
             ..BlockedWay::default()
         };
-        let told = described(&map, &ways, None);
+        let told = described(&map, &ways, &[], None);
         assert_eq!(
             told,
             format!("{floor}blocked: from (2, 0) to the left; a person says so")

@@ -121,7 +121,7 @@ impl Operator {
 
     /// Gives one command about the queue, once, since not all of them may be repeated, and waits
     /// until logic shows the effect.
-    fn say_until(
+    pub(super) fn say_until(
         &self,
         kind: InputKind,
         order_id: u32,

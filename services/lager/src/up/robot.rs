@@ -22,12 +22,14 @@ use anyhow::{Result, bail};
 use super::external::External;
 use super::resets::{MOST, Remedy, Resets};
 use crate::config::Config;
+use crate::kept::{Kept, KeptFile};
 use crate::mission::Mission;
 use crate::outcome::Outcome;
 use crate::report::Note;
 use crate::runtime::NameLock;
 use crate::services::Service;
 use crate::signals::Signals;
+use crate::state::World;
 use crate::supervisor::{Ended, PATIENCE, Start, Supervisor};
 use crate::terminal::Terminal;
 use crate::words::{Begin, Line, Pulse, Request, Silence, Sweep, Word};
@@ -58,6 +60,14 @@ pub struct Robot {
     /// The external computer, and where it listens if it is this robot's own.
     external: External,
     mission: Option<Mission>,
+    /// What the robot is still to be given back, all that is to be kept, and where.
+    left: Kept,
+    kept: Kept,
+    kept_file: Option<KeptFile>,
+    /// What people are told before it starts.
+    pub first_notes: Vec<String>,
+    /// The copy of its warehouse's file, if it runs in one.
+    pub world: Option<World>,
     /// Products that were delivered and do not lie where they should.
     misplaced: Vec<i32>,
     figures: Figures,
@@ -129,6 +139,11 @@ impl Robot {
             owed: Vec::new(),
             external,
             mission,
+            left: Kept::default(),
+            kept: Kept::default(),
+            kept_file: None,
+            first_notes: Vec::new(),
+            world: None,
             misplaced: Vec::new(),
             figures: Figures::new(now),
             signals,
@@ -140,13 +155,20 @@ impl Robot {
         })
     }
 
+    /// It is given back `kept`, and what it has to do from then on is kept in a file.
+    pub fn goes_on_with(&mut self, kept: Kept, file: KeptFile) {
+        (self.left, self.kept) = (kept.clone(), kept);
+        self.kept_file = Some(file);
+    }
+
     /// Runs until a signal asks for the end, or with `exit_when_done` the mission has ended.
     ///
     /// # Errors
     /// The robot does not start, or the bus does not hold.
     pub fn run(&mut self, exit_when_done: bool) -> Result<()> {
         self.note(&self.external.told);
-        for line in self.external.panel.iter().chain(&self.external.gateway) {
+        let external = self.external.panel.iter().chain(&self.external.gateway);
+        for line in external.chain(&self.first_notes) {
             self.note(line);
         }
         self.begin()?;
@@ -231,6 +253,9 @@ impl Robot {
             ));
         }
         self.lock.restore(&self.config)?;
+        self.world.as_ref().map(World::write).transpose()?;
+        // Nobody knows any more what it had to do, and a simulated world is a new one.
+        self.left = self.kept.clone();
         self.begin()
     }
 
@@ -329,6 +354,13 @@ impl Robot {
             Word::Silent(silence) => return self.take_silence(silence),
             Word::Damaged(why) => return Some(why),
             Word::Mission(mission) => self.mission = Some(mission),
+            Word::Kept { left, all } => {
+                self.left = left;
+                if let Some(file) = self.kept_file.as_ref().filter(|_| self.kept != all) {
+                    file.keep(all.clone());
+                }
+                self.kept = all;
+            }
             Word::Misplaced(products) => self.misplaced = products,
         }
         None
@@ -471,6 +503,7 @@ impl Robot {
         self.tell(&Request::Begin(Begin {
             robot_start: self.figures.robot_start,
             mission: self.mission.clone(),
+            kept: self.left.clone(),
             sweep,
         }));
         for (service, pid) in self.supervisor.running() {

@@ -2,10 +2,13 @@
 //! there.
 
 use lager_topics::{
-    EventKind, Failure, FailureKind, Goal, Order, OrderQueue, Phase, Pick, Thought, ThoughtKind,
+    EventKind, Failure, FailureKind, Goal, GoneWhy, Order, OrderQueue, Phase, Pick, Thought,
+    ThoughtKind,
 };
 
 use super::{Mission, Tables};
+use crate::goods::Gone;
+use crate::map::Map;
 use crate::output::Output;
 use crate::queue::Queue;
 
@@ -22,6 +25,10 @@ impl Mission {
             return self.refuse(order, FailureKind::UnknownProduct, out);
         } else if self.needs_reset() {
             return self.refuse(order, FailureKind::NeedsReset, out);
+        } else if self.is_ordered(order.product) {
+            return self.refuse(order, FailureKind::AlreadyOrdered, out);
+        } else if self.gone.why(order.product, self.now).is_some() {
+            return self.refuse_gone(order, out);
         }
         let before = self.queue.waiting().len();
         if !self.queue.push(*order) {
@@ -36,6 +43,48 @@ impl Mission {
                 seen: before as i32,
                 ..ThoughtKind::OrderWaits.into()
             });
+        }
+    }
+
+    /// Whether an order for this product waits or is under way. There is one piece of goods for
+    /// each, so a second order would be in vain.
+    fn is_ordered(&self, product: i32) -> bool {
+        let mut waiting = self.queue.waiting().iter();
+        self.is_under_way(self.order.id) && self.order.product == product
+            || waiting.any(|waiting| waiting.order.product == product)
+    }
+
+    /// The goods of the order under way are not in their place from now on.
+    pub(super) fn goods_are_gone(&mut self, why: GoneWhy, out: &mut Output) {
+        self.gone.add(self.order.product, why, self.now);
+        out.queue_changed = true;
+    }
+
+    /// It is told that these goods are not in their place. What is ordered of them is refused,
+    /// unless the robot is on its way already: it sees for itself.
+    pub(crate) fn miss_goods(&mut self, product: i32, out: &mut Output) {
+        self.gone.add(product, GoneWhy::Told, self.now);
+        out.queue_changed = true;
+        think_of_product(ThoughtKind::GoodsGone, product, out);
+        let mut waiting = self.queue.waiting().iter().map(|waiting| waiting.order);
+        if let Some(order) = waiting.find(|order| order.product == product) {
+            self.queue.cancel(order.id);
+            self.refuse_gone(&order, out);
+            self.need_no_way();
+        }
+    }
+
+    /// A person says that goods are in their place again: those of one product, or all.
+    pub(crate) fn find_goods(&mut self, product: Option<i32>, out: &mut Output) {
+        let were_gone = match product {
+            Some(product) => self.gone.remove(product),
+            None => self.gone.clear(),
+        };
+        out.queue_changed |= were_gone;
+        match product {
+            Some(product) if were_gone => think_of_product(ThoughtKind::GoodsBack, product, out),
+            None if were_gone => out.think(ThoughtKind::AllGoodsBack),
+            _ => {}
         }
     }
 
@@ -108,12 +157,22 @@ impl Mission {
     /// The orders as they are published.
     pub(crate) fn order_queue(&self) -> OrderQueue {
         let is_under_way = self.is_under_way(self.order.id);
-        self.queue.to_payload(is_under_way.then_some(self.order))
+        let mut queue = self.queue.to_payload(is_under_way.then_some(self.order));
+        self.gone.fill(&mut queue);
+        queue
     }
 
     /// As a predecessor published them.
     pub(crate) fn restore_queue(&mut self, queue: &OrderQueue) {
         self.queue = Queue::from_payload(queue, self.order);
+        self.gone = Gone::from_payload(queue);
+    }
+
+    /// The map is another one: goods that it has elsewhere are there.
+    pub(super) fn follow_goods(&mut self, before: &Map, out: &mut Output) {
+        if let Some(map) = &self.map {
+            out.queue_changed |= self.gone.follow(before, map);
+        }
     }
 
     pub(super) fn refuse(&self, order: &Order, kind: FailureKind, out: &mut Output) {
@@ -121,7 +180,17 @@ impl Mission {
             FailureKind::QueueFull => self.queue.waiting().len() as i32,
             _ => order.product,
         };
-        let failure = self.failure_here(kind, 0, seen);
+        self.refuse_with(order, self.failure_here(kind, 0, seen), out);
+    }
+
+    /// Refuses an order for goods that are not in their place.
+    fn refuse_gone(&self, order: &Order, out: &mut Output) {
+        if let Some((kind, ago_s)) = self.gone.why(order.product, self.now) {
+            self.refuse_with(order, self.failure_here(kind, ago_s, order.product), out);
+        }
+    }
+
+    fn refuse_with(&self, order: &Order, failure: Failure, out: &mut Output) {
         out.announce_failure(EventKind::Refused, self.place, *order, failure);
         out.think(Thought {
             product: order.product,
@@ -335,6 +404,9 @@ impl Mission {
         self.place.node = from;
         let has_goods = self.goal != Goal::Home;
         if has_goods {
+            if self.goal == Goal::Product {
+                self.goods_are_gone(GoneWhy::PickedUp, out);
+            }
             self.goal = Goal::Delivery;
         }
         self.tries = 0;
@@ -354,8 +426,8 @@ impl Mission {
         self.delivered = self.delivered.wrapping_add(1);
         out.announce(EventKind::ItemDelivered, self.place, self.order);
         think_of_product(ThoughtKind::Delivered, self.order.product, out);
+        self.goods_are_gone(GoneWhy::Delivered, out);
         self.goal = Goal::Home;
-        out.queue_changed = true;
         self.forced = false;
         self.phase = Phase::BackingOff;
     }

@@ -50,7 +50,9 @@ impl Mission {
             return false;
         }
         out.think(ThoughtKind::MapChanged);
-        self.map = Some(map);
+        if let Some(before) = self.map.replace(map) {
+            self.follow_goods(&before, out);
+        }
         self.none_reachable = None;
         self.tables.distances.forget();
         if same_floor {

@@ -25,6 +25,10 @@ pub enum Input<'a> {
     MoveUp(u32),
     /// No waiting order is to be carried out.
     ClearQueue,
+    /// The goods of this product are not in their place.
+    GoodsGone(i32),
+    /// They are there again; `None` = all goods.
+    GoodsBack(Option<i32>),
     /// The operator has the goods in the gripper; 0 = whatever order it is.
     PickupDone {
         /// The order the operator worked for.

@@ -33,6 +33,8 @@ impl Navigator {
             Input::Cancel(id) => self.mission.cancel(id, out),
             Input::MoveUp(id) => self.mission.move_up(id, out),
             Input::ClearQueue => self.mission.clear_queue(out),
+            Input::GoodsGone(product) => self.mission.miss_goods(product, out),
+            Input::GoodsBack(product) => self.mission.find_goods(product, out),
             Input::PickupDone { order_id, forced } => self.picked(now, order_id, forced, out),
             Input::Pick(pick) => self.choose_pick(now, pick, out),
             Input::DrivenByHand(sum) => self.watch_manual_driving(now, sum, out),

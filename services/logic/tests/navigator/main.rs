@@ -2,6 +2,7 @@
 
 mod double;
 mod floor;
+mod goods;
 mod holds;
 mod interventions;
 mod missions;

@@ -15,9 +15,11 @@ use crate::trial::{Trial, warehouse};
 const EXIT: Exit = Exit::Straight(450.0);
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A robot with nothing to do. Product 2 is on its way to product 1, and 3 elsewhere.
+/// A robot with nothing to do. Product 2 is on its way to product 1, and 3 elsewhere. Product 4
+/// stands where 1 does, and so on.
 fn robot() -> Trial {
-    let products = [(1, 0, Side::Right), (0, 0, Side::Down), (0, 0, Side::Left)];
+    let places = [(1, 0, Side::Right), (0, 0, Side::Down), (0, 0, Side::Left)];
+    let products: Vec<_> = places.into_iter().cycle().take(MOST_ORDERS + 2).collect();
     let map = warehouse((2, 1), (0, 0), 45, &products);
     Trial::new(map, EXIT, Trouble::NONE, 3)
 }
@@ -54,7 +56,7 @@ fn way(trial: &mut Trial, node: (u8, u8), heading: Heading, open: bool) {
 
 #[test]
 fn orders_are_carried_out_in_the_order_given() {
-    let mut trial = busy(&[1, 3, 2, 1]);
+    let mut trial = busy(&[1, 3, 2, 4]);
     assert_eq!((trial.queue.under_way, trial.queue.order_id), (1, 1));
     assert_eq!(waiting(&trial), [2, 3, 4]);
     trial.deliver(4);
@@ -72,7 +74,7 @@ fn orders_are_carried_out_in_the_order_given() {
 
 #[test]
 fn waiting_orders_are_cancelled_moved_up_and_cleared_while_it_drives() {
-    let mut trial = busy(&[1, 2, 3, 1]);
+    let mut trial = busy(&[1, 2, 3, 4]);
     trial.tell(Input::MoveUp(4));
     assert_eq!(waiting(&trial), [2, 4, 3]);
     trial.tell(Input::MoveUp(4));
@@ -99,17 +101,17 @@ fn waiting_orders_are_cancelled_moved_up_and_cleared_while_it_drives() {
 fn a_full_queue_refuses_and_says_how_many_wait() {
     let mut trial = busy(&[1]);
     for id in 2..MOST_ORDERS as u32 + 2 {
-        trial.order(id, 2);
+        trial.order(id, id as i32);
     }
     assert_eq!(trial.queue.orders().len(), MOST_ORDERS);
     assert_eq!(orders(&trial, EventKind::Refused), [0; 0]);
-    trial.order(99, 2);
+    trial.order(99, MOST_ORDERS as i32 + 2);
     assert_eq!(orders(&trial, EventKind::Refused), [99]);
     let said = trial.thoughts.last().unwrap();
     assert!(said.contains("31 orders are waiting already"), "{said}");
-    trial.order(98, 12);
+    trial.order(98, 77);
     let said = trial.thoughts.last().unwrap();
-    assert!(said.contains("product 12"), "{said}");
+    assert!(said.contains("product 77"), "{said}");
 }
 
 #[test]

@@ -32,7 +32,9 @@ pub(crate) fn server(warehouse: Option<PathBuf>) -> Server {
         name: Name::new("station").unwrap(),
         listen: Listen::At(SocketAddr::from(([127, 0, 0, 1], 0))),
         gag: None,
+        queues: warehouse.as_deref().map(lager_station::Queues::beside),
         warehouse,
+        otherwise: None,
         fetch: Vec::new(),
     })
     .unwrap()

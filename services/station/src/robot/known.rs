@@ -7,6 +7,15 @@ use lager_wire::OperatorCommand;
 use super::{Doing, Robot};
 use crate::shown::Shown;
 
+/// In what two warehouses differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Other {
+    /// In their size, their delivery or their squares.
+    Floor,
+    /// In nothing but the goods.
+    Goods,
+}
+
 impl Robot {
     /// What it is doing.
     pub const fn doing(&self) -> Doing {
@@ -16,6 +25,21 @@ impl Robot {
     /// Its name, once it has announced the extension.
     pub fn name(&self) -> Option<&Name> {
         self.hello.as_ref().map(|hello| &hello.name)
+    }
+
+    /// In what the warehouse that it was told differs from the one that there is, if it was told
+    /// all of it.
+    pub(crate) fn uses_other(&self) -> Option<Other> {
+        let (side, map, products) = self.warehouse.as_ref()?;
+        let known = &self.known;
+        let is_told = known.side.is_some() && known.map.is_some() && known.products.is_some();
+        if !is_told || self.doing == Doing::Away {
+            return None;
+        }
+        if known.side != Some(*side) || known.map != Some(*map) {
+            return Some(Other::Floor);
+        }
+        (known.products.as_ref() != Some(products)).then_some(Other::Goods)
     }
 
     /// The question that is held.

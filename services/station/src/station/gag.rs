@@ -307,6 +307,8 @@ fn described(
         side_length_cm: side.cm(),
         delivery: [map.delivery().x, map.delivery().y],
         products: products.as_slice().iter().map(product).collect(),
-        rest: before.map_or_else(toml::Table::new, |before| before.rest.clone()),
+        exit: before.and_then(|before| before.exit),
+        floor: before.and_then(|before| before.floor),
+        obstacles: before.map_or_else(Vec::new, |before| before.obstacles.clone()),
     }
 }

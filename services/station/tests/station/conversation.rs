@@ -260,7 +260,7 @@ fn a_product_that_may_not_have_arrived_is_told_again() {
 }
 
 #[test]
-fn the_queue_is_bounded_and_products_are_taken_out() {
+fn each_product_waits_once_and_is_taken_out() {
     let mut robot = connected();
     let unknown = product(8);
     assert_eq!(
@@ -268,12 +268,21 @@ fn the_queue_is_bounded_and_products_are_taken_out() {
         Err(FetchRefused::Unknown { product: unknown })
     );
     assert_eq!(robot.fetch(product(7)), Ok(None));
-    for _ in 1..Robot::MOST_PRODUCTS {
-        assert_eq!(robot.fetch(product(12)), Ok(None));
-    }
-    assert_eq!(robot.fetch(product(7)), Err(FetchRefused::Full));
+    assert_eq!(robot.fetch(product(12)), Ok(None));
+    let twice = FetchRefused::Ordered {
+        product: product(7),
+    };
+    assert_eq!(robot.fetch(product(7)), Err(twice.clone()));
     assert!(robot.cancel(product(7)));
     assert!(!robot.cancel(product(7)));
-    assert_eq!(robot.queue().next(), Some(product(12)));
-    assert_eq!(robot.queue().count(), Robot::MOST_PRODUCTS - 1);
+    assert_eq!(robot.queue().collect::<Vec<_>>(), [product(12)]);
+    // Nor while the robot is on its way for it, as far as its questions tell.
+    assert_eq!(robot.fetch(product(7)), Ok(None));
+    assert_eq!(say(&mut robot, "fetchprod"), "fetchprod 12");
+    assert_eq!(
+        robot.fetch(product(12)).unwrap_err().to_string(),
+        "product 12 is ordered already"
+    );
+    assert_eq!(say(&mut robot, "fetchprod"), "fetchprod 7");
+    assert_eq!(robot.fetch(product(7)), Err(twice));
 }

@@ -1,7 +1,8 @@
 //! The warehouse file: what cannot be is refused, and saving replaces the file whole.
 
 use std::fs;
-use std::path::PathBuf;
+use std::os::unix::fs::{PermissionsExt as _, symlink};
+use std::path::{Path, PathBuf};
 
 use lager_lines::Called;
 use lager_station::{LoadError, SaveError, load, save};
@@ -204,4 +205,80 @@ fn a_file_that_is_none_is_named() {
     fs::write(folder.file(), WAREHOUSE.replacen("[4, 3]", "[0, 3]", 1)).expect("a file");
     let error = load(&folder.file()).expect_err("no squares");
     assert!(matches!(error, LoadError::Warehouse { .. }), "{error}");
+}
+
+#[test]
+fn a_mistyped_key_is_refused_with_the_one_that_was_meant() {
+    let folder = Folder::new("mistyped");
+    for (from, to, meant) in [
+        ("[[product]]", "[[products]]", "product"),
+        ("side = \"down\"", "sied = \"down\"", "side"),
+        ("delivery", "delivrey", "delivery"),
+        (
+            "size = [4, 3]",
+            "size = [4, 3]\nexit.lenght_cm = 90",
+            "length_cm",
+        ),
+    ] {
+        fs::write(folder.file(), WAREHOUSE.replacen(from, to, 1)).expect("a file");
+        let error = load(&folder.file()).expect_err(to).to_string();
+        let hint = format!("; did you mean `{meant}`?");
+        assert!(error.ends_with(&hint), "{error}");
+    }
+}
+
+#[test]
+fn what_is_saved_goes_behind_a_link_and_the_mode_stays() {
+    let folder = Folder::new("link");
+    fs::create_dir(folder.0.join("real")).expect("a folder");
+    let real = folder.0.join("real/hall.toml");
+    fs::write(&real, WAREHOUSE).expect("a file");
+    fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).expect("its own file");
+    symlink("real/hall.toml", folder.file()).expect("a link");
+    let mut changed = warehouse();
+    changed.products.pop();
+    save(&folder.file(), &changed).expect("saved");
+    let is_link = fs::symlink_metadata(folder.file()).expect("it is there");
+    assert!(is_link.file_type().is_symlink());
+    assert_eq!(load(&real).expect("a warehouse"), changed);
+    let mode = fs::metadata(&real)
+        .expect("it is there")
+        .permissions()
+        .mode();
+    assert_eq!(mode & 0o777, 0o640);
+    // A link to nothing yet is one to a file that is made.
+    let dangling = folder.0.join("dangling.toml");
+    symlink("real/new.toml", &dangling).expect("a link");
+    save(&dangling, &changed).expect("saved");
+    assert!(folder.0.join("real/new.toml").is_file());
+    // Links in a circle lead nowhere.
+    let circle = folder.0.join("circle.toml");
+    symlink("circle.toml", &circle).expect("a link");
+    save(&circle, &changed).expect_err("a circle");
+}
+
+#[test]
+fn pipes_devices_and_folders_are_refused_at_once() {
+    let folder = Folder::new("pipe");
+    let pipe = folder.0.join("pipe");
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR).expect("a pipe");
+    for path in [pipe.as_path(), Path::new("/dev/zero"), folder.0.as_path()] {
+        let error = load(path).expect_err("it is no file").to_string();
+        assert!(error.contains(": it is "), "{error}");
+        save(path, &warehouse()).expect_err("it is no file");
+    }
+    assert!(folder.0.is_dir(), "nothing is replaced");
+}
+
+#[test]
+fn what_could_not_be_read_again_is_not_saved() {
+    let folder = Folder::new("again");
+    fs::write(folder.file(), WAREHOUSE).expect("a file");
+    let mut changed = warehouse();
+    // Longer than a file may be that is read.
+    changed.products[0].name = Some("x".repeat(2 << 20));
+    let error = save(&folder.file(), &changed).expect_err("not saved");
+    assert!(matches!(error, SaveError::Unreadable { .. }), "{error}");
+    let text = fs::read_to_string(folder.file()).expect("the file");
+    assert_eq!(text, WAREHOUSE);
 }

@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use lager_lines::Name;
 use lager_lines::command::read_wheels;
 use lager_lines::extension::{Action, Mode};
-use lager_station::{Handle, Reply, Subscription, Told};
+use lager_station::{Handle, Reply, Subscription, Told, Warehouse, Wish, WishRefused};
 
 use crate::sockets::{Peer, Running, WATCHDOG};
+use crate::transcript::{product, warehouse};
 
 fn r1() -> Name {
     Name::new("r1").expect("a name")
@@ -138,4 +139,90 @@ fn states_come_with_their_age_and_events_to_whoever_has_subscribed() {
         assert!(late.next(Duration::ZERO).is_some());
     }
     assert_eq!(late.next(Duration::ZERO), None);
+}
+
+#[test]
+fn goods_that_a_robot_has_seen_to_be_gone_are_not_ordered_from_it() {
+    let station = Running::new();
+    let handle = &station.handle;
+    let mut robot = extended(&station);
+    let fetch = |number| handle.wish(&r1(), Wish::Fetch(product(number)));
+    robot.says(b"gone 1 7\nstate product=12\n");
+    wait_for(handle, |view| view.shown.state.as_ref().map(drop));
+    let why = |refused: Result<(), WishRefused>| refused.expect_err("it is refused").to_string();
+    assert_eq!(
+        why(fetch(7)),
+        "product 7 is not in its place, as robot r1 has seen; put it back and say \
+         `lager map back 7`"
+    );
+    assert_eq!(why(fetch(12)), "product 12 is ordered already");
+    robot.says(b"gone 0\nstate product=12\n");
+    wait_for(handle, |view| {
+        let gone = view.shown.gone.as_ref()?;
+        (gone.value.total() == 0).then_some(())
+    });
+    fetch(7).expect("it is back");
+}
+
+#[test]
+fn who_saves_a_warehouse_is_told_what_a_robot_does_that_knows_another_one() {
+    let station = Running::new();
+    let handle = &station.handle;
+    let save = |warehouse: &Warehouse| {
+        let saving = handle.set_warehouse(warehouse.clone()).expect("it can be");
+        assert_eq!(saving.wait(WATCHDOG), Some(Ok(())));
+        let sentence = saving.sentence();
+        let saved = format!(
+            "saved in {}",
+            station.folder().join("warehouse.toml").display()
+        );
+        assert!(sentence.starts_with(&saved), "{sentence}");
+        sentence[saved.len()..].to_owned()
+    };
+    let mut changed = warehouse();
+    changed.products.pop();
+    assert_eq!(save(&changed), "", "there is no robot");
+
+    let mut robot = extended(&station);
+    for (query, answer) in [
+        ("sidelength", "sidelength 40"),
+        ("karta", "karta 4 3 0 0"),
+        ("prodlis", "prodlis 1 7 1 0 down"),
+    ] {
+        assert_eq!(robot.asks(query), answer);
+    }
+    assert_eq!(save(&changed), "; r1 uses it");
+    changed.side_length_cm = 60;
+    assert_eq!(
+        save(&changed),
+        "; r1 still uses the floor of before, until it is put on the delivery node and \
+         `lager up` is started again"
+    );
+    robot.says(b"truth 0 0 90 -\n");
+    wait_for(handle, |view| view.shown.truth.as_ref().map(drop));
+    assert_eq!(
+        save(&changed),
+        "; r1 is simulated and still drives in the warehouse of before, until `lager up` is \
+         started again"
+    );
+}
+
+#[test]
+fn a_real_robot_asks_for_goods_that_have_changed() {
+    let station = Running::new();
+    let mut robot = extended(&station);
+    for query in ["sidelength", "karta", "prodlis"] {
+        robot.asks(query);
+    }
+    let mut changed = warehouse();
+    changed.products.pop();
+    let saving = station.handle.set_warehouse(changed).expect("it can be");
+    let sentence = saving.sentence();
+    assert!(
+        sentence.ends_with("; r1 is told where the goods are"),
+        "{sentence}"
+    );
+    assert_eq!(robot.hears(), None, "it is to connect anew");
+    let mut robot = extended(&station);
+    assert_eq!(robot.asks("prodlis"), "prodlis 1 7 1 0 down");
 }

@@ -96,6 +96,8 @@ fn config(folder: &std::path::Path) -> ServerConfig {
         listen: Listen::At(SocketAddr::from(([127, 0, 0, 1], 0))),
         gag: Some(folder.join("gag")),
         warehouse: Some(folder.join("warehouse.toml")),
+        otherwise: None,
+        queues: Some(folder.join("warehouse.toml.queue")),
         fetch: Vec::new(),
     }
 }
@@ -216,15 +218,15 @@ fn queues_outlive_a_station_that_was_killed() {
     robot.says(b"lager 1 r1\n");
     assert_eq!(robot.hears().as_deref(), Some("lager 1 lager"));
     let r1 = Name::new("r1").expect("a name");
-    for number in [7, 12, 7] {
+    for number in [7, 12] {
         let wish = Wish::Fetch(product(number));
         station.handle.wish(&r1, wish).expect("it is known");
     }
-    wait_for_queues(&station.folder, "r1 = [7, 12, 7]");
+    wait_for_queues(&station.folder, "r1 = [7, 12]");
     // What was told counts as told once the robot has said another word.
     assert_eq!(robot.asks("fetchprod"), "fetchprod 7");
     robot.says(b"set_robot 1 0\n");
-    let saved = wait_for_queues(&station.folder, "r1 = [12, 7]");
+    let saved = wait_for_queues(&station.folder, "r1 = [12]");
 
     // The next one finds what lies on the disk now, and what it is to add.
     let folder = station.folder.join("next");
@@ -233,7 +235,9 @@ fn queues_outlive_a_station_that_was_killed() {
     fs::copy(&from, &to).expect("the warehouse");
     fs::copy(Queues::beside(&from), Queues::beside(&to)).expect("the queues");
     let mut next = config(&folder);
-    next.fetch = vec![(Name::new("r2").expect("a name"), product(12).into())];
+    // What waits already is asked for by the same flags at each start.
+    let asked = |robot: &str| (Name::new(robot).expect("a name"), product(12).into());
+    next.fetch = vec![asked("r2"), asked("r1")];
     let next = Server::open(next).expect("another station");
     let queues = next.handle().look(lager_station::Station::queues);
     assert_eq!(queues.0["r1"], saved.0["r1"]);
@@ -350,14 +354,70 @@ fn the_socket_of_a_gag_is_its_users_alone_and_a_dead_one_is_replaced() {
     let path = station.folder.join("gag");
     let mode = fs::metadata(&path).expect("a socket").permissions().mode();
     assert_eq!(mode & 0o777, 0o600);
-    let taken = Server::open(config(&station.folder)).expect_err("another one listens");
+    let elsewhere = |config: ServerConfig| ServerConfig {
+        warehouse: None,
+        ..config
+    };
+    let taken = Server::open(elsewhere(config(&station.folder))).expect_err("another one listens");
     assert!(matches!(taken, ServerError::GagInUse { .. }), "{taken}");
 
     let dead = station.folder.join("dead");
     drop(std::os::unix::net::UnixListener::bind(&dead).expect("a socket"));
     let config = ServerConfig {
         gag: Some(dead),
-        ..config(&station.folder)
+        ..elsewhere(config(&station.folder))
     };
     Server::open(config).expect("nobody listens there");
+}
+
+#[test]
+fn two_stations_do_not_save_in_one_file() {
+    let station = Running::new();
+    let another = || ServerConfig {
+        gag: None,
+        ..config(&station.folder)
+    };
+    let held = Server::open(another()).expect_err("it is held");
+    let sentence = format!("is kept by process {}, and two would", std::process::id());
+    assert!(held.to_string().contains(&sentence), "{held}");
+    let link = station.folder.join("link.toml");
+    std::os::unix::fs::symlink("warehouse.toml", &link).expect("a link");
+    let by_another_name = ServerConfig {
+        warehouse: Some(link),
+        ..another()
+    };
+    let held = Server::open(by_another_name).expect_err("it is the same file");
+    assert!(matches!(held, ServerError::Held { .. }), "{held}");
+}
+
+#[test]
+fn a_damaged_queue_is_moved_aside_and_the_station_serves() {
+    let name = format!("lager-aside-{}", std::process::id());
+    let folder = std::env::temp_dir().join(name);
+    fs::create_dir_all(&folder).expect("a folder");
+    let queue = folder.join("warehouse.toml.queue");
+    fs::write(&queue, "r1 = [7, ").expect("a file");
+    let config = ServerConfig {
+        gag: None,
+        warehouse: None,
+        ..config(&folder)
+    };
+    drop(Server::open(config).expect("it serves"));
+    let names: Vec<String> = fs::read_dir(&folder)
+        .expect("the folder")
+        .map(|entry| {
+            entry
+                .expect("an entry")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    let aside = names
+        .iter()
+        .find(|name| name.starts_with("warehouse.toml.queue.damaged-2"));
+    let aside = aside.unwrap_or_else(|| panic!("it is not moved aside: {names:?}"));
+    let text = fs::read_to_string(folder.join(aside)).expect("the file");
+    assert_eq!(text, "r1 = [7, ");
+    fs::remove_dir_all(folder).expect("it is there");
 }

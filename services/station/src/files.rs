@@ -1,0 +1,330 @@
+//! Files at paths that a person has chosen: read without hanging, replaced as a whole, and held by
+//! one process at a time.
+//!
+//! A path may name anything: a pipe that nobody writes to, a device that never ends, a symbolic
+//! link, a file of somebody else's format. None of them may hang a process that drives a robot,
+//! and saving changes what a file contains and nothing else about it.
+//!
+//! It knows no format: what a text means is its caller's.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read as _, Write as _};
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, fchown};
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use rustix::fs::OFlags;
+use serde::de::DeserializeOwned;
+use thiserror::Error;
+
+/// The longest text that is read, in bytes.
+pub const MOST_BYTES: u64 = 1 << 20;
+
+/// Symbolic links behind each other, at most, as the kernel has it.
+const MOST_LINKS: usize = 40;
+
+/// Why a file is not read.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// It could not be read.
+    #[error("cannot read {}: {error}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// It is not what it should be.
+    #[error("{}: {}", .path.display(), in_words(.error))]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        error: toml::de::Error,
+    },
+}
+
+impl ReadError {
+    /// Whether the file is there and holds something else, so that it never will be read.
+    pub fn is_damage(&self) -> bool {
+        match self {
+            Self::Toml { .. } => true,
+            Self::Read { error, .. } => matches!(
+                error.kind(),
+                io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput
+            ),
+        }
+    }
+}
+
+/// What is wrong with a text of TOML, and what was meant if a key or a value is mistyped.
+fn in_words(error: &toml::de::Error) -> String {
+    let hint = lager_lines::hint(error.message());
+    format!("{}{hint}", error.to_string().trim_end())
+}
+
+/// Reads a text from a regular file.
+///
+/// # Errors
+/// It cannot be read, is no regular file, is longer than [`MOST_BYTES`], or is no text.
+pub fn read(path: &Path) -> io::Result<String> {
+    // Asked first, because opening a device may already do something.
+    refuse_others(&fs::metadata(path)?)?;
+    let file = OpenOptions::new()
+        .read(true)
+        .custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32)
+        .open(path)?;
+    refuse_others(&file.metadata()?)?;
+    let mut text = String::new();
+    file.take(MOST_BYTES + 1).read_to_string(&mut text)?;
+    match text.len() as u64 > MOST_BYTES {
+        true => Err(invalid("it is longer than 1 MiB, which is no such file")),
+        false => Ok(text),
+    }
+}
+
+/// Reads a value from a file of TOML.
+///
+/// # Errors
+/// As [`read`], or the file holds something else.
+pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ReadError> {
+    let at = || path.to_owned();
+    let text = read(path).map_err(|error| ReadError::Read { path: at(), error })?;
+    parse_toml(path, &text)
+}
+
+/// Reads a value from a text of TOML that came from `path`.
+///
+/// # Errors
+/// It is something else.
+pub fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ReadError> {
+    toml::from_str(text).map_err(|error| ReadError::Toml {
+        path: path.to_owned(),
+        error,
+    })
+}
+
+fn refuse_others(metadata: &fs::Metadata) -> io::Result<()> {
+    match metadata.is_file() {
+        true => Ok(()),
+        false if metadata.is_dir() => Err(invalid("it is a folder")),
+        false => Err(invalid("it is no file but a pipe, a socket or a device")),
+    }
+}
+
+fn invalid(why: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, why)
+}
+
+/// Replaces what a file contains, so that whoever reads it, even after a loss of power, finds the
+/// text before or this one and nothing between: a new file beside it is written and synchronised,
+/// takes its name, and the folder is synchronised. Where the path is a symbolic link, the file that
+/// it leads to is replaced. Mode and owner of the file stay, as far as this process may.
+///
+/// One process does it at a time ([`Hold`]). If it is killed half way, the file beside stays, named
+/// `NAME.new`, and is replaced by the next one.
+///
+/// # Errors
+/// The disk does not take it, or there is something else than a regular file. The file is as it
+/// was; if only its folder could not be synchronised it is the new one, which a loss of power may
+/// undo.
+pub fn replace(path: &Path, text: &str) -> io::Result<()> {
+    let target = behind_links(path)?;
+    let before = match fs::symlink_metadata(&target) {
+        Ok(before) => {
+            refuse_others(&before)?;
+            Some(before)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        Err(error) => return Err(error),
+    };
+    let beside = beside(&target, "new");
+    let replaced = put(&target, &beside, text, before.as_ref());
+    if replaced.is_err() {
+        // What could not be finished is of no use, and its name is free again.
+        let _ = fs::remove_file(&beside);
+    }
+    replaced
+}
+
+fn put(target: &Path, beside: &Path, text: &str, before: Option<&fs::Metadata>) -> io::Result<()> {
+    // One that was left, or a link to elsewhere, is not written to.
+    let _ = fs::remove_file(beside);
+    let mut file = File::create_new(beside)?;
+    if let Some(before) = before {
+        // Only the superuser may; for all others it is theirs already.
+        let _ = fchown(&file, Some(before.uid()), Some(before.gid()));
+        file.set_permissions(before.permissions())?;
+    }
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    fs::rename(beside, target)?;
+    let folder = target
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+}
+
+/// Where a path leads, which need not be there yet.
+fn behind_links(path: &Path) -> io::Result<PathBuf> {
+    let mut at = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&at) {
+            Ok(to) => {
+                at = match at.parent() {
+                    Some(folder) => folder.join(to),
+                    None => to,
+                }
+            }
+            // It is none, or nothing.
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::InvalidInput | io::ErrorKind::NotFound
+                ) =>
+            {
+                return Ok(at);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Err(invalid("its symbolic links lead in a circle"))
+}
+
+/// `NAME.ending` in the same folder.
+pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(".");
+    name.push(ending);
+    name.into()
+}
+
+/// Moves a file that cannot be read out of the way, to `NAME.damaged-DATE` (UTC); returns where it
+/// is.
+///
+/// # Errors
+/// It cannot be moved.
+pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
+    let aside = beside(path, &format!("damaged-{}", date(SystemTime::now())));
+    fs::rename(path, &aside)?;
+    Ok(aside)
+}
+
+/// A moment as `20261127T093005`, UTC.
+fn date(at: SystemTime) -> String {
+    let seconds = at.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    // Days are counted from 1 March of the year 0, so that a leap day is the last one of its year.
+    let days = days + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let march = (5 * day + 2) / 153;
+    let day = day - (153 * march + 2) / 5 + 1;
+    let month = if march < 10 { march + 3 } else { march - 9 };
+    let year = era * 400 + year + u64::from(month < 3);
+    let (hour, minute) = (second / 3_600, second / 60 % 60);
+    format!(
+        "{year:04}{month:02}{day:02}T{hour:02}{minute:02}{:02}",
+        second % 60
+    )
+}
+
+/// Why a file is not held.
+#[derive(Debug, Error)]
+#[error(
+    "{} is kept by process {pid}, and two would overwrite each other's changes; end that one, or \
+     name another file",
+    .path.display()
+)]
+pub struct HeldBy {
+    /// The file.
+    pub path: PathBuf,
+    /// Who holds it, as it says itself; 0 if it does not.
+    pub pid: u32,
+}
+
+/// A file is this process's to replace until this is dropped or the process ends, however it does.
+/// Everybody may read it.
+///
+/// The lock is one on `NAME.lock` beside the file, because the file itself is another one after
+/// each change.
+#[derive(Debug)]
+pub struct Hold {
+    lock: PathBuf,
+    /// Locked as long as it is open.
+    _file: File,
+}
+
+impl Hold {
+    /// Holds the file at `path`, which need not be there. `None` where no lock can be made: there
+    /// nobody can replace the file either.
+    ///
+    /// # Errors
+    /// Another process holds it.
+    pub fn of(path: &Path) -> Result<Option<Self>, HeldBy> {
+        let Ok(target) = behind_links(path) else {
+            return Ok(None);
+        };
+        let lock = beside(&target, "lock");
+        loop {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create(true).truncate(false);
+            let flags = OFlags::NONBLOCK | OFlags::NOFOLLOW;
+            let Ok(mut file) = options.custom_flags(flags.bits() as i32).open(&lock) else {
+                return Ok(None);
+            };
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => {
+                    let mut pid = String::new();
+                    let _ = file.take(16).read_to_string(&mut pid);
+                    return Err(HeldBy {
+                        path: path.to_owned(),
+                        pid: pid.trim().parse().unwrap_or_default(),
+                    });
+                }
+                Err(TryLockError::Error(_)) => return Ok(None),
+            }
+            // Whoever held it before may have removed it between the two calls.
+            let is_it = |there: fs::Metadata, own: fs::Metadata| {
+                (there.dev(), there.ino()) == (own.dev(), own.ino())
+            };
+            if let (Ok(there), Ok(own)) = (fs::symlink_metadata(&lock), file.metadata())
+                && is_it(there, own)
+            {
+                let _ = file.set_len(0);
+                let _ = writeln!(file, "{}", std::process::id());
+                return Ok(Some(Self { lock, _file: file }));
+            }
+        }
+    }
+}
+
+impl Drop for Hold {
+    fn drop(&mut self) {
+        // It is still locked, so nobody else believes in it.
+        let _ = fs::remove_file(&self.lock);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (seconds, wanted) in [
+            (0, "19700101T000000"),
+            (951_782_399, "20000228T235959"),
+            (951_782_400, "20000229T000000"),
+            (1_795_773_005, "20261127T095005"),
+            (4_107_542_400, "21000301T000000"),
+        ] {
+            assert_eq!(date(UNIX_EPOCH + Duration::from_secs(seconds)), wanted);
+        }
+    }
+}
