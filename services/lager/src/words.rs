@@ -5,13 +5,13 @@
 //!
 //! ```text
 //!   supervisor                                        attendant
-//!       │  begin (robot's start, mission, what to sweep)  │
+//!       │  begin (start, mission, orders to give back …)  │
 //!       │ ───────────────────────────────────────────────>│ sweeps the bus
 //!       │ <───────────────────────────────────────── swept│
 //!       │  (starts the body)                              │ joins the bus
 //!       │ <───────────── pulse, from then on 5 times a second, ready = 1 once it has joined
 //!       │  started (bridge, its process) …                │ listens for it
-//!       │ <────────────────── notes, the mission's progress, silence, damage
+//!       │ <──── notes, the mission's progress, the orders to keep, silence, damage
 //!       │  hand-over (bridge)                             │ publishes what is kept
 //!       │ <─────────────────────────── handed-over (bridge)
 //!       │  SIGTERM                                        │

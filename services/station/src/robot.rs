@@ -34,9 +34,7 @@ use std::time::Duration;
 use lager_lines::conversation::{AnswerRefused, Held, RobotLine, StationLine};
 use lager_lines::extension::{Hello, Order};
 use lager_lines::gag::{Answer, Query, Request, Telemetry};
-use lager_lines::{
-    Coord, Direction, Map, Name, ProductId, Products, SideLength, Text, TooLate,
-};
+use lager_lines::{Coord, Direction, Map, Name, ProductId, Products, SideLength, Text, TooLate};
 use lager_wire::OperatorCommand;
 use thiserror::Error;
 

@@ -157,6 +157,7 @@ impl Robot {
 
     /// It is given back `kept`, and what it has to do from then on is kept in a file.
     pub fn goes_on_with(&mut self, kept: Kept, file: KeptFile) {
+        file.keep(kept.clone());
         (self.left, self.kept) = (kept.clone(), kept);
         self.kept_file = Some(file);
     }
@@ -356,9 +357,8 @@ impl Robot {
             Word::Mission(mission) => self.mission = Some(mission),
             Word::Kept { left, all } => {
                 self.left = left;
-                if let Some(file) = self.kept_file.as_ref().filter(|_| self.kept != all) {
-                    file.keep(all.clone());
-                }
+                let file = self.kept_file.as_ref().filter(|_| self.kept != all);
+                file.into_iter().for_each(|file| file.keep(all.clone()));
                 self.kept = all;
             }
             Word::Misplaced(products) => self.misplaced = products,
