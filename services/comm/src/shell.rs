@@ -151,11 +151,9 @@ impl Shell {
         };
         let mut shell = Self {
             clock: bus.clock(),
-            link: Link::new(wanted, waiter.ringer()?).map_err(|error| {
-                PortError::Thread {
-                    what: "the link to the station",
-                    fault: error.into(),
-                }
+            link: Link::new(wanted, waiter.ringer()?).map_err(|error| PortError::Thread {
+                what: "the link to the station",
+                fault: error.into(),
             })?,
             bridge: opening.asking(&waiter)?,
             world: opening.asking(&waiter)?,

@@ -23,8 +23,8 @@
 mod asked;
 mod awaited;
 mod connection;
-mod given;
 mod gate;
+mod given;
 mod handle;
 mod queues;
 mod robot;

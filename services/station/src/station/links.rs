@@ -115,7 +115,8 @@ impl Station {
         let mut links = self.links.iter();
         links.find_map(|(number, link)| {
             let name = link.name.clone();
-            name.filter(|_| link.is_proved || !is_asked).map(|name| (*number, name))
+            name.filter(|_| link.is_proved || !is_asked)
+                .map(|name| (*number, name))
         })
     }
 
