@@ -70,6 +70,7 @@ pub(crate) fn a_stop_is_one_press_for_this_robot_by_name_and_another_robot_is_no
 ) {
     // The browser has the token by now.
     let (here, _) = scene.url.split_once("/?").expect("a token");
+    let here = here.to_owned();
     for at in ["/screen?r77", "/?r77"] {
         page.call("Page.navigate", &json!({ "url": format!("{here}{at}") }));
         page.wait_until("document.body?.textContent.includes('r77 is not here')");

@@ -114,22 +114,3 @@ impl fmt::Display for Shortage {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use std::io::Error;
-    use std::path::Path;
-
-    use super::*;
-    use crate::error::StopError;
-
-    #[test]
-    fn a_stop_word_that_no_file_is_left_for_blames_no_folder() {
-        let none_left = Error::from_raw_os_error(rustix::io::Errno::MFILE.raw_os_error());
-        let said = StopError::new(Path::new("stop"), &none_left).to_string();
-        assert!(said.contains("ulimit -n"), "{said}");
-        let elsewhere = Error::from_raw_os_error(rustix::io::Errno::NOTDIR.raw_os_error());
-        let said = StopError::new(Path::new("stop"), &elsewhere).to_string();
-        assert!(!said.contains("ulimit"), "{said}");
-    }
-}

@@ -475,4 +475,16 @@ mod tests {
             assert!(said.contains(words) && said.contains("/a/stop"), "{said}");
         }
     }
+
+    #[test]
+    fn a_stop_word_that_no_file_is_left_for_blames_no_folder() {
+        let raw = |errno: rustix::io::Errno| Error::from_raw_os_error(errno.raw_os_error());
+        for (errno, is_short) in [
+            (rustix::io::Errno::MFILE, true),
+            (rustix::io::Errno::NOTDIR, false),
+        ] {
+            let said = StopError::new(Path::new("/a/stop"), &raw(errno)).to_string();
+            assert_eq!(said.contains("ulimit -n"), is_short, "{said}");
+        }
+    }
 }

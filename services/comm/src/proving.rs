@@ -75,6 +75,7 @@ impl Proving {
         let hello = Hello {
             version: Hello::VERSION,
             name: self.robot.clone(),
+            clock_ms: None,
         };
         line(&RobotLine::Hello(hello))
     }
