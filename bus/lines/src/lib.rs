@@ -14,6 +14,7 @@
 //! - [`command`]: the codes of commands as text (AMB-4).
 //! - [`LATEST_MOVE`]: how late something may come that moves a robot.
 //! - [`Called`]: a product by its number or its name, as people call it.
+//! - [`nearest`](fn@nearest): what somebody may have meant who has mistyped a word.
 //!
 //! Every module specifies its language with examples, so that a peer can be written from it.
 //!
@@ -42,6 +43,7 @@ pub mod extension;
 pub mod gag;
 mod late;
 mod misread;
+mod nearest;
 mod reader;
 pub mod splitter;
 pub mod strings;
@@ -52,6 +54,7 @@ mod writer;
 pub use called::{Called, CalledError, NamesError, UnknownProduct, check_names};
 pub use late::{LATEST, LATEST_MOVE, TooLate};
 pub use misread::{Found, Misread};
+pub use nearest::nearest;
 pub use text::{Name, NameError, Text, TextError};
 pub use warehouse::{
     Coord, Direction, Map, MapError, Product, ProductId, Products, ProductsError, SideLength,
