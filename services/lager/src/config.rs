@@ -9,6 +9,7 @@ mod buttons;
 mod chip;
 mod documented;
 mod gateway;
+mod invalid;
 mod logic;
 mod realtime;
 mod station;
@@ -18,7 +19,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use lager_lines::check_names;
 use lager_plant::{MOST_OBSTACLES, Warehouse};
 use lager_ports::{BusConfig, RobotName};
@@ -33,6 +34,7 @@ pub use logic::{LogicSection, PickBy};
 pub use realtime::RealtimeSection;
 pub use station::{CommSection, StationSection, WithoutLink};
 
+use crate::meant::meant;
 use crate::realtime::HIGHEST_PRIORITY;
 use crate::services::Service;
 
@@ -201,10 +203,11 @@ impl Config {
         };
         let text =
             text.with_context(|| format!("cannot read the configuration {}", path.display()))?;
-        toml::from_str(&text).with_context(|| {
-            format!(
-                "the configuration {} is not valid; `lager config` prints one with every key",
-                path.display()
+        toml::from_str(&text).map_err(|error| {
+            anyhow!(
+                "the configuration {} is not valid: {}. `lager config` prints one with every key",
+                path.display(),
+                invalid::why(&text, &error)
             )
         })
     }
@@ -310,7 +313,8 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
     }
     let text = fs::read_to_string(name).with_context(|| {
         format!(
-            "there is no warehouse `{name}`: the built-in ones are {}, anything else is read as a file",
+            "there is no warehouse `{name}`{}: the built-in ones are {}, anything else is read as a file",
+            meant(name, Warehouse::BUILTIN),
             Warehouse::BUILTIN.join(", ")
         )
     })?;
@@ -465,6 +469,11 @@ mod tests {
         let error = warehouse("medium").expect_err("no such warehouse");
         assert!(
             error.to_string().contains("small, curved, large"),
+            "{error}"
+        );
+        let error = warehouse("smal").expect_err("no such warehouse");
+        assert!(
+            error.to_string().contains("did you mean `small`?"),
             "{error}"
         );
     }

@@ -6,10 +6,11 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use lager_ports::{Lock, Place, RobotName, StopPage, StopWord};
+use lager_ports::{Life, Lock, Place, RobotName, StopPage, StopWord};
 use lager_station::Queues;
 
 use crate::config::Config;
+use crate::services::Service;
 
 /// The effective configuration's file.
 const CONFIG: &str = "lager.toml";
@@ -52,6 +53,15 @@ impl RuntimeFolder {
             return Ok(None);
         }
         Config::load(Some(&file)).map(Some)
+    }
+
+    /// Begins to give signs of life as this service of `config`'s robot.
+    ///
+    /// # Errors
+    /// The folder takes none, or another process is that service.
+    pub fn live_as(config: &Config, service: Service) -> Result<Life> {
+        let bus = config.bus()?;
+        Ok(Life::begin(&bus.place()?, &bus.robot, service.command())?)
     }
 
     /// Where the own station of `config`'s robot listens for a GaG.

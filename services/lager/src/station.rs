@@ -10,14 +10,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use lager_lines::Name;
-use lager_panel::{Panel, Tokens};
+use lager_panel::{Panel, PanelError, Tokens};
 use lager_ports::Shutdown;
 use lager_station::{Listen, Queues, Server, ServerConfig, save};
 
 use crate::cli::StationArgs;
 use crate::config::{Config, StationSection};
 use crate::goods;
+use crate::reach;
 use crate::runtime::RuntimeFolder;
+use crate::services::Service;
 use crate::supervisor;
 
 /// What a station calls itself towards robots.
@@ -37,7 +39,9 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
     let (server, panel) = match args.parent {
         Some(parent) => {
             supervisor::adopt(parent, shutdown)?;
-            let server = Server::open(supervised(config)?)?;
+            let mut server = Server::open(supervised(config)?)?;
+            let life = RuntimeFolder::live_as(config, Service::Station)?;
+            server.each_turn(move || life.goes_on());
             let panel = config.station.panel.and_then(|address| {
                 // Robots are served, whoever looks.
                 let panel = Panel::open(address, None, server.handle());
@@ -84,7 +88,7 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
     })?;
     crate::say(&format!(
         "robots connect to {}, a GaG to {}; {}",
-        server.address()?,
+        reach::listed(server.address()?, |at| at.to_string()),
         gag.display(),
         warehouse(args.warehouse.as_deref()),
     ))?;
@@ -108,11 +112,17 @@ fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
     }
     let tokens = Tokens::random()?;
     let panel = Panel::open(address, Some(tokens.clone()), server.handle())?;
-    let at = panel.address()?;
+    let at = |token: &str| {
+        let page = |at| format!("http://{at}/?token={token}");
+        Ok::<_, PanelError>(reach::listed(
+            panel.address().map_err(PanelError::Run)?,
+            page,
+        ))
+    };
     crate::say(&format!(
-        "the panel is at http://{at}/?token={} for who drives, and at http://{at}/?token={} for who \
-         looks and stops",
-        tokens.driver, tokens.viewer
+        "the panel is at {} for who drives, and at {} for who looks and stops",
+        at(&tokens.driver)?,
+        at(&tokens.viewer)?
     ))?;
     Ok(panel)
 }

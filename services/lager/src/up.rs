@@ -4,7 +4,9 @@
 //! nothing there can hold it up or end it. It starts the services, restarts them, answers signals,
 //! and shows what it is told. Its child, the attendant (`attend.rs`), does what needs the bus.
 
+mod attendant;
 mod external;
+mod figures;
 mod resets;
 mod robot;
 
@@ -26,6 +28,7 @@ use crate::signals::Signals;
 use crate::station;
 use crate::stop;
 use crate::terminal::Terminal;
+use crate::voice;
 use external::External;
 use robot::Robot;
 
@@ -59,7 +62,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let mission = ordered(&config, &external, products)?;
 
     stop::at_start(&config)?;
-    let terminal = Terminal::new(args.json)?;
+    let terminal = Terminal::new(args.json, voice::are_traced(&config.log))?;
     let mut robot = Robot::new(config, lock, external, mission, signals, terminal)?;
     let ran = robot.run(args.exit_when_done);
     let outcome = robot.finish(args.exit_when_done, args.json);
@@ -109,18 +112,17 @@ fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
 }
 
 /// Puts what is to be fetched into the queue of the robot's own station. Where there is none, the
-/// robot's own queue is given it.
-fn ordered(
-    config: &Config,
-    external: &External,
-    products: Option<Vec<i32>>,
-) -> Result<Option<Mission>> {
-    if external.listener.is_none() {
-        let first_id = Hands::fresh_id();
-        return Ok(products.map(|products| Mission::of_robot(&products, first_id)));
+/// robot's own queue is given it. Real boards carry out what somebody orders, and that is counted.
+fn ordered(config: &Config, external: &External, products: Option<Vec<i32>>) -> Result<Mission> {
+    let has_station = external.listener.is_some();
+    if has_station {
+        station::prepare(config, products.as_deref().unwrap_or_default())?;
     }
-    station::prepare(config, products.as_deref().unwrap_or_default())?;
-    Ok(products.map(|products| Mission::of_station(&products)))
+    Ok(match products {
+        None => Mission::of_others(),
+        Some(products) if has_station => Mission::of_station(&products),
+        Some(products) => Mission::of_robot(&products, Hands::fresh_id()),
+    })
 }
 
 /// Refuses before anything runs what the services would be refused, again and again, at every

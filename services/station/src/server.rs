@@ -11,6 +11,7 @@
 //!   there is nothing more of it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs;
 use std::io::{self, Read as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -133,8 +134,18 @@ pub struct Server {
     saved: Queues,
     connections: BTreeMap<Peer, Connection>,
     next_link: u64,
+    turned: Turned,
     /// How long this thread was held up before this turn, if that makes old what waits.
     pause: Option<Duration>,
+}
+
+/// What is done at each turn of the loop.
+struct Turned(Box<dyn FnMut() + Send>);
+
+impl fmt::Debug for Turned {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Turned")
+    }
 }
 
 impl Server {
@@ -196,6 +207,7 @@ impl Server {
             handle,
             connections: BTreeMap::new(),
             next_link: 0,
+            turned: Turned(Box::new(|| {})),
             pause: None,
         })
     }
@@ -214,6 +226,11 @@ impl Server {
         self.handle.clone()
     }
 
+    /// Has `act` done at each turn, at least ten times a second: a sign that the station goes on.
+    pub fn each_turn(&mut self, act: impl FnMut() + Send + 'static) {
+        self.turned = Turned(Box::new(act));
+    }
+
     /// Serves until `shutdown` is set.
     ///
     /// # Errors
@@ -224,6 +241,7 @@ impl Server {
         while !shutdown.load(Ordering::SeqCst) {
             let ready = self.wait()?;
             let now = Instant::now();
+            (self.turned.0)();
             let pause = now.saturating_duration_since(turned);
             turned = now;
             self.pause = Some(pause).filter(|pause| *pause > LATEST_MOVE);
