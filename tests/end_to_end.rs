@@ -410,6 +410,7 @@ fn the_topic_tools_show_a_running_robot() {
         "shared memory",
         "open files",
         "versions",
+        "load",
         "serial rights",
         "bus",
     ] {

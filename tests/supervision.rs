@@ -245,17 +245,34 @@ fn a_robot_whose_topics_are_overwritten_comes_up_again_beside_another_that_notic
     assert_only_a_stop_is_left(&domain);
 }
 
+/// It starts the robot again after pauses that grow, says so, and goes on when what damages the bus
+/// has ended.
 #[test]
-fn a_bus_that_never_holds_ends_the_robot_with_a_sentence() {
+fn a_bus_that_does_not_hold_is_tried_more_and_more_seldom_until_it_does() {
     let domain = Domain::new();
     let mut up = start(&domain, &["up", "--headless"]);
-    wait_for("the end", || {
+    wait_for("the starts in vain", || {
         cut_off(&domain);
-        (!up.is_running()).then_some(())
+        assert!(up.is_running(), "{}{}", up.log(), up.output());
+        up.output()
+            .contains("new starts were in vain")
+            .then_some(())
     });
-    assert_eq!(up.wait(), Some(1), "{}{}", up.log(), up.output());
-    let said = up.log();
-    assert!(said.contains("3 new starts were in vain"), "{said}");
+    let said = up.output();
+    let starts: Vec<&str> = said
+        .lines()
+        .filter_map(|line| line.split("starting everything again").nth(1))
+        .collect();
+    assert_eq!(
+        starts,
+        [" (1 of 3)", " in 1 s (2 of 3)", " in 4 s (3 of 3)"]
+    );
+    assert!(said.contains("tried every 15 s from now on"), "{said}");
+    let told = "put it down, say where (`lager place`";
+    assert_eq!(said.matches(told).count(), 1, "{said}");
+    wait_until_up(&domain, &mut up);
+    assert_stands_lost(&domain, StopCause::StateLost);
+    interrupt(&mut up, 3);
     assert_only_a_stop_is_left(&domain);
 }
 
@@ -330,7 +347,7 @@ fn a_stopped_service_is_replaced_by_itself() {
     domain.assert_clean();
 }
 
-/// Nobody hears whether comm lives. `strace` keeps a call of it from returning.
+/// `strace` keeps a call of it from returning.
 #[test]
 fn a_comm_that_hangs_ends_itself_with_a_sentence() {
     let domain = Domain::new();
@@ -359,6 +376,130 @@ fn a_comm_that_hangs_ends_itself_with_a_sentence() {
     told.expect("UTF-8");
     assert_eq!(ended.code(), Some(1), "{said}");
     assert!(said.contains("has taken 3 s"), "{said}");
+    interrupt(&mut up, 0);
+    domain.assert_clean();
+}
+
+/// Comm says nothing on the bus and the station is on none: each writes signs of life.
+#[test]
+fn a_stopped_comm_and_a_stopped_station_are_replaced_by_themselves() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless", "--listen", "127.0.0.1:0"]);
+    let others = |up: &mut Running| {
+        ["attend", "simulator", "bridge", "logic"].map(|name| service(up, name, None))
+    };
+    let before = others(&mut up);
+    for (name, called) in [
+        ("comm", "the link to the station (comm)"),
+        ("station", "the station"),
+    ] {
+        let stopped = service(&mut up, name, None);
+        wait_for("its sign of life", || {
+            let bus = domain.bus("r1", 1.0);
+            let place = bus.place().expect("a folder");
+            let sign = place.sign_of(&bus.robot, name)?;
+            (sign.pid == stopped).then_some(())
+        });
+        kill(stopped, Signal::STOP);
+        service(&mut up, name, Some(stopped));
+        let told = format!("{called} does not answer any more and is killed");
+        wait_for("the word of it", || {
+            up.output().contains(&told).then_some(())
+        });
+    }
+    assert_eq!(others(&mut up), before, "{}", up.output());
+    interrupt(&mut up, 0);
+    domain.assert_clean();
+}
+
+/// Nobody supervises this comm, so it stays frozen for as long as `top` looks.
+#[test]
+fn top_does_not_say_that_all_is_well_while_a_service_is_frozen() {
+    let domain = Domain::new();
+    let mut up = start(&domain, &["up", "--headless", "--no-station"]);
+    let station = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = station.local_addr().expect("an address").to_string();
+    let comm = domain.start(&["comm", "--station", &address]);
+    let _robot = station.accept().expect("the robot's call");
+    comm.signal(Signal::STOP);
+    wait_for("it to stop", || is_stopped(comm.pid()).then_some(()));
+    let top = domain.run(&["top", "--once", "--duration", "1"]);
+    let shown = String::from_utf8_lossy(&top.stdout).into_owned();
+    comm.signal(Signal::CONT);
+    let first = shown.lines().next().unwrap_or_default();
+    assert!(
+        first.contains("1 service") && first.contains("IN TROUBLE"),
+        "{shown}"
+    );
+    let frozen = format!(
+        "the link to the station (comm), process {}, is frozen",
+        comm.pid()
+    );
+    assert!(shown.contains(&frozen), "{shown}");
+    drop(comm);
+    interrupt(&mut up, 0);
+    domain.assert_clean();
+}
+
+/// Busy loops, twelve of them, which end when this is dropped.
+struct Busy(Vec<std::process::Child>);
+
+impl Busy {
+    fn begin() -> Self {
+        let endless = || {
+            let mut shell = Command::new("timeout");
+            shell.args(["300", "sh", "-c", "while :; do :; done"]);
+            shell.spawn().expect("a shell")
+        };
+        Self((0..12).map(|_| endless()).collect())
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        for shell in &mut self.0 {
+            // `timeout` ends its child, too.
+            let _ = kill_process(pid(shell.id()), Signal::TERM);
+            let _ = shell.wait();
+        }
+    }
+}
+
+#[test]
+#[ignore = "keeps every core busy for minutes; `tests/soak busy` runs it"]
+fn on_a_busy_machine_nothing_is_called_damaged_and_the_mission_is_carried_out() {
+    let domain = Domain::new();
+    let busy = Busy::begin();
+    let args = ["up", "--headless", "--no-station", "--mission", "1"];
+    let drives = |up: &Running| up.output().contains("drives from").then_some(());
+    // All of its processes are killed at once, and it is started again.
+    for _ in 0..2 {
+        let mut up = domain.start(&args);
+        wait_for("the robot to drive", || drives(&up));
+        let mut all = lager_tests::children(up.pid());
+        all.push(up.pid());
+        all.iter().for_each(|process| kill(*process, Signal::KILL));
+        up.wait();
+        assert!(!up.output().contains("damaged"), "{}", up.output());
+    }
+    let mut up = domain.start(&args);
+    let was_delivered = |up: &Running| up.output().contains("DELIVERED product 1");
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(120) && !was_delivered(&up) {
+        assert!(up.is_running(), "{}{}", up.log(), up.output());
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    drop(busy);
+    // It goes on by itself when the load ends.
+    wait_for("the delivery", || {
+        assert!(up.is_running(), "{}{}", up.log(), up.output());
+        was_delivered(&up).then_some(())
+    });
+    let said = up.output();
+    assert!(
+        !said.contains("damaged") && !said.contains("does not answer"),
+        "{said}"
+    );
     interrupt(&mut up, 0);
     domain.assert_clean();
 }

@@ -23,7 +23,7 @@ use harm::{FILES, HARMS, Harm, SEGMENTS, Target};
 /// The bound on driving without a word of the bridge, and what a sample of the world is late.
 const UNSTEERED: Duration = Duration::from_millis(200);
 /// The bound on being up again, or on ending with a reason.
-const BACK: Duration = Duration::from_secs(10);
+const BACK: Duration = Duration::from_secs(25);
 /// The bound on a tool's end.
 const TOOL: Duration = Duration::from_secs(5);
 

@@ -57,7 +57,7 @@ mod writer;
 pub use called::{Called, CalledError, NamesError, UnknownProduct, check_names};
 pub use late::{LATEST, LATEST_MOVE, TooLate};
 pub use misread::{Found, Misread};
-pub use nearest::{hint, nearest};
+pub use nearest::{hint, meant, nearest};
 pub use text::{Name, NameError, Text, TextError};
 pub use warehouse::{
     Coord, Direction, Map, MapError, Product, ProductId, Products, ProductsError, SideLength,

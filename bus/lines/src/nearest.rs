@@ -29,26 +29,27 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// What a serde error of a mistyped key or value is to be followed by: `; did you mean `side`?`, or
-/// nothing if no name that would have been right is like it.
+/// The name that was meant, where a serde error tells that one is unknown and which there are.
 ///
 /// ```
 /// let why = "unknown field `sied`, expected one of `id`, `square`, `side`";
-/// assert_eq!(lager_lines::hint(why), "; did you mean `side`?");
-/// assert_eq!(lager_lines::hint("invalid type: string"), "");
+/// assert_eq!(lager_lines::meant(why), Some("side"));
+/// assert_eq!(lager_lines::meant("invalid type: string"), None);
 /// ```
-pub fn hint(message: &str) -> String {
-    let is_of_names =
-        message.starts_with("unknown field") || message.starts_with("unknown variant");
+pub fn meant(message: &str) -> Option<&str> {
+    let (_, names) = message
+        .split_once("unknown field `")
+        .or_else(|| message.split_once("unknown variant `"))?;
     // What stands between every other pair of marks: the typed one, and those that there are.
-    let mut names = message.split('`').skip(1).step_by(2);
-    match names.next().filter(|_| is_of_names) {
-        Some(typed) => match nearest(typed, names) {
-            Some(meant) => format!("; did you mean `{meant}`?"),
-            None => String::new(),
-        },
-        None => String::new(),
-    }
+    let mut quoted = names.split('`').step_by(2);
+    let typed = quoted.next()?;
+    nearest(typed, quoted)
+}
+
+/// What such an error is to be followed by: `; did you mean `side`?`, or nothing if no name that
+/// would have been right is like it.
+pub fn hint(message: &str) -> String {
+    meant(message).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"))
 }
 
 /// How many letters have to be changed, added, left out or exchanged with the next one.

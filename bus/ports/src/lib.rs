@@ -43,6 +43,7 @@
 mod any;
 mod bus;
 mod cause;
+mod chance;
 mod clock;
 mod config;
 mod descriptions;
@@ -58,6 +59,7 @@ mod keeper;
 mod kept;
 mod kind;
 mod lease;
+mod life;
 mod lock;
 mod mend;
 mod name;
@@ -89,6 +91,7 @@ mod watchdog;
 pub use any::AnyPublisher;
 pub use bus::Bus;
 pub use cause::Cause;
+pub use chance::{Chance, ChanceClock};
 pub use clock::Clock;
 pub use config::BusConfig;
 pub use error::{
@@ -100,9 +103,10 @@ pub use introspect::{Layout, NodeInfo, NodeState, Peer, TopicInfo, nodes, remove
 pub use inventory::Inventory;
 pub use keeper::{Keeper, KeeperError};
 pub use kept::KeptError;
+pub use life::{Life, Sign};
 pub use lock::{Lock, LockError};
 pub use mend::{Mended, damaged, mend};
-pub use name::{RobotName, RobotNameError};
+pub use name::{RobotName, RobotNameError, called};
 pub use pace::Pace;
 pub use place::{OtherPlace, Place, other_places};
 pub use policy::{Policy, PolicyError};

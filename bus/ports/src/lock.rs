@@ -16,7 +16,11 @@ use std::time::Instant;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
-use crate::name::RobotName;
+use crate::name::{RobotName, called};
+
+/// How the files end that a process holds as long as it lives: locks, and signs of life.
+pub(crate) const ENDS: [&str; 2] = ["lock", LIFE];
+pub(crate) const LIFE: &str = "life";
 
 /// How long a successor waits for a predecessor that is just dying.
 pub(crate) const SUCCESSION: Duration = Duration::from_secs(1);
@@ -36,7 +40,8 @@ pub enum LockError {
     },
     /// Another process is this service.
     #[error(
-        "the {role} of robot `{robot}` already runs (process {pid}); stop that one, or give this one another name with --name"
+        "the {} of robot `{robot}` already runs (process {pid}); stop that one, or give this one another name with --name",
+        called(.role)
     )]
     Service {
         /// The service.
@@ -121,6 +126,13 @@ impl Lock {
         if there[..length] != *std::process::id().to_string().as_bytes() {
             let _ = self.write_number();
         }
+    }
+
+    /// Writes a number behind the process's, in one piece, so that who reads sees the old or the
+    /// new one.
+    pub(crate) fn write_beside_number(&self, number: u64) -> std::io::Result<()> {
+        let text = format!("{} {number}\n", std::process::id());
+        self.file.write_all_at(text.as_bytes(), 0)
     }
 
     fn write_number(&self) -> std::io::Result<()> {

@@ -23,7 +23,6 @@ use std::time::{Duration, SystemTime};
 use crate::descriptions::Descriptions;
 use crate::error::OpenError;
 use crate::lease;
-use crate::lock;
 use crate::name::RobotName;
 use crate::place::{Place, user_name};
 use crate::watch::{NODES, SERVICES};
@@ -244,8 +243,7 @@ fn remove_left(path: &Path) -> bool {
 fn tidy(place: &Place, robot: &RobotName) -> usize {
     let folder = place.folder_of(robot);
     let before = files(&folder).count();
-    let locks = files(&folder).filter(|path| path.extension().is_some_and(|end| end == "lock"));
-    locks.for_each(|path| lock::sweep(&path));
+    place.sweep_locks_of(robot);
     lease::remove_unused(&folder.join("bells"));
     // While this process holds the name, no supervisor can start.
     if let Ok(_name) = place.lock_name(robot) {

@@ -154,6 +154,18 @@ pub(crate) fn parse_port(name: &str) -> Option<(Role, u32)> {
     Some((role.parse().ok()?, pid.parse().ok()?))
 }
 
+/// What people call a process that the software knows by its role or its subcommand.
+#[must_use]
+pub fn called(who: &str) -> &str {
+    match who {
+        "comm" => "link to the station (comm)",
+        "simulator" => "simulated robot (simulator)",
+        "emulator" => "emulated boards (emulator)",
+        "up" => "supervisor (up)",
+        other => other,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -170,17 +170,24 @@ impl Place {
             .collect()
     }
 
-    /// Removes the locks' files that killed processes have left.
+    /// Removes the locks' files and the signs of life that killed processes have left.
     pub fn sweep_locks(&self) {
         for robot in self.robots() {
-            fs::read_dir(self.folder_of(&robot))
-                .into_iter()
-                .flatten()
-                .flatten()
-                .map(|entry| entry.path())
-                .filter(|path| path.extension().is_some_and(|end| end == "lock"))
-                .for_each(|path| lock::sweep(&path));
+            self.sweep_locks_of(&robot);
         }
+    }
+
+    pub(crate) fn sweep_locks_of(&self, robot: &RobotName) {
+        fs::read_dir(self.folder_of(robot))
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.path())
+            .filter(|path| {
+                let end = path.extension().and_then(|end| end.to_str());
+                end.is_some_and(|end| lock::ENDS.contains(&end))
+            })
+            .for_each(|path| lock::sweep(&path));
     }
 
     /// Removes everything of a damaged bus but the robots' folders, and begins its next generation,

@@ -3,8 +3,9 @@
 //! The transport waits without a time-out for a shared-memory segment to get its size. A process
 //! that is killed or frozen in between leaves a segment that never does, and a process that opens
 //! it hangs. Services have a supervisor for that; a tool has this watchdog. Its own thread touches
-//! nothing of the bus, counts how long a call takes and says when it has taken too long. It also
-//! makes one wish to stop enough, whatever the tool's other threads are doing.
+//! nothing of the bus, counts how long a call takes and says when it has taken too long. Time that
+//! the calling thread has waited for a core is not counted. It also makes one wish to stop enough,
+//! whatever the tool's other threads are doing. A service's calls are its sign of life, too.
 //!
 //! ```text
 //!            enter                        limit is over
@@ -20,6 +21,8 @@ use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::chance::Chance;
+use crate::life::Life;
 use crate::shutdown::Shutdown;
 use crate::urgency;
 
@@ -50,6 +53,7 @@ pub enum GivenUp {
 #[derive(Clone, Default)]
 pub struct Watchdog {
     now: Arc<Mutex<Now>>,
+    life: Option<Arc<Life>>,
 }
 
 /// What the watched threads are doing.
@@ -59,6 +63,13 @@ struct Now {
     calls: u64,
     /// What the last of them is for; `None` once it has returned.
     what: Option<&'static str>,
+    /// The thread that makes it, as the system counts threads.
+    thread: u32,
+}
+
+thread_local! {
+    /// This thread's number, asked for once.
+    static THREAD: u32 = rustix::thread::gettid().as_raw_nonzero().get().unsigned_abs();
 }
 
 impl Watchdog {
@@ -104,11 +115,24 @@ impl Watchdog {
         Ok(watchdog)
     }
 
+    /// The same watch, each of whose calls is a sign that the service goes on.
+    #[must_use]
+    pub fn showing(self, life: Life) -> Self {
+        Self {
+            life: Some(Arc::new(life)),
+            ..self
+        }
+    }
+
     /// A call into the bus begins, and the one before is over; `what` says what it is for.
     pub fn enter(&self, what: &'static str) {
+        if let Some(life) = &self.life {
+            life.goes_on();
+        }
         let mut now = self.now();
         now.calls += 1;
         now.what = Some(what);
+        now.thread = THREAD.with(|thread| *thread);
     }
 
     /// No call into the bus is under way: what follows may take as long as it likes.
@@ -132,11 +156,19 @@ impl Watchdog {
     fn watch(&self, mut watch: Watch, shutdown: &Shutdown) -> GivenUp {
         urgency::wake_with_others(TICK);
         let mut looked = Instant::now();
+        // The thread that makes the calls, and what it could have run.
+        let mut caller = (0, Chance::of_own_thread(0));
         loop {
             std::thread::sleep(watch.tick());
-            let tick = looked.elapsed();
+            let mut tick = looked.elapsed();
             looked = Instant::now();
             let now = *self.now();
+            if caller.0 != now.thread {
+                caller = (now.thread, Chance::of_own_thread(now.thread));
+            }
+            if watch.is_under_way(now) {
+                tick = caller.1.of(tick);
+            }
             if let Some(why) = watch.look(tick, now, shutdown.is_requested()) {
                 return why;
             }
@@ -181,6 +213,11 @@ impl Watch {
         if is_quiet { QUIET_TICK } else { TICK }
     }
 
+    /// Whether that is the call which the last look saw.
+    fn is_under_way(&self, now: Now) -> bool {
+        now.what.is_some() && now.calls == self.call
+    }
+
     /// One look, `tick` after the one before; whether to give up.
     fn look(&mut self, tick: Duration, now: Now, shutdown: bool) -> Option<GivenUp> {
         let tick = tick.min(LONGEST_TICK);
@@ -192,7 +229,7 @@ impl Watch {
                 return Some(GivenUp::Interrupted);
             }
         }
-        let Some(what) = now.what.filter(|_| now.calls == self.call) else {
+        let Some(what) = now.what.filter(|_| self.is_under_way(now)) else {
             self.call = now.calls;
             self.lasted = Duration::ZERO;
             return None;
@@ -212,7 +249,17 @@ mod tests {
 
     fn call(calls: u64) -> Now {
         let what = Some("opening a topic");
-        Now { calls, what }
+        Now {
+            what,
+            ..resting(calls)
+        }
+    }
+
+    fn resting(calls: u64) -> Now {
+        Now {
+            calls,
+            ..Now::default()
+        }
     }
 
     #[test]
@@ -231,10 +278,7 @@ mod tests {
     #[test]
     fn it_looks_seldom_until_a_call_lasts_or_the_end_is_wished_for() {
         let mut watch = Watch::new(LIMIT);
-        let resting = Now {
-            calls: 2,
-            what: None,
-        };
+        let resting = resting(2);
         for now in [call(1), call(2), resting, resting] {
             watch.look(QUIET_TICK, now, false);
             assert_eq!(watch.tick(), QUIET_TICK);
@@ -254,10 +298,7 @@ mod tests {
         for number in 0..1_000 {
             assert_eq!(watch.look(LONGEST_TICK, call(number / 2), false), None);
         }
-        let resting = Now {
-            calls: 1_000,
-            what: None,
-        };
+        let resting = resting(1_000);
         for _ in 0..1_000 {
             assert_eq!(watch.look(LONGEST_TICK, resting, false), None);
         }
@@ -289,10 +330,9 @@ mod tests {
             only_calls: true,
             ..Watch::new(LIMIT)
         };
-        let between = |calls| Now { calls, what: None };
         for calls in 0..1_000 {
             assert_eq!(watch.look(LONGEST_TICK, call(calls), true), None);
-            assert_eq!(watch.look(LONGEST_TICK, between(calls), true), None);
+            assert_eq!(watch.look(LONGEST_TICK, resting(calls), true), None);
         }
         let mut looks = 0;
         while watch.look(TICK, call(1_000), true).is_none() {

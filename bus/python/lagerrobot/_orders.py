@@ -39,9 +39,15 @@ def give(lager: str, robot: str, folder: str, words: List[str]) -> str:
     command = [lager, "--name", robot, "--bus", folder, *words]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except FileNotFoundError as error:
+        raise Refused(
+            f"there is no program `{lager}`, which gives commands: `cargo install --path "
+            "services/lager`, in the project's folder, installs it, and Robot(..., lager=PATH) "
+            "names one that lies elsewhere"
+        ) from error
     except OSError as error:
         raise Refused(
-            f"`{lager}` cannot be started ({error.strerror}); `lager=` names the program"
+            f"`{lager}` cannot be started ({error.strerror}); Robot(..., lager=PATH) names another"
         ) from error
     if done.returncode != 0:
         raise Refused(done.stderr.strip() or f"`{' '.join(command)}` ended with {done.returncode}")

@@ -38,4 +38,5 @@ with Robot("r1", bus=folder, role="operator", lager=lager) as robot:
     assert "no command" in said, said
 with Robot("r1", bus=folder, role="operator", lager="/nowhere/lager") as robot:
     said = refused(lagerrobot.Refused, lambda: robot.tell("stop"))
-    assert "cannot be started" in said, said
+    assert "there is no program `/nowhere/lager`" in said, said
+    assert "cargo install --path services/lager" in said, said

@@ -5,8 +5,8 @@
 //! renewed, and the bridge stops the robot when the lease is over, 120 ms later. Logic goes on with
 //! its orders.
 //!
-//! Nobody listens whether it lives, so its turns run under a watch: a call that does not return
-//! ends the process, and `up` starts it again.
+//! Its turns run under a watch: each is a sign of life, and a call that does not return ends the
+//! process. `up` starts it again.
 
 use core::time::Duration;
 use std::path::PathBuf;

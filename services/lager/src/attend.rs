@@ -10,12 +10,16 @@
 //! It decides nothing about processes: it reports what it hears (`words.rs`), and the supervisor
 //! acts.
 
+mod busy;
 mod ears;
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_ports::{Bus, BusConfig, Cause, Clock, Inventory, OpenError, Publisher, Shutdown};
+use lager_ports::{
+    Bus, BusConfig, Cause, Chance, Clock, Inventory, OpenError, Publisher, Shutdown, Sign,
+};
 use lager_topics::{NavMap, Role};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
@@ -28,6 +32,7 @@ use crate::mission::{Helper, Mission, Watch};
 use crate::report::Narrator;
 use crate::supervisor::{self, Parent};
 use crate::words::{Begin, Line, Pulse, Request, Sweep, Word};
+use busy::Busy;
 use ears::Ears;
 
 /// The pace of this process's work in robot time, and at most this in real time. What the
@@ -47,8 +52,12 @@ const LOOK: Duration = Duration::from_secs(1);
 const SWEEP: Duration = Duration::from_secs(5);
 /// How long the first word may take.
 const FIRST_WORD: Duration = Duration::from_secs(2);
-/// How long the bus may return nothing but errors.
+/// How long the bus may return nothing but errors, and at how many looks: on a busy machine there
+/// are few.
 const ERRORS: Duration = Duration::from_secs(2);
+const BAD_LOOKS: u32 = 25;
+/// How often the signs of life are read that services write.
+const SIGNS: Duration = Duration::from_millis(200);
 
 /// Attends the supervisor `parent` until `shutdown`.
 pub fn run(config: &Config, parent: Option<Parent>, shutdown: &Shutdown) -> Result<()> {
@@ -138,13 +147,19 @@ struct Attendant {
     hands: Hands,
     /// The warehouse, where comm does not tell it.
     map: Option<Publisher<NavMap>>,
-    watch: Option<Watch>,
+    watch: Watch,
     told: Option<Mission>,
     returned: Returned,
     /// What was told to be kept.
     kept: Option<Kept>,
     body: Body,
     ears: Ears,
+    /// What each process could have run, for the ears and for whether the machine is busy.
+    chances: BTreeMap<u32, Chance>,
+    busy: Busy,
+    /// The last sign of life of each service that writes them.
+    signs: BTreeMap<u32, Sign>,
+    signs_due: Instant,
     inventory: Inventory,
     complaints: Complaints,
     pulse_due: Instant,
@@ -156,8 +171,7 @@ struct Attendant {
 impl Attendant {
     fn new(config: &Config, begin: Begin, line: Line, bus: Bus) -> Result<Self> {
         let keepers = Keepers::new(&bus)?;
-        let joins_late = begin.robot_start.is_some() && begin.sweep == Sweep::TheDead;
-        let narrator = Narrator::new(&bus, joins_late)?;
+        let narrator = Narrator::new(&bus, begin.joins_late)?;
         let hands = Hands::new(&bus)?;
         let map = match config.station.wanted {
             true => None,
@@ -175,14 +189,16 @@ impl Attendant {
             narrator,
             hands,
             map,
-            watch: begin
-                .mission
-                .map(|mission| Watch::new(mission, helper(config.body))),
+            watch: Watch::new(begin.mission, helper(config.body)),
             told: None,
             returned: Returned::new(begin.kept),
             kept: None,
             body: config.body,
             ears: Ears::default(),
+            chances: BTreeMap::new(),
+            busy: Busy::default(),
+            signs: BTreeMap::new(),
+            signs_due: now,
             inventory: Inventory::default(),
             complaints: Complaints::default(),
             pulse_due: now,
@@ -199,6 +215,10 @@ impl Attendant {
                 Request::Begin(_) => {}
                 Request::Started(service, pid) => {
                     self.ears.started(service, pid);
+                    // What is known of processes that have ended.
+                    let processes = self.ears.processes();
+                    self.chances.retain(|pid, _| processes.contains(pid));
+                    self.signs.retain(|pid, _| processes.contains(pid));
                     self.introduced = Instant::now() + INTRODUCTION;
                 }
                 Request::HandOver(service) => {
@@ -237,6 +257,7 @@ impl Attendant {
         if self.look_due <= Instant::now() {
             self.look_due = Instant::now() + LOOK;
             self.look_at_files()?;
+            self.look_at_machine();
         }
         // Late joiners get it, too.
         self.map.iter().for_each(Publisher::tick);
@@ -251,11 +272,7 @@ impl Attendant {
             self.pulse()?;
         }
         self.complaints.end_of_look();
-        if self
-            .complaints
-            .since
-            .is_some_and(|since| since.elapsed() >= ERRORS)
-        {
+        if self.complaints.are_lasting() {
             self.line
                 .send(&Word::Damaged(self.complaints.last.clone()))?;
         }
@@ -308,11 +325,20 @@ impl Attendant {
         Ok(())
     }
 
+    /// Tells when services wait for a core for most of the time, and when they no longer do.
+    fn look_at_machine(&mut self) {
+        let now = self.started.elapsed();
+        for (service, pid) in self.ears.listened() {
+            self.busy.look(service, pid, now);
+        }
+        if let Some(text) = self.busy.told(now) {
+            self.narrator.note("up", &text);
+        }
+    }
+
     /// Sees to the mission.
     fn watch_mission(&mut self) -> Result<()> {
-        let Some(watch) = &mut self.watch else {
-            return Ok(());
-        };
+        let watch = &mut self.watch;
         let act = watch.step(self.clock.now(), self.narrator.seen());
         if self.told.as_ref() != Some(watch.mission()) {
             // Report it before it is done: a successor must know of an order that was given.
@@ -331,10 +357,35 @@ impl Attendant {
         for pid in self.narrator.take_heard() {
             self.ears.heard(pid);
         }
-        for silence in self.ears.look(self.started.elapsed(), self.clock.now()) {
+        if self.signs_due <= Instant::now() {
+            self.signs_due = Instant::now() + SIGNS;
+            self.read_signs();
+        }
+        let chances = &mut self.chances;
+        let chance = |pid, piece| {
+            let of_it = chances.entry(pid);
+            of_it.or_insert_with(|| Chance::of_process(pid)).of(piece)
+        };
+        let silent = self
+            .ears
+            .look(self.started.elapsed(), self.clock.now(), chance);
+        for silence in silent {
             self.line.send(&Word::Silent(silence))?;
         }
         Ok(())
+    }
+
+    /// Hears the services that write a sign of life.
+    fn read_signs(&mut self) {
+        let (place, robot) = (self.bus.place(), self.bus.robot());
+        for (service, pid) in self.ears.writers() {
+            let sign = place.sign_of(robot, service.command());
+            if let Some(sign) = sign.filter(|sign| sign.pid == pid)
+                && self.signs.insert(pid, sign) != Some(sign)
+            {
+                self.ears.heard(pid);
+            }
+        }
     }
 
     fn pulse(&self) -> Result<()> {
@@ -360,8 +411,7 @@ impl Attendant {
         let looked = self.narrator.look(self.clock.now() - self.robot_start);
         self.complain(looked);
         self.tell_kept()?;
-        let mission = self.watch.iter().map(Watch::mission);
-        let delivered = mission.flat_map(Mission::delivered).copied();
+        let delivered = self.watch.mission().delivered().iter().copied();
         let misplaced = delivered.filter(|id| self.narrator.truly_delivered(*id) == Some(false));
         self.line.send(&Word::Misplaced(misplaced.collect()))?;
         self.pulse()?;
@@ -395,8 +445,9 @@ struct Complaints {
     count: u32,
     last: String,
     heard: bool,
-    /// Since when every look has met an error.
+    /// Since when every look has met an error, and how many there were.
     since: Option<Instant>,
+    looks: u32,
 }
 
 impl Complaints {
@@ -410,8 +461,15 @@ impl Complaints {
     }
 
     fn end_of_look(&mut self) {
-        if !core::mem::take(&mut self.heard) {
-            self.since = None;
+        match core::mem::take(&mut self.heard) {
+            true => self.looks += 1,
+            false => (self.since, self.looks) = (None, 0),
         }
+    }
+
+    /// Whether there has been nothing but errors for so long that they do not pass.
+    fn are_lasting(&self) -> bool {
+        let is_long = self.since.is_some_and(|since| since.elapsed() >= ERRORS);
+        is_long && self.looks >= BAD_LOOKS
     }
 }

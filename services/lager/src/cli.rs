@@ -147,7 +147,7 @@ pub enum Command {
   lager cancel 4711           fetch order 4711 no more")]
     Cancel {
         /// The order's number
-        #[arg(value_name = "ORDER")]
+        #[arg(value_name = "ORDER", allow_negative_numbers = true, value_parser = values::order)]
         id: u32,
     },
     /// Show the warehouse, its goods and the ways that are blocked, or say that goods are back
@@ -385,7 +385,7 @@ pub struct UpArgs {
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = values::speed, help_heading = "Body")]
     pub speed: Option<f64>,
     /// The external computer that runs at this address, instead of one that `up` starts
-    #[arg(long, value_name = "HOST:PORT", value_parser = values::address, conflicts_with = "no_station", help_heading = "Station")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::calls, conflicts_with = "no_station", help_heading = "Station")]
     pub station: Option<String>,
     /// The file of the secret by which the robot and its external computer prove who they are; it
     /// has mode 0600 [default: one of their own for a station that `up` starts]
@@ -401,7 +401,7 @@ pub struct UpArgs {
     pub no_station: bool,
     /// Where robots connect to the station that `up` starts [default: 127.0.0.1:7420, or a free
     /// port]
-    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::listens, conflicts_with_all = ["no_station", "station"], help_heading = "Station")]
     pub listen: Option<std::net::SocketAddr>,
     /// Where a GaG connects to it: the path of a unix socket [default: gag in the robot's folder of
     /// the bus]
@@ -409,17 +409,17 @@ pub struct UpArgs {
     pub gag: Option<PathBuf>,
     /// Where the operator panel answers browsers of this machine [default: 127.0.0.1:7410, or a
     /// free port]
-    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["headless", "no_station", "station"], help_heading = "Station")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::listens, conflicts_with_all = ["headless", "no_station", "station"], help_heading = "Station")]
     pub panel: Option<std::net::SocketAddr>,
     /// Do without a panel
     #[arg(long, help_heading = "Mission")]
     pub headless: bool,
     /// Show the robot's figures to Prometheus, there or at 127.0.0.1:7430
-    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, help_heading = "Outside")]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, value_parser = values::listens, help_heading = "Outside")]
     pub metrics: Option<std::net::SocketAddr>,
     /// Show the robot live to Foxglove, there or at 127.0.0.1:8765; `lager gateway --help` says
     /// more
-    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, help_heading = "Outside")]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, value_parser = values::listens, help_heading = "Outside")]
     pub foxglove: Option<std::net::SocketAddr>,
     /// Let real boards carry out --mission by themselves, with nobody in their way; a simulated or
     /// emulated robot does so anyway
@@ -444,7 +444,7 @@ pub struct UpArgs {
 #[derive(Debug, Args)]
 pub struct CommArgs {
     /// Where the external computer listens [default: as configured, or 127.0.0.1:7420]
-    #[arg(long, value_name = "HOST:PORT", value_parser = values::address, help_heading = "Station")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::calls, help_heading = "Station")]
     pub station: Option<String>,
     /// The file of the secret by which both prove who they are; it has mode 0600 [default: as
     /// configured]
@@ -459,12 +459,7 @@ pub struct CommArgs {
 #[derive(Debug, Args)]
 pub struct StationArgs {
     /// Where robots connect
-    #[arg(
-        long,
-        value_name = "HOST:PORT",
-        default_value = "127.0.0.1:7420",
-        help_heading = "Station"
-    )]
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7420", value_parser = values::listens, help_heading = "Station")]
     pub listen: std::net::SocketAddr,
     /// Where a GaG connects: the path of a unix socket [default: gag in the folder of the bus]
     #[arg(long, value_name = "SOCKET", help_heading = "Station")]
@@ -483,7 +478,7 @@ pub struct StationArgs {
     #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub robots_secret: Option<PathBuf>,
     /// Where the operator panel answers browsers [default: 127.0.0.1:7410, or a free port]
-    #[arg(long, value_name = "HOST:PORT", help_heading = "Station")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::listens, help_heading = "Station")]
     pub panel: Option<std::net::SocketAddr>,
     /// Do without a panel
     #[arg(long, conflicts_with = "panel", help_heading = "Station")]

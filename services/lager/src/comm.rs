@@ -41,8 +41,8 @@ pub fn prepare(config: &Config, args: &CommArgs) -> Result<(Config, CommConfig)>
     Ok((joined, wanted))
 }
 
-/// Ends this process when a call into the bus hangs: comm says nothing on the bus by which others
-/// could tell that it lives. `up` starts another one.
+/// Ends this process when a call into the bus hangs, with a sentence that says which. `up` starts
+/// another one.
 ///
 /// # Errors
 /// The system has no thread for it.

@@ -9,6 +9,7 @@ mod buttons;
 mod chip;
 mod documented;
 mod gateway;
+mod invalid;
 mod logic;
 mod realtime;
 mod station;
@@ -18,8 +19,8 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
-use lager_lines::{check_names, nearest};
+use anyhow::{Context, Result, anyhow, bail};
+use lager_lines::check_names;
 use lager_plant::{MOST_OBSTACLES, Warehouse};
 use lager_ports::{BusConfig, RobotName};
 use lager_station::files;
@@ -34,6 +35,7 @@ pub use logic::{LogicSection, PickBy};
 pub use realtime::RealtimeSection;
 pub use station::{CommSection, StationSection, WithoutLink};
 
+use crate::meant::meant;
 use crate::realtime::HIGHEST_PRIORITY;
 use crate::services::Service;
 
@@ -200,20 +202,23 @@ impl Config {
             None if Path::new("lager.toml").is_file() => Path::new("lager.toml"),
             None => return Ok(Self::default()),
         };
-        let invalid = || {
-            format!(
-                "the configuration {} is not valid; `lager config` prints one with every key",
-                path.display()
-            )
+        let text = match path == Path::new("-") {
+            true => {
+                let mut text = String::new();
+                let mut input = std::io::stdin().take(files::MOST_BYTES);
+                input.read_to_string(&mut text).map(|_| text)
+            }
+            false => files::read(path),
         };
-        if path != Path::new("-") {
-            return files::read_toml(path).with_context(invalid);
-        }
-        let mut text = String::new();
-        let input = std::io::stdin().take(files::MOST_BYTES);
-        let read = { input }.read_to_string(&mut text);
-        read.with_context(|| format!("cannot read the configuration {}", path.display()))?;
-        files::parse_toml(path, &text).with_context(invalid)
+        let text =
+            text.with_context(|| format!("cannot read the configuration {}", path.display()))?;
+        toml::from_str(&text).map_err(|error| {
+            anyhow!(
+                "the configuration {} is not valid: {}. `lager config` prints one with every key",
+                path.display(),
+                invalid::why(&text, &error)
+            )
+        })
     }
 
     /// Refuses values no process could work with, each with a sentence.
@@ -310,12 +315,6 @@ impl Config {
     }
 }
 
-/// The built-in warehouse that was meant, in the middle of a sentence.
-fn meant(name: &str) -> String {
-    let meant = nearest(name, Warehouse::BUILTIN.iter().copied());
-    meant.map_or_else(String::new, |meant| format!(" (did you mean `{meant}`?)"))
-}
-
 /// A warehouse by the name of a built-in one or by its file.
 pub fn warehouse(name: &str) -> Result<Warehouse> {
     if let Some(warehouse) = Warehouse::builtin(name) {
@@ -326,7 +325,7 @@ pub fn warehouse(name: &str) -> Result<Warehouse> {
         true => format!("the warehouse file {name} is not valid"),
         false => format!(
             "there is no warehouse `{name}`{}: the built-in ones are {}, anything else is read as a file",
-            meant(name),
+            meant(name, Warehouse::BUILTIN),
             Warehouse::BUILTIN.join(", ")
         ),
     })?;
@@ -479,6 +478,11 @@ mod tests {
         let error = warehouse("medium").expect_err("no such warehouse");
         assert!(
             error.to_string().contains("small, curved, large"),
+            "{error}"
+        );
+        let error = warehouse("smal").expect_err("no such warehouse");
+        assert!(
+            error.to_string().contains("did you mean `small`?"),
             "{error}"
         );
     }

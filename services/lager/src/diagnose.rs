@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use lager_ports::{Holder, Shortage};
+use lager_ports::{Holder, Shortage, called};
 
 use crate::config::Config;
 
@@ -64,7 +64,8 @@ pub fn causes(config: &Config) -> Vec<String> {
     let holders = place.up().remove(&bus.robot).unwrap_or_default();
     for Holder { what, pid, .. } in holders.iter().filter(|holder| holder.frozen) {
         causes.push(format!(
-            "the {what} of the robot `{}` (process {pid}) is frozen; `kill -CONT {pid}` lets it go on",
+            "the {} of the robot `{}` (process {pid}) is frozen; `kill -CONT {pid}` lets it go on",
+            called(what),
             bus.robot
         ));
     }

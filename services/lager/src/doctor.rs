@@ -4,6 +4,7 @@
 //! what dead processes left on the bus. This process opens nothing of the bus that could make it
 //! wait.
 
+mod ports;
 mod realtime;
 
 use std::fs;
@@ -18,6 +19,7 @@ use lager_ports::{Clock, NodeState};
 use rustix::process::{Resource, getrlimit};
 
 use crate::config::{Body, Config};
+use crate::overload::{self, Load};
 use crate::{diagnose, exit};
 
 /// Shared memory that a robot needs: 1 MiB when it runs alone, more with every observer.
@@ -45,6 +47,8 @@ type Check = (&'static str, Finding);
 /// How long the bus may take to be looked at, and to be mended.
 const LOOK: Duration = Duration::from_millis(2_500);
 const MEND: Duration = Duration::from_secs(60);
+/// The same where the machine is overloaded.
+const BUSY_LOOK: Duration = Duration::from_secs(20);
 
 /// Checks everything; fails when anything is bad.
 pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
@@ -53,6 +57,7 @@ pub fn run(config: &Config, fix: bool, as_json: bool) -> Result<ExitCode> {
         ("bus", bus_in_time(config, fix)),
         ("shared memory", shared_memory()),
         ("open files", open_files()),
+        ("load", load()),
         ("serial rights", serial(config)),
         ("original boards", original_boards(config)),
         ("emulated boards", emulated(config)),
@@ -175,10 +180,16 @@ fn bus_in_time(config: &Config, fix: bool) -> Finding {
             "cannot start a thread ({error}); see `ulimit -u` and `ulimit -v`"
         ));
     }
+    let patience = match (fix, overload::cause()) {
+        (true, _) => MEND,
+        (false, None) => LOOK,
+        (false, Some(_)) => BUSY_LOOK,
+    };
     found
-        .recv_timeout(if fix { MEND } else { LOOK })
+        .recv_timeout(patience)
         .unwrap_or_else(|_| {
-            let causes = diagnose::causes(config);
+            let mut causes = diagnose::causes(config);
+            causes.extend(overload::cause());
             let why = match causes.is_empty() {
                 true => "a process that was killed while it made a shared file leaves such a bus, and `lager doctor --fix` mends it".into(),
                 false => causes.join("; "),
@@ -273,10 +284,45 @@ fn serial(config: &Config) -> Finding {
             ));
         }
     }
-    Good(format!(
-        "{} and {} can be used",
-        config.serial.sensor.display(),
-        config.serial.steering.display()
+    let ports = [&config.serial.sensor, &config.serial.steering];
+    match ports::others(&ports, &own(config)).as_slice() {
+        [] => Good(format!(
+            "{} and {} can be used",
+            config.serial.sensor.display(),
+            config.serial.steering.display()
+        )),
+        others => {
+            let said: Vec<String> = others.iter().map(ports::Other::said).collect();
+            Bad(said.join("; "))
+        }
+    }
+}
+
+/// The processes of the robot itself: its bridge has the ports open, and so has what stands for
+/// boards.
+fn own(config: &Config) -> Vec<u32> {
+    let bus = config.bus().ok();
+    let holders = bus.and_then(|bus| bus.place().ok()?.up().remove(&bus.robot));
+    let holders = holders.into_iter().flatten();
+    holders.map(|holder| holder.pid).collect()
+}
+
+/// Whether anybody else lets the robot have a core.
+fn load() -> Finding {
+    let Some(load) = Load::now() else {
+        return Good("the kernel does not tell how busy this machine is".into());
+    };
+    if !load.is_too_much() {
+        return Good(format!("there is room: {}", load.said()));
+    }
+    let greedy = overload::greediest();
+    let who = match greedy.is_empty() {
+        true => "see `top` for who wants them".to_owned(),
+        false => greedy.join(", "),
+    };
+    Hint(format!(
+        "this machine is overloaded: {}; {who}; the robot stands when its services get no core in time, and goes on by itself; end what is not needed, or start it with `lager up --realtime 20`",
+        load.said()
     ))
 }
 

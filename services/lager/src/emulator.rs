@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use lager_plant::{Edge, HandsOff, Pose, Warehouse};
-use lager_ports::{Bus, Cause, Publisher, Shutdown};
+use lager_ports::{Bus, Cause, ChanceClock, Publisher, Shutdown};
 use lager_simulator::{Wish, answer, wish};
 use lager_topics::{Outcome, Truth, TruthPose, WorldAnswer, WorldAsk, WorldRequest};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -35,6 +35,9 @@ use crate::supervisor::{PATIENCE, ends_within};
 const KEPT_WAIT: Duration = Duration::from_millis(500);
 /// How long the emulator may take to do what hands do.
 const HANDS_WAIT: Duration = Duration::from_millis(500);
+/// For how long the emulator may tell nothing, though it could run, until that is said. The robot's
+/// time stands still meanwhile, so nothing is lost, and nobody else would notice.
+const STANDS: Duration = Duration::from_secs(5);
 /// How long to wait for a line before looking at the shutdown flag.
 const LOOK: Timespec = Timespec {
     tv_sec: 0,
@@ -75,6 +78,11 @@ struct Emulator {
     lines: Lines,
     /// What became of the last thing that hands did.
     answered: Option<Hands>,
+    /// How long it could run in all, what that was when it last told something, and whether that
+    /// it tells nothing has been said.
+    could_run: ChanceClock,
+    told_at: Duration,
+    is_said: bool,
 }
 
 /// A line of the emulator.
@@ -133,6 +141,9 @@ impl Emulator {
         let output = child.stdout.take().context("the emulator has no output")?;
         let input = child.stdin.take().context("the emulator has no input")?;
         let mut emulator = Self {
+            could_run: ChanceClock::of_process(child.id()),
+            told_at: Duration::ZERO,
+            is_said: false,
             child,
             input,
             output,
@@ -190,14 +201,31 @@ impl Emulator {
         (Ok(true), answer(tried))
     }
 
+    /// Says once that the emulator tells nothing.
+    fn watch(&mut self) {
+        let stands = self.could_run.look(STANDS) - self.told_at;
+        if stands >= STANDS && !core::mem::replace(&mut self.is_said, true) {
+            let pid = self.child.id();
+            tracing::warn!(
+                "the emulator (process {pid}) does not go on, so the robot's time stands still; if somebody has frozen it, `kill -CONT {pid}` lets it go on, and `kill -9 {pid}` has another one started"
+            );
+        }
+    }
+
     /// Publishes what the emulator tells, waiting for it a moment; whether it still runs.
     fn pass_on(&mut self, truth: &Publisher<TruthPose>) -> Result<bool> {
         let mut fds = [PollFd::new(&self.output, PollFlags::IN)];
         match poll(&mut fds, Some(&LOOK)) {
-            Ok(0) | Err(Errno::INTR) => return Ok(true),
+            Ok(0) => {
+                self.watch();
+                return Ok(true);
+            }
+            Err(Errno::INTR) => return Ok(true),
             Ok(_) => {}
             Err(errno) => return Err(errno).context("the emulator cannot be heard"),
         }
+        self.told_at = self.could_run.look(STANDS);
+        self.is_said = false;
         let mut chunk = [0; 4_096];
         let count = self.output.read(&mut chunk)?;
         self.lines.push(&chunk[..count]);

@@ -3,7 +3,7 @@
 
 use std::process::ExitCode;
 
-use lager_ports::LockError;
+use lager_ports::{LockError, OpenError, PortError};
 
 /// The failure's reason is on standard error.
 pub const FAILED: ExitCode = ExitCode::FAILURE;
@@ -20,6 +20,30 @@ pub struct Interrupted;
 
 /// The exit code after [`Interrupted`], as shells have it for Ctrl-C.
 pub const INTERRUPTED: i32 = 130;
+
+/// The exit code of a service that could not join the bus and may do better next time, as
+/// `sysexits.h` has it. Only its supervisor sees it.
+pub const TRY_AGAIN: i32 = 75;
+
+/// Whether another attempt may succeed: others were just making or removing what it wanted, which
+/// on a busy machine may take longer than it waits for.
+fn may_try_again(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        matches!(cause.downcast_ref(), Some(OpenError::Transport { .. }))
+            || matches!(
+                cause.downcast_ref(),
+                Some(PortError::Busy { .. } | PortError::Transport { .. })
+            )
+    })
+}
+
+/// The exit code of a service's error.
+pub fn code_of_service(error: &anyhow::Error) -> ExitCode {
+    match may_try_again(error) {
+        true => ExitCode::from(TRY_AGAIN as u8),
+        false => code(error),
+    }
+}
 
 /// The exit code of an error that ends the program.
 pub fn code(error: &anyhow::Error) -> ExitCode {

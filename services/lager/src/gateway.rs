@@ -8,7 +8,9 @@ use crate::cli::GatewayArgs;
 use crate::config::Config;
 use crate::exit;
 use crate::patience::Patience;
+use crate::reach;
 use crate::runtime::RuntimeFolder;
+use crate::services::Service;
 
 /// The configuration it runs with, and where it answers. Started beside a robot that is up it takes
 /// over that robot's clock, in which the boards' silence counts.
@@ -47,7 +49,9 @@ pub fn run(bus: &Bus, config: &Config, wanted: Addresses, shutdown: &Shutdown) -
     }
     // The wish to end is heeded here and not by the watch: there is nothing to wait for.
     let patience = Patience::new(config, &Shutdown::new())?;
-    Ok(gateway.run(bus, &patience.watchdog, shutdown)?)
+    let signs = RuntimeFolder::live_as(config, Service::Gateway)?;
+    let watchdog = patience.watchdog.showing(signs);
+    Ok(gateway.run(bus, &watchdog, shutdown)?)
 }
 
 /// Refuses what a gateway of `up` could not do, before anything runs, and says where what will be.
@@ -72,10 +76,12 @@ fn refused(error: GatewayError) -> anyhow::Error {
 fn told(at: Addresses) -> Vec<String> {
     let metrics = at
         .metrics
-        .map(|at| format!("figures for Prometheus are at http://{at}/metrics"));
+        .map(|at| reach::listed(at, |at| format!("http://{at}/metrics")))
+        .map(|at| format!("figures for Prometheus are at {at}"));
     let foxglove = at
         .foxglove
-        .map(|at| format!("Foxglove opens a connection to ws://{at}"));
+        .map(|at| reach::listed(at, |at| format!("ws://{at}")))
+        .map(|at| format!("Foxglove opens a connection to {at}"));
     metrics.into_iter().chain(foxglove).collect()
 }
 

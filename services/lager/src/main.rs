@@ -6,6 +6,7 @@
     reason = "in a binary, `pub` says what a module offers to the others"
 )]
 
+mod address;
 mod attend;
 mod bag;
 mod bench;
@@ -24,9 +25,12 @@ mod hands;
 mod keepers;
 mod kept;
 mod map;
+mod meant;
 mod mission;
 mod outcome;
+mod overload;
 mod patience;
+mod reach;
 mod realtime;
 mod report;
 mod runtime;
@@ -64,7 +68,10 @@ use crate::cli::{
 };
 use crate::config::{ChipSection, Config};
 use crate::patience::Patience;
+use crate::runtime::RuntimeFolder;
+use crate::services::Service;
 use crate::steer::{Obstacle, Operator};
+use crate::supervisor::Parent;
 use crate::voice::Speaker;
 
 fn main() -> ExitCode {
@@ -78,6 +85,7 @@ fn main() -> ExitCode {
         .unwrap_or_else(|error| error.exit());
     let mut speaker = Speaker::Tool;
     let mut looked_at = None;
+    let is_supervised = as_whom(&cli.command).is_some_and(|(_, parent)| parent.is_some());
     let begun = signals::outlive_long_files().and_then(|()| configure(&cli.global));
     let ended = begun.and_then(|config| {
         looked_at = Some(config.clone());
@@ -95,18 +103,33 @@ fn main() -> ExitCode {
         Err(error) => {
             voice::say(&speaker.line(&format!("{error:#}")));
             if exit::may_have_a_cause(&error) {
-                for cause in looked_at.iter().flat_map(diagnose::causes) {
+                let causes = looked_at.iter().flat_map(diagnose::causes);
+                let busy = patience::was_in_vain(&error)
+                    .then(overload::cause)
+                    .flatten();
+                for cause in causes.chain(busy) {
                     voice::say(&speaker.line(&cause));
                 }
             }
-            exit::code(&error)
+            match is_supervised {
+                true => exit::code_of_service(&error),
+                false => exit::code(&error),
+            }
         }
     }
 }
 
 /// As whom this process speaks on the terminal.
 fn own_voice(command: &Command, config: &Config) -> Speaker {
-    let (who, parent) = match command {
+    match as_whom(command) {
+        Some((who, parent)) => Speaker::service(who, parent, config),
+        None => Speaker::Tool,
+    }
+}
+
+/// The part of a robot that a command runs, and who has started it.
+fn as_whom(command: &Command) -> Option<(&'static str, Option<Parent>)> {
+    Some(match command {
         Command::Up(_) => ("up", None),
         Command::Attend(args) => ("up", args.parent),
         Command::Bridge(args) => ("bridge", args.parent),
@@ -116,9 +139,8 @@ fn own_voice(command: &Command, config: &Config) -> Speaker {
         Command::Comm(args) => ("comm", args.service.parent),
         Command::Station(args) => ("station", args.parent),
         Command::Gateway(args) => ("gateway", args.service.parent),
-        _ => return Speaker::Tool,
-    };
-    Speaker::service(who, parent, config)
+        _ => return None,
+    })
 }
 
 fn run(cli: Cli, mut config: Config) -> Result<ExitCode> {
@@ -384,9 +406,11 @@ fn service(
     let bus = config.bus()?;
     // Two of a kind would both steer; a supervised successor may meet its predecessor's end.
     let _lock = bus.place()?.lock(&bus.robot, role)?;
+    // The attendant listens whether it lives: for what it publishes, or for these signs.
     let watchdog = match role {
-        Role::Comm => comm::watch(shutdown)?,
-        // The attendant listens whether it lives.
+        Role::Comm => {
+            comm::watch(shutdown)?.showing(RuntimeFolder::live_as(config, Service::Comm)?)
+        }
         _ => Watchdog::default(),
     };
     let bus = watchdog.over("joining the bus", || Bus::open(&bus, role))?;

@@ -73,7 +73,7 @@ pub enum Act {
 pub struct Mission {
     /// The products that are not delivered yet, in the order given.
     open: Vec<i32>,
-    /// Those that are, in the order in which they were.
+    /// Those that are, in the order in which they were, and those that others have ordered.
     delivered: Vec<i32>,
     /// The orders that logic has not shown yet; none where a station gives them.
     unseen: VecDeque<(u32, i32)>,
@@ -112,7 +112,15 @@ impl Mission {
         self.unseen.retain(|(_, product)| !ordered(*product));
     }
 
-    /// The products delivered so far, in order.
+    /// No mission, only a look at what the robot delivers for whoever orders it.
+    pub fn of_others() -> Self {
+        Self {
+            begun: true,
+            ..Self::default()
+        }
+    }
+
+    /// The products delivered so far, in order, also those that others have ordered.
     pub fn delivered(&self) -> &[i32] {
         &self.delivered
     }
@@ -145,10 +153,12 @@ impl Mission {
     /// Takes down what logic has delivered.
     fn count(&mut self, status: &NavigatorStatus) {
         let before = self.counted.replace(status.delivered);
-        if before.is_some_and(|before| status.delivered > before)
-            && let Some(place) = self.open.iter().position(|open| *open == status.product)
-        {
-            self.delivered.push(self.open.remove(place));
+        if before.is_some_and(|before| status.delivered > before) {
+            let product = status.product;
+            self.delivered.push(product);
+            if let Some(place) = self.open.iter().position(|open| *open == product) {
+                self.open.remove(place);
+            }
         }
     }
 

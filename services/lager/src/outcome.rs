@@ -6,7 +6,7 @@ use serde::Serialize;
 /// How a mission ended.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
-    /// The products delivered, in order.
+    /// The products delivered, in order, whoever has ordered them.
     pub delivered: Vec<i32>,
     /// Robot time from start to end.
     pub sim_seconds: f64,
@@ -32,13 +32,17 @@ pub struct Outcome {
 impl Outcome {
     /// The outcome in words.
     pub fn sentence(&self) -> String {
+        let delivered = match self.delivered.len() {
+            0 => String::new(),
+            count => format!("; {count} delivered"),
+        };
         match &self.failure {
             // What it has not seen may be why.
             Some(why) if self.lost > 0 => format!(
-                "the mission failed: {why} ({} of {} frames were lost)",
+                "the mission failed: {why} ({} of {} frames were lost){delivered}",
                 self.lost, self.frames
             ),
-            Some(why) => format!("the mission failed: {why}"),
+            Some(why) => format!("the mission failed: {why}{delivered}"),
             None => format!(
                 "{} delivered in {:.1} s of robot time; {} frames, {} lost",
                 self.delivered.len(),

@@ -5,14 +5,15 @@
 //! sentence, when the bus does not answer.
 
 use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
-use lager_ports::{GivenUp, Shutdown, Watchdog};
+use lager_ports::{CallError, GivenUp, Shutdown, Watchdog};
 
 use crate::config::Config;
 use crate::voice::{self, Speaker};
-use crate::{cut_short, diagnose, exit};
+use crate::{cut_short, diagnose, exit, overload};
 
 /// How long one call into the bus may take, in real time, and a command that waits for the robot as
 /// a whole. The tool ends within three seconds.
@@ -22,6 +23,14 @@ const CALL: Duration = Duration::from_millis(2_800);
 const ANSWER: Duration = Duration::from_millis(2_500);
 /// How often the wish to end is looked at in a pause.
 const LOOK: Duration = Duration::from_millis(10);
+
+/// Whether this process has waited for the robot in vain.
+static IN_VAIN: AtomicBool = AtomicBool::new(false);
+
+/// Whether an error comes of a wait that was in vain: then a busy machine may be the cause.
+pub fn was_in_vain(error: &anyhow::Error) -> bool {
+    IN_VAIN.load(Ordering::Relaxed) || error.chain().any(|cause| cause.is::<CallError>())
+}
 
 /// What ends a tool that is given up.
 type End = Box<dyn FnOnce(GivenUp) + Send>;
@@ -67,7 +76,9 @@ impl Patience {
 
     /// Whether the command has waited for the robot for long enough.
     pub fn is_over(&self) -> bool {
-        Instant::now() >= self.give_up
+        let is_over = Instant::now() >= self.give_up;
+        IN_VAIN.fetch_or(is_over, Ordering::Relaxed);
+        is_over
     }
 
     /// How long the command may wait yet.
@@ -78,7 +89,9 @@ impl Patience {
     /// Whether a robot that was last heard then has been silent for too long. A command that has
     /// just begun waits no longer than for its first answer.
     pub fn is_silent(&self, heard: Option<Instant>) -> bool {
-        heard.map_or_else(|| self.is_over(), |heard| heard.elapsed() >= ANSWER)
+        let is_silent = heard.map_or_else(|| self.is_over(), |heard| heard.elapsed() >= ANSWER);
+        IN_VAIN.fetch_or(is_silent, Ordering::Relaxed);
+        is_silent
     }
 
     /// Waits that long, outside the watch over the bus, and then goes on under it with a new call:
@@ -124,7 +137,8 @@ fn give_up(config: &Config, why: GivenUp) {
         config.name,
         CALL.as_secs_f64()
     )));
-    let causes = diagnose::causes(config);
+    let mut causes = diagnose::causes(config);
+    causes.extend(overload::cause());
     if causes.is_empty() {
         voice::say(&Speaker::Tool.line(
             "a process that was killed while it made a shared file leaves such a bus; \

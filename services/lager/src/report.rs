@@ -6,8 +6,8 @@ use std::time::Duration;
 use anyhow::Result;
 use lager_ports::{Bus, Subscriber};
 use lager_topics::{
-    Event, EventKind, GoodState, Health, LinkHealth, LogThought, MissionEvent, MissionQueue, Mode,
-    NavStatus, NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, StopCause,
+    Event, EventKind, Goal, GoodState, Health, LinkHealth, LogThought, MissionEvent, MissionQueue,
+    Mode, NavStatus, NavigatorStatus, Phase, SensorDistance, SensorLine, SteeringState, StopCause,
     TruthPose,
 };
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,7 @@ pub struct Narrator {
     doing: String,
     now: Duration,
     notes: Vec<Note>,
+    told: Told,
     heard: Vec<u32>,
     joins_late: bool,
 }
@@ -44,6 +45,35 @@ pub struct Note {
     pub who: String,
     /// What happened.
     pub text: String,
+}
+
+/// For how long a line that is said again and again is told once.
+const TOLD: Duration = Duration::from_secs(10);
+
+/// What was told last. Somebody who answers a question wrongly is asked again, several times a
+/// second, and hears the same each time.
+#[derive(Debug, Default)]
+struct Told {
+    /// When each line was said last, and who said what.
+    lines: Vec<(Duration, String, String)>,
+}
+
+impl Told {
+    /// Whether the line was not said in the last while; it counts as said now.
+    fn is_new(&mut self, now: Duration, who: &str, text: &str) -> bool {
+        self.lines.retain(|(said, ..)| now < *said + TOLD);
+        let mut lines = self.lines.iter_mut();
+        match lines.find(|(_, speaker, line)| speaker == who && line == text) {
+            Some((said, ..)) => {
+                *said = now;
+                false
+            }
+            None => {
+                self.lines.push((now, who.to_owned(), text.to_owned()));
+                true
+            }
+        }
+    }
 }
 
 impl Narrator {
@@ -65,6 +95,7 @@ impl Narrator {
             doing: String::new(),
             now: Duration::ZERO,
             notes: Vec::new(),
+            told: Told::default(),
             heard: Vec::new(),
             joins_late,
         })
@@ -142,8 +173,14 @@ impl Narrator {
         wires + health.bus_lost + logic
     }
 
-    /// Adds a line.
+    /// Adds a line, unless it was told a moment ago.
     pub fn note(&mut self, who: &str, text: &str) {
+        if self.told.is_new(self.now, who, text) {
+            self.push(who, text);
+        }
+    }
+
+    fn push(&mut self, who: &str, text: &str) {
         self.notes.push(Note {
             at: self.now,
             who: who.to_owned(),
@@ -172,11 +209,11 @@ impl Narrator {
         for (name, before, now) in boards {
             let was_up = before.is_some_and(|before| before.up != 0);
             if now.up != 0 && !was_up {
-                self.note("bridge", &format!("the {name} board is connected"));
+                self.push("bridge", &format!("the {name} board is connected"));
             } else if now.up == 0 && was_up {
-                self.note("bridge", &format!("the {name} board is silent"));
+                self.push("bridge", &format!("the {name} board is silent"));
             } else if before.is_some_and(|before| before.reboots < now.reboots) {
-                self.note(
+                self.push(
                     "bridge",
                     &format!("the {name} board has restarted ({})", now.reset_cause),
                 );
@@ -184,8 +221,8 @@ impl Narrator {
         }
         if before.map(|before| before.mode) != Some(now.mode) {
             match now.mode.get() {
-                Some(Mode::Autonomous) => self.note("bridge", "logic steers"),
-                _ => self.note("bridge", "the operator steers"),
+                Some(Mode::Autonomous) => self.push("bridge", "logic steers"),
+                _ => self.push("bridge", "the operator steers"),
             }
         }
         let stop = |health: &Health| (health.stopped != 0).then_some(health.stopped_at_ns);
@@ -193,12 +230,12 @@ impl Narrator {
         if is.is_some() && is != was {
             let cause = now.stop_cause.get().unwrap_or(StopCause::WordDamaged);
             let said = describe(now.stop_origin.get(), cause, now.stopped_at_ns);
-            self.note(
+            self.push(
                 "bridge",
                 &format!("STOPPED {said}; `lager resume` lets the robot go on"),
             );
         } else if is.is_none() && was.is_some() {
-            self.note("bridge", "the stop is released");
+            self.push("bridge", "the stop is released");
         }
     }
 
@@ -217,6 +254,10 @@ impl Narrator {
             ),
             Some(Phase::Positioning) => "turns in to the station".into(),
             Some(Phase::Picking) => format!("is in position at product {}", status.product),
+            // An order may be taken back while the robot turns in, and a person may send it off.
+            Some(Phase::Leaving) if status.goal != Goal::Delivery => {
+                "leaves the station without goods".into()
+            }
             Some(Phase::Leaving) => format!("leaves the station with product {}", status.product),
             Some(Phase::Exiting) => "follows the line to the delivery station".into(),
             Some(Phase::Dropping) => format!("lays down product {}", status.product),
@@ -232,7 +273,8 @@ impl Narrator {
         };
         if self.doing != line {
             if !(self.doing.is_empty() && self.joins_late) {
-                self.note("robot", &line);
+                // Whatever it does after something else is new.
+                self.push("robot", &line);
             }
             self.doing = line;
         }
@@ -242,10 +284,10 @@ impl Narrator {
         let product = event.product;
         match event.kind.get() {
             Some(EventKind::GettingItem) => {
-                self.note("robot", &format!("fetches product {product}"));
+                self.push("robot", &format!("fetches product {product}"));
             }
             Some(EventKind::ItemDelivered) => {
-                self.note("robot", &format!("DELIVERED product {product}"));
+                self.push("robot", &format!("DELIVERED product {product}"));
             }
             Some(EventKind::Refused) => {
                 let why = event.failure;
@@ -274,5 +316,28 @@ impl Narrator {
             // What logic is doing tells these already.
             Some(EventKind::InPosition | EventKind::NextNode) | None => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_said_again_and_again_is_told_once_until_it_has_been_quiet() {
+        let mut told = Told::default();
+        let at = |ms: u64| Duration::from_millis(ms);
+        let mut lines = 0;
+        // Two sentences five times a second, for a minute.
+        for turn in 0..300 {
+            lines += usize::from(told.is_new(at(turn * 200), "robot", "does not have product 1"));
+            lines += usize::from(told.is_new(at(turn * 200), "logic", "\"the claw is empty\""));
+        }
+        assert_eq!(lines, 2);
+        assert!(told.is_new(at(60_000), "robot", "does not have product 2"));
+        assert!(told.is_new(at(60_000), "logic", "does not have product 2"));
+        let later = at(60_000) + TOLD + TOLD;
+        assert!(told.is_new(later, "robot", "does not have product 1"));
+        assert_eq!(told.lines.len(), 1, "nothing is kept for ever");
     }
 }

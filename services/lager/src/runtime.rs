@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use lager_lines::secret::Secret;
-use lager_ports::{Lock, Place, RobotName, StopPage, StopWord};
+use lager_ports::{Life, Lock, Place, RobotName, StopPage, StopWord};
 
 use crate::config::Config;
+use crate::services::Service;
 
 /// The effective configuration's file.
 const CONFIG: &str = "lager.toml";
@@ -58,6 +59,15 @@ impl RuntimeFolder {
             return Ok(None);
         }
         Config::load(Some(&file)).map(Some)
+    }
+
+    /// Begins to give signs of life as this service of `config`'s robot.
+    ///
+    /// # Errors
+    /// The folder takes none, or another process is that service.
+    pub fn live_as(config: &Config, service: Service) -> Result<Life> {
+        let bus = config.bus()?;
+        Ok(Life::begin(&bus.place()?, &bus.robot, service.command())?)
     }
 
     /// Where the own station of `config`'s robot listens for a GaG.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lager_ports::called;
 use serde::{Deserialize, Serialize};
 
 /// One of a robot's processes.
@@ -41,18 +42,33 @@ impl Service {
         }
     }
 
-    /// Whether it says something on the bus again and again as long as it lives. Comm does not, and
-    /// watches over its calls into the bus itself.
-    pub fn is_heard(self) -> bool {
-        !matches!(self, Self::Comm | Self::Station | Self::Gateway)
+    /// How others learn that it goes on.
+    pub fn sign(self) -> Sign {
+        match self {
+            Self::Attendant => Sign::Line,
+            Self::Simulator | Self::Emulator | Self::Bridge | Self::Logic => Sign::Topic,
+            Self::Comm | Self::Station | Self::Gateway => Sign::File,
+        }
     }
 }
 
+/// How a service shows that it goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// It publishes its state again and again, by the robot's clock.
+    Topic,
+    /// It writes when it last came round its loop (`lager_ports::Life`), by the real clock.
+    File,
+    /// It tells the supervisor itself.
+    Line,
+}
+
 impl fmt::Display for Service {
+    /// What people call it.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Self::Attendant => "attendant",
-            other => other.command(),
+            other => called(other.command()),
         })
     }
 }

@@ -19,7 +19,9 @@ use lager_station::{Listen, Queues, Server, ServerConfig, Warehouse};
 use crate::cli::StationArgs;
 use crate::config::{Config, StationSection};
 use crate::goods;
+use crate::reach;
 use crate::runtime::RuntimeFolder;
+use crate::services::Service;
 use crate::state::StateFolder;
 use crate::supervisor;
 
@@ -40,7 +42,9 @@ pub fn run(config: &Config, args: &StationArgs, shutdown: &Shutdown) -> Result<(
     let (server, panel) = match args.parent {
         Some(parent) => {
             supervisor::adopt(parent, shutdown)?;
-            let server = Server::open(supervised(config)?)?;
+            let mut server = Server::open(supervised(config)?)?;
+            let life = RuntimeFolder::live_as(config, Service::Station)?;
+            server.each_turn(move || life.goes_on());
             let panel = config.station.panel.and_then(|address| {
                 // Robots are served, whoever looks.
                 let panel = tokens(config).and_then(|tokens| {
@@ -98,7 +102,7 @@ fn alone(config: &Config, args: &StationArgs) -> Result<(Server, Option<Panel>)>
     })?;
     crate::say(&format!(
         "robots connect to {}, a GaG to {}; {told}; {}",
-        server.address()?,
+        reach::listed(server.address()?, |at| at.to_string()),
         gag.display(),
         match args.robots_secret {
             Some(_) => "robots prove who they are",
@@ -123,9 +127,9 @@ fn panel(address: Option<SocketAddr>, server: &Server) -> Result<Panel> {
     let panel = Panel::open(address, tokens.clone(), server.handle())?;
     let at = panel.address()?;
     crate::say(&format!(
-        "the panel is at {} for who drives, and at http://{at}/?token={} for who looks and stops",
-        driver_at(at, &tokens),
-        tokens.viewer
+        "the panel is at {} for who drives, and at {} for who looks and stops",
+        page_at(at, &tokens.driver),
+        page_at(at, &tokens.viewer)
     ))?;
     Ok(panel)
 }
@@ -144,9 +148,9 @@ pub fn tokens(config: &Config) -> Result<Tokens> {
     ))
 }
 
-/// The address at which a driver opens the panel.
-pub fn driver_at(address: SocketAddr, tokens: &Tokens) -> String {
-    format!("http://{address}/?token={}", tokens.driver)
+/// Where a page is opened that the `token` lets in.
+pub fn page_at(address: SocketAddr, token: &str) -> String {
+    reach::listed(address, |at| format!("http://{at}/?token={token}"))
 }
 
 /// Where a panel answers on this machine if nobody says: the usual address, or a port that is free.

@@ -259,8 +259,8 @@ impl Operator {
         })?;
         crate::say("calibrating for five seconds: move the robot over tape and floor")?;
         let clock = self.bus.clock();
-        let mut heard = None;
         let give_up = clock.now() + CALIBRATION;
+        let mut heard = None;
         while clock.now() < give_up {
             if let Some(health) = self.health.latest()? {
                 heard = Some(Instant::now());
@@ -318,7 +318,6 @@ impl Operator {
         };
         let mut accepted = false;
         let mut ended = None;
-        let mut heard = None;
         let mut renewed = clock.now();
         // When the steering board reported last.
         let mut reported = renewed;
@@ -350,7 +349,6 @@ impl Operator {
                 }
             }
             if let Some(health) = self.health.latest()?.map(|health| *health) {
-                heard = Some(Instant::now());
                 // An original board reports nothing, so its bridge has to do.
                 if health.steering.up != 0 && health.steering.version == Version::Original as u8 {
                     reported = clock.now();

@@ -23,11 +23,12 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use lager_ports::{Clock, Shutdown};
+use lager_ports::{ChanceClock, Clock, Shutdown};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{MemfdFlags, memfd_create};
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
 
+use crate::exit;
 use crate::services::Service;
 use crate::signals::Signals;
 
@@ -43,8 +44,10 @@ const SETTLED: Duration = Duration::from_secs(30);
 const MOST_FAILURES: u32 = 5;
 /// How often a child is looked at whose end the kernel does not tell.
 const LOOK: Duration = Duration::from_millis(50);
-/// How long a child may take to stop before it is killed.
+/// How long a child may take to stop before it is killed: so much time that it could run, and on a
+/// busy machine at most this many times as long.
 pub const PATIENCE: Duration = Duration::from_secs(2);
+const BUSY: u32 = 5;
 /// How long a killed child may take to end. Even a killed process has to run once more to end, and
 /// real-time load can keep it from its core.
 const LAST_PATIENCE: Duration = Duration::from_millis(500);
@@ -122,6 +125,8 @@ pub struct Start {
     pub resume: bool,
     /// Its standard output.
     pub output: Stdio,
+    /// Its standard error.
+    pub errors: Stdio,
 }
 
 /// A child ended without being asked to.
@@ -133,6 +138,8 @@ pub struct Ended {
     pub how: String,
     /// Whether it has ended by itself, not by a signal.
     pub by_itself: bool,
+    /// Whether it says that another attempt may succeed.
+    pub may_try_again: bool,
     /// Whether memory that it had mapped was gone.
     pub lost_memory: bool,
 }
@@ -180,21 +187,27 @@ impl Supervisor {
         let mut ended = Vec::new();
         for process in &mut self.processes {
             let status = process.running.as_mut().map(|each| each.child.try_wait());
-            let (how, by_itself, lost_memory) = match status {
-                Some(Ok(Some(status))) => {
-                    (status.to_string(), status.code().is_some(), faulted(status))
-                }
-                Some(Err(error)) => (error.to_string(), false, false),
+            let service = process.service;
+            let end = match status {
+                Some(Ok(Some(status))) => Ended {
+                    service,
+                    how: status.to_string(),
+                    by_itself: status.code().is_some(),
+                    may_try_again: status.code() == Some(exit::TRY_AGAIN),
+                    lost_memory: faulted(status),
+                },
+                Some(Err(error)) => Ended {
+                    service,
+                    how: error.to_string(),
+                    by_itself: false,
+                    may_try_again: false,
+                    lost_memory: false,
+                },
                 Some(Ok(None)) | None => continue,
             };
             // One that was killed may do better next time.
-            process.back_off(by_itself);
-            ended.push(Ended {
-                service: process.service,
-                how,
-                by_itself,
-                lost_memory,
-            });
+            process.back_off(end.by_itself);
+            ended.push(end);
         }
         ended
     }
@@ -256,6 +269,11 @@ impl Supervisor {
         let mut processes = self.processes.iter();
         let process = processes.find(|process| process.failures >= MOST_FAILURES)?;
         Some(process.service)
+    }
+
+    /// When it began, in ns of `CLOCK_MONOTONIC`.
+    pub fn started_ns(&self) -> u64 {
+        self.parent.started_ns
     }
 
     /// How many restarts there were in all.
@@ -362,6 +380,7 @@ impl Process {
                 .arg(parent.to_string())
                 .stdin(in_memory(config)?)
                 .stdout(start.output)
+                .stderr(start.errors)
                 // An own group, so that Ctrl-C reaches the supervisor alone, which stops the
                 // children in order.
                 .process_group(0);
@@ -389,17 +408,19 @@ impl Running {
     }
 }
 
-/// Whether `child`, whose end is told by `end`, ends within `patience`, and before Ctrl-C comes if
-/// that is listened for.
+/// Whether `child`, whose end is told by `end`, ends before it could have run for `patience`, and
+/// before Ctrl-C comes if that is listened for.
 pub fn ends_within(
     child: &mut Child,
     end: Option<&OwnedFd>,
     patience: Duration,
     mut signals: Option<&mut Signals>,
 ) -> bool {
-    let give_up = Instant::now() + patience;
+    let mut could_run = ChanceClock::of_process(child.id());
+    let give_up = Instant::now() + patience * BUSY;
     while matches!(child.try_wait(), Ok(None)) {
-        let left = give_up.saturating_duration_since(Instant::now());
+        let left = patience.saturating_sub(could_run.look(patience));
+        let left = left.min(give_up.saturating_duration_since(Instant::now()));
         let interrupted = signals
             .as_mut()
             .is_some_and(|signals| signals.interrupted());
@@ -456,10 +477,14 @@ pub fn adopt(parent: Parent, shutdown: &Shutdown) -> Result<()> {
     std::thread::Builder::new()
         .name("last-resort".into())
         .spawn(move || {
+            const LOOK: Duration = Duration::from_millis(100);
             while !shutdown.is_requested() {
-                std::thread::sleep(Duration::from_millis(100));
+                std::thread::sleep(LOOK);
             }
-            std::thread::sleep(PATIENCE);
+            let mut could_run = ChanceClock::of_process(std::process::id());
+            while could_run.look(LOOK) < PATIENCE {
+                std::thread::sleep(LOOK);
+            }
             std::process::exit(1);
         })?;
     Ok(())

@@ -1,64 +1,244 @@
-//! The lines that `up` shows while it runs; only this file writes them.
+//! The lines that `up` shows while it runs, in the order of their times; only this file writes
+//! them.
 //!
-//! A terminal that is held (Ctrl-S, a pager) takes no more, and a thread that writes to it waits.
-//! So a separate thread writes the lines, and drops those that it cannot write for long.
+//! ```text
+//!   this process, and the attendant ── notes ─┐
+//!                                             ├─> held for a moment, put in order ──> terminal
+//!   every service ─ standard error, a pipe ───┘
+//! ```
+//! What the robot does is seen a moment later than what a service says of itself. A terminal that
+//! is held (Ctrl-S, a pager) takes no more, and whoever writes to it waits. So a thread writes the
+//! lines, and drops those that it cannot write for long. A service writes into a pipe that never
+//! makes it wait. Traces that somebody has asked for are not lines: they go to standard error
+//! straight.
 
-use std::io::Write;
-use std::sync::mpsc::{self, Receiver, SyncSender};
-use std::time::Duration;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
+use std::os::fd::OwnedFd;
+use std::process::Stdio;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::pipe::{PipeFlags, pipe_with};
 
 use crate::report::Note;
 use crate::voice;
 
 /// How many lines may wait; at a few lines a second that is minutes.
 const WAITING: usize = 1_024;
+/// How long a line is held, so that an earlier one that comes later goes before it.
+const HELD: Duration = Duration::from_millis(150);
 /// How long the last lines may take.
 const LAST_LINES: Duration = Duration::from_millis(500);
 
 /// Where the lines go.
 pub struct Terminal {
-    lines: SyncSender<Note>,
+    lines: SyncSender<Told>,
     written: Receiver<()>,
+    /// Where services say what is wrong; `None` where that is traces.
+    services: Option<Services>,
+}
+
+/// The pipe of the services' standard error, and the end of its reader.
+struct Services {
+    mouth: OwnedFd,
+    read: Receiver<()>,
+}
+
+/// What the thread is told.
+enum Told {
+    Line(Line),
+    End,
+}
+
+/// A line with its time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Line {
+    at: Duration,
+    text: String,
+    /// It is a service's, and belongs on standard error.
+    is_fault: bool,
 }
 
 impl Terminal {
     /// Writes to standard output, or with `to_stderr` to standard error, so that standard output
-    /// stays free for the JSON line.
-    pub fn new(to_stderr: bool) -> Result<Self> {
-        let (lines, waiting) = mpsc::sync_channel::<Note>(WAITING);
+    /// stays free for the JSON line. `are_traces`: services write traces to standard error.
+    pub fn new(to_stderr: bool, are_traces: bool) -> Result<Self> {
+        let (lines, waiting) = mpsc::sync_channel(WAITING);
         let (done, written) = mpsc::sync_channel(1);
         std::thread::Builder::new()
             .name("terminal".into())
             .spawn(move || {
-                for note in waiting {
-                    show(&note, to_stderr);
-                }
+                write_all(&waiting, to_stderr);
                 let _ = done.send(());
             })
             .context("cannot start a thread for the terminal")?;
-        Ok(Self { lines, written })
+        let services = match are_traces {
+            true => None,
+            false => Some(Services::listen(lines.clone())?),
+        };
+        Ok(Self {
+            lines,
+            written,
+            services,
+        })
     }
 
-    /// Shows a line, at once or never.
-    pub fn show(&self, note: Note) {
-        let _ = self.lines.try_send(note);
+    /// The standard error of a service.
+    pub fn errors(&self) -> Stdio {
+        let mouth = self.services.as_ref();
+        let mouth = mouth.and_then(|services| services.mouth.try_clone().ok());
+        mouth.map_or_else(Stdio::inherit, Stdio::from)
+    }
+
+    /// Shows a line, in a moment or never.
+    pub fn show(&self, note: &Note) {
+        let _ = self.lines.try_send(Told::Line(Line {
+            at: note.at,
+            text: voice::line(note.at, &note.who, &note.text),
+            is_fault: false,
+        }));
     }
 
     /// Waits until the last line is written, but not for ever.
     pub fn finish(self) {
-        drop(self.lines);
+        if let Some(Services { mouth, read }) = self.services {
+            drop(mouth);
+            let _ = read.recv_timeout(LAST_LINES);
+        }
+        let _ = self.lines.try_send(Told::End);
         let _ = self.written.recv_timeout(LAST_LINES);
     }
 }
 
-fn show(note: &Note, to_stderr: bool) {
-    let line = voice::line(note.at, &note.who, &note.text);
+impl Services {
+    /// Listens to what is said, in a thread that ends with the last one who could say something.
+    fn listen(lines: SyncSender<Told>) -> Result<Self> {
+        let (ear, mouth) = pipe_with(PipeFlags::CLOEXEC).context("there is no pipe")?;
+        // A service never waits for this process: what does not fit in is lost.
+        fcntl_setfl(&mouth, OFlags::NONBLOCK)?;
+        let (done, read) = mpsc::sync_channel(1);
+        std::thread::Builder::new()
+            .name("services".into())
+            .spawn(move || {
+                let mut at = Duration::ZERO;
+                for text in BufReader::new(File::from(ear)).split(b'\n') {
+                    let Ok(text) = text else { break };
+                    let text = String::from_utf8_lossy(&text).into_owned();
+                    // What has no time of its own belongs to what was said before it.
+                    at = voice::time(&text).unwrap_or(at);
+                    let is_fault = true;
+                    let _ = lines.try_send(Told::Line(Line { at, text, is_fault }));
+                }
+                let _ = done.send(());
+            })
+            .context("cannot start a thread for what services say")?;
+        Ok(Self { mouth, read })
+    }
+}
+
+/// Writes what comes, until it is told the end.
+fn write_all(told: &Receiver<Told>, to_stderr: bool) {
+    let mut held = Held::default();
+    loop {
+        let next = match held.due() {
+            Some(due) => told.recv_timeout(due.saturating_duration_since(Instant::now())),
+            None => told.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        let lines = match next {
+            Ok(Told::Line(line)) => {
+                held.take(line, Instant::now());
+                continue;
+            }
+            Err(RecvTimeoutError::Timeout) => held.release(Instant::now()),
+            Ok(Told::End) | Err(RecvTimeoutError::Disconnected) => {
+                held.all().iter().for_each(|line| write(line, to_stderr));
+                return;
+            }
+        };
+        lines.iter().for_each(|line| write(line, to_stderr));
+    }
+}
+
+fn write(line: &Line, to_stderr: bool) {
     // A closed terminal is no reason to stop a robot.
-    let _ = if to_stderr {
-        writeln!(std::io::stderr(), "{line}")
-    } else {
-        writeln!(std::io::stdout(), "{line}")
+    let _ = match line.is_fault || to_stderr {
+        true => writeln!(std::io::stderr(), "{}", line.text),
+        false => writeln!(std::io::stdout(), "{}", line.text),
     };
+}
+
+/// Lines that are held, by time and then as they came.
+#[derive(Debug, Default)]
+struct Held {
+    lines: Vec<(Line, Instant)>,
+}
+
+impl Held {
+    fn take(&mut self, line: Line, now: Instant) {
+        let place = self.lines.partition_point(|(other, _)| other.at <= line.at);
+        self.lines.insert(place, (line, now + HELD));
+    }
+
+    /// When the next one has been held for long enough.
+    fn due(&self) -> Option<Instant> {
+        self.lines.iter().map(|(_, due)| *due).min()
+    }
+
+    /// The lines that are due, and those of earlier times.
+    fn release(&mut self, now: Instant) -> Vec<Line> {
+        let due = self.lines.iter().rposition(|(_, due)| *due <= now);
+        let count = due.map_or(0, |place| place + 1);
+        self.lines.drain(..count).map(|(line, _)| line).collect()
+    }
+
+    fn all(&mut self) -> Vec<Line> {
+        self.lines.drain(..).map(|(line, _)| line).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(at: u64, text: &str) -> Line {
+        Line {
+            at: Duration::from_millis(at),
+            text: text.to_owned(),
+            is_fault: false,
+        }
+    }
+
+    #[test]
+    fn lines_are_told_in_the_order_of_their_times_though_they_come_in_another() {
+        let start = Instant::now();
+        let ms = |count| start + Duration::from_millis(count);
+        let mut held = Held::default();
+        assert_eq!(held.due(), None);
+        held.take(line(300, "a warning"), ms(300));
+        held.take(line(260, "seen later"), ms(340));
+        held.take(line(300, "of the same time"), ms(345));
+        held.take(line(400, "the next one"), ms(400));
+        assert_eq!(held.due(), Some(ms(300) + HELD));
+        assert_eq!(held.release(ms(301)), []);
+        let told: Vec<String> = held
+            .release(ms(460))
+            .into_iter()
+            .map(|line| line.text)
+            .collect();
+        assert_eq!(told, ["seen later", "a warning"]);
+        assert_eq!(held.release(ms(495)).len(), 1);
+        assert_eq!(held.all(), [line(400, "the next one")]);
+    }
+
+    #[test]
+    fn none_is_held_longer_than_a_moment_whatever_its_time() {
+        let start = Instant::now();
+        let mut held = Held::default();
+        held.take(line(9_000_000, "of a clock that runs ahead"), start);
+        assert_eq!(held.release(start + HELD).len(), 1);
+        assert_eq!(held.due(), None);
+    }
 }

@@ -4,14 +4,15 @@ use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use lager_monitor::{EchoConfig, Payloads, PublishError, Publishing, ToolError, Tools};
 use lager_ports::{Bus, Watchdog};
-use lager_topics::{Role, TOPICS};
+use lager_topics::{Role, TOPICS, UnknownTopic};
 use serde_json::Value;
 
 use crate::cli::{TopicArgs, TopicCommand};
 use crate::config::Config;
+use crate::meant::unknown_topic;
 use crate::patience::Patience;
 use crate::{diagnose, exit};
 
@@ -43,7 +44,14 @@ pub fn run(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patie
         out: &mut BufWriter::new(std::io::stdout().lock()),
     };
     let shown = match args.command {
-        TopicCommand::List => tools.list(every_robot),
+        TopicCommand::List => {
+            let listed = tools.list(every_robot);
+            // A name of which there is nothing is nobody's.
+            if matches!(listed, Ok(0)) && !every_robot {
+                diagnose::must_be_up(config)?;
+            }
+            listed.map(drop)
+        }
         TopicCommand::Schema { .. } => unreachable!("it needs no bus"),
         TopicCommand::Info { topic } => tools.info(&topic),
         TopicCommand::Echo { watch, field } => {
@@ -80,12 +88,11 @@ pub fn run(config: &Config, args: TopicArgs, every_robot: bool, patience: &Patie
                 live,
             };
             let published = tools.publish(&topic, &what);
-            return ended(
-                published.map_err(|error| refused(error, payload.is_some())),
-                tools.out,
-            );
+            let refused = |error| refused(error, payload.is_some(), &bus, &patience.watchdog);
+            return ended(published.map_err(refused), tools.out);
         }
     };
+    let as_usage = |error| as_usage(error, &bus, &patience.watchdog);
     ended(shown.map_err(as_usage), tools.out)
 }
 
@@ -110,18 +117,35 @@ fn ended(shown: Result<()>, out: &mut impl Write) -> Result<()> {
     }
 }
 
-/// A field that there is not makes no sense, whatever the robot does.
-fn as_usage(error: ToolError) -> anyhow::Error {
+/// A field or a topic that there is not makes no sense, whatever the robot does.
+fn as_usage(error: ToolError, bus: &Bus, watchdog: &Watchdog) -> anyhow::Error {
     match error {
         ToolError::NoField(error) => exit::Usage(error.to_string()).into(),
+        ToolError::Unknown(UnknownTopic(topic)) => anyhow!(unknown(&topic, bus, watchdog)),
         error => error.into(),
     }
 }
 
-fn refused(error: PublishError, is_argument: bool) -> anyhow::Error {
+/// That there is no such topic, and which one may have been meant of those that are open.
+fn unknown(topic: &str, bus: &Bus, watchdog: &Watchdog) -> String {
+    let open = watchdog.over("listing the topics", || bus.topics());
+    let open: Vec<String> = open.into_iter().flatten().map(|topic| topic.name).collect();
+    unknown_topic(topic, open.iter().map(String::as_str))
+}
+
+fn refused(
+    error: PublishError,
+    is_argument: bool,
+    bus: &Bus,
+    watchdog: &Watchdog,
+) -> anyhow::Error {
     match error {
         PublishError::Payload { topic, error, .. } if is_argument => {
             exit::Usage(format!("{topic}: {error}")).into()
+        }
+        PublishError::Unknown(ref topic) => {
+            let meant = unknown(topic, bus, watchdog);
+            anyhow!("{error}; {meant}")
         }
         PublishError::Up {
             topic,

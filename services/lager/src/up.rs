@@ -4,7 +4,9 @@
 //! nothing there can hold it up or end it. It starts the services, restarts them, answers signals,
 //! and shows what it is told. Its child, the attendant (`attend.rs`), does what needs the bus.
 
+mod attendant;
 mod external;
+mod figures;
 mod resets;
 mod robot;
 
@@ -28,6 +30,7 @@ use crate::state::{self, StateFolder, World};
 use crate::station;
 use crate::stop;
 use crate::terminal::Terminal;
+use crate::voice;
 use external::External;
 use robot::Robot;
 
@@ -82,7 +85,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     notes.extend(kept.sentence());
 
     stop::at_start(&config)?;
-    let terminal = Terminal::new(args.json)?;
+    let terminal = Terminal::new(args.json, voice::are_traced(&config.log))?;
     let mut robot = Robot::new(config, lock, external, mission, signals, terminal)?;
     (robot.first_notes, robot.world) = (notes, world);
     if !args.exit_when_done {
@@ -172,14 +175,15 @@ fn products(config: &Config, args: &UpArgs) -> Result<Option<Vec<i32>>> {
 
 /// Puts what is to be fetched into the queue of the robot's own station. Where there is none, the
 /// robot's own queue is given it. What waits from before goes first, in the robot's own queue; the
-/// first product of the warehouse is fetched only if nothing else is to be.
+/// first product of the warehouse is fetched only if nothing else is to be. Real boards carry out
+/// what somebody orders, and that is counted.
 fn ordered(
     config: &Config,
     external: &External,
     mut products: Option<Vec<i32>>,
     args: &UpArgs,
     kept: &mut Kept,
-) -> Result<Option<Mission>> {
+) -> Result<Mission> {
     let known: Vec<i32> = config
         .warehouse()?
         .products
@@ -205,14 +209,15 @@ fn ordered(
     if is_own {
         station::prepare(config, &waiting)?;
     }
-    Ok(products.map(|products| match is_own {
-        true => Mission::of_station(&products),
-        false => {
+    Ok(match products {
+        None => Mission::of_others(),
+        Some(products) if is_own => Mission::of_station(&products),
+        Some(products) => {
             let mut mission = Mission::of_robot(&products, Hands::fresh_id());
             mission.leave(|product| kept.has(product));
             mission
         }
-    }))
+    })
 }
 
 /// Refuses before anything runs what the services would be refused, again and again, at every

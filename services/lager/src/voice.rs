@@ -43,6 +43,12 @@ pub fn line(time: Duration, who: &str, what: &str) -> String {
     format!("{:8.2} s  {who:9}  {what}", time.as_secs_f64())
 }
 
+/// The time that a line begins with, if it is one.
+pub fn time(line: &str) -> Option<Duration> {
+    let (seconds, _) = line.split_once(" s  ")?;
+    Duration::try_from_secs_f64(seconds.trim_start().parse().ok()?).ok()
+}
+
 /// Who speaks, and when his time began.
 #[derive(Clone, Copy, Debug)]
 pub enum Speaker {
@@ -114,11 +120,19 @@ pub fn begin(speaker: Speaker, log: &LogSection) -> Result<()> {
         None => tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .event_format(Lines(speaker))
+            // Nobody may have an ear for it, and what is wrong with that is said nowhere else.
+            .log_internal_errors(false)
             .with_filter(faults())
             .boxed(),
     };
     Registry::default().with(terminal).with(in_file).init();
     Ok(())
+}
+
+/// Whether processes of a robot write traces to standard error, and not lines.
+pub fn are_traced(log: &LogSection) -> bool {
+    let asked = std::env::var("RUST_LOG").is_ok_and(|text| !text.trim().is_empty());
+    log.file.is_none() && (log.json || asked)
 }
 
 /// What is shown unasked. That a viewer's connection breaks is no fault of the robot's.
@@ -144,6 +158,7 @@ where
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(to)
         .with_ansi(is_coloured)
+        .log_internal_errors(false)
         .with_span_events(FmtSpan::NEW | FmtSpan::CLOSE);
     match as_json {
         true => layer.json().flatten_event(true).with_filter(filter).boxed(),
@@ -259,6 +274,21 @@ mod tests {
             said.contains("`lager doctor`") && said.contains("report it"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn the_time_of_a_line_is_read_as_it_was_written() {
+        let at = Duration::from_millis(83_420);
+        assert_eq!(time(&line(at, "bridge", "WARNING: 7 s  of it")), Some(at));
+        for other in [
+            "",
+            "lager: 7",
+            "thread 'main' panicked",
+            "x s  y",
+            "-1 s  y",
+        ] {
+            assert_eq!(time(other), None, "{other}");
+        }
     }
 
     #[test]

@@ -55,10 +55,12 @@ pub enum Request {
 pub struct Begin {
     /// The robot's time at its start, once a clock has shown it.
     pub robot_start: Option<Duration>,
-    /// The mission, if there is one.
-    pub mission: Option<Mission>,
+    /// The mission, as far as it has come.
+    pub mission: Mission,
     /// What the robot is to be given back.
     pub kept: Kept,
+    /// Whether another attendant has told already what the robot does.
+    pub joins_late: bool,
     /// What is to be removed first.
     pub sweep: Sweep,
 }

@@ -10,10 +10,11 @@ use crate::{Count, ToolError, Tools};
 
 impl<W: Write> Tools<'_, W> {
     /// `topic list`: every topic that is open on the bus, of every robot or only of the tools'.
+    /// Returns how many there are.
     ///
     /// # Errors
     /// The bus cannot be looked at, or the output cannot be written.
-    pub fn list(&mut self, every_robot: bool) -> Result<(), ToolError> {
+    pub fn list(&mut self, every_robot: bool) -> Result<usize, ToolError> {
         let topics = self
             .watchdog
             .over("listing the topics", || self.bus.topics())?;
@@ -22,6 +23,7 @@ impl<W: Write> Tools<'_, W> {
             .filter(|topic| every_robot || topic.robot == *self.bus.robot())
             .collect();
         topics.sort_by(|a, b| a.robot.cmp(&b.robot));
+        let count = topics.len();
         if topics.is_empty() && !self.as_json {
             let of = match every_robot {
                 true => "on this bus".to_owned(),
@@ -56,7 +58,7 @@ impl<W: Write> Tools<'_, W> {
                 )?,
             }
         }
-        Ok(())
+        Ok(count)
     }
 
     /// `topic info`: what one topic carries, its limits, and who is on it now.

@@ -9,6 +9,10 @@
 //! ```
 //! Robot time is the bus's clock, so it runs at the speed of everybody else's. The loop works in
 //! batches, which costs little processor time and delays a byte by no more than a batch.
+//!
+//! While this process gets no core, its world stands still. A world that made up for lost time would
+//! drive on under commands that it could not hear meanwhile, and on a machine that is too slow for
+//! it each batch would take longer than the one before.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -30,6 +34,8 @@ use crate::truth::{message, world_state};
 const BATCH: Duration = Duration::from_micros(500);
 /// The longest sleep, in real time; also how late an opened port is noticed.
 const LONGEST_SLEEP: Duration = Duration::from_millis(5);
+/// How much the world makes up for at once, in real time; more than that it has stood still.
+const MADE_UP: Duration = Duration::from_millis(50);
 /// From one truth to the next, in robot time.
 const TRUTH_PERIOD: Duration = Duration::from_millis(20);
 /// How long a restarted simulator waits for its last truth, in real time.
@@ -113,6 +119,14 @@ pub fn run(bus: &Bus, config: &SimulatorConfig, shutdown: &Shutdown) -> Result<(
     shell.run(&bus.clock(), shutdown)
 }
 
+/// How much of the robot time that has passed, which took `real`, the world makes up for.
+fn made_up(passed: Duration, real: Duration) -> Duration {
+    match real > MADE_UP {
+        true => passed.mul_f64(MADE_UP.div_duration_f64(real)),
+        false => passed,
+    }
+}
+
 struct Line {
     wire: Wire,
     port: Port,
@@ -143,9 +157,11 @@ struct Shell {
 
 impl Shell {
     fn run(&mut self, clock: &Clock, shutdown: &Shutdown) -> Result<(), RunError> {
-        let (robot_start, clock_start) = (self.robot.now(), clock.now());
+        let mut looked = clock.now();
         while !shutdown.is_requested() {
-            let now = robot_start + clock.now().saturating_sub(clock_start);
+            let passed = clock.now().saturating_sub(looked);
+            looked += passed;
+            let now = self.robot.now() + made_up(passed, clock.real(passed));
             self.robot.advance_to(now);
             self.exchange();
             self.obey_hands()?;
@@ -214,5 +230,22 @@ impl Shell {
         };
         // An interrupted sleep is only a shorter one.
         let _ = poll(&mut fds, Some(&time));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_world_whose_process_got_no_core_has_stood_still() {
+        let ms = Duration::from_millis;
+        assert_eq!(made_up(Duration::ZERO, Duration::ZERO), Duration::ZERO);
+        assert_eq!(made_up(ms(5), ms(5)), ms(5));
+        assert_eq!(made_up(ms(50), ms(50)), ms(50));
+        assert_eq!(made_up(ms(3_000), ms(3_000)), ms(50));
+        // A clock that runs twenty times as fast.
+        assert_eq!(made_up(ms(600), ms(30)), ms(600));
+        assert_eq!(made_up(ms(60_000), ms(3_000)), ms(1_000));
     }
 }

@@ -14,6 +14,7 @@
 //!   there is nothing more of it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs;
 use std::io::{self, Read as _};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -161,10 +162,20 @@ pub struct Server {
     gates: BTreeMap<u64, Gate>,
     waiting: Waiting,
     next_link: u64,
+    turned: Turned,
     /// How long this thread was held up before this turn, if that makes old what waits.
     pause: Option<Duration>,
     /// Until when nobody is let in, where the system has no file to open for him; it has been said.
     rests: Option<Instant>,
+}
+
+/// What is done at each turn of the loop.
+struct Turned(Box<dyn FnMut() + Send>);
+
+impl fmt::Debug for Turned {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Turned")
+    }
 }
 
 impl Server {
@@ -237,6 +248,7 @@ impl Server {
             gates: BTreeMap::new(),
             waiting: Waiting::default(),
             next_link: 0,
+            turned: Turned(Box::new(|| {})),
             pause: None,
             rests: None,
         })
@@ -256,6 +268,11 @@ impl Server {
         self.handle.clone()
     }
 
+    /// Has `act` done at each turn, at least ten times a second: a sign that the station goes on.
+    pub fn each_turn(&mut self, act: impl FnMut() + Send + 'static) {
+        self.turned = Turned(Box::new(act));
+    }
+
     /// Serves until `shutdown` is set.
     ///
     /// # Errors
@@ -267,6 +284,7 @@ impl Server {
             let lets_in = self.rests.is_none_or(|until| Instant::now() >= until);
             let ready = self.wait(lets_in)?;
             let now = Instant::now();
+            (self.turned.0)();
             let pause = now.saturating_duration_since(turned);
             turned = now;
             self.pause = Some(pause).filter(|pause| *pause > LATEST_MOVE);

@@ -5,16 +5,17 @@
 //!
 //! By the real clock, since a service that hangs does so in real time. A piece counts no more than
 //! [`LONGEST_PIECE`], so time during which this process slept is not counted as a service's
-//! silence.
+//! silence. Nor is time in which the service was ready to run and got no core: a busy machine is no
+//! hanging service ([`lager_ports::Chance`]).
 //!
 //! By the robot's clock, since services publish by that: while an emulated body's clock stands
-//! still, or crawls, they have nothing to publish. Comm and station are not listened for, because
-//! they publish nothing that says they live. An emulator that has not published anything yet is
-//! judged by the real clock alone, because the robot's clock comes from the emulator.
+//! still, or crawls, they have nothing to publish. An emulator that has not published anything yet
+//! is judged by the real clock alone, because the robot's clock comes from the emulator; and so are
+//! those that write a sign of life instead, from their first one on.
 
 use std::time::Duration;
 
-use crate::services::Service;
+use crate::services::{Service, Sign};
 use crate::words::Silence;
 
 /// How long a service may be silent in real time.
@@ -23,6 +24,9 @@ const REAL: Duration = Duration::from_secs(2);
 const ROBOT: Duration = Duration::from_millis(500);
 /// How long an emulator may take until its first word, in real time.
 const EMULATOR: Duration = Duration::from_secs(5);
+/// From so long a silence on it is asked what a service could have run: that costs two looks at
+/// the kernel's files, and most are never silent for so long.
+const NOTICED: Duration = Duration::from_millis(200);
 /// The most that counts between two looks.
 const LONGEST_PIECE: Duration = Duration::from_millis(100);
 
@@ -39,9 +43,16 @@ struct Voice {
 
 impl Voice {
     fn is_too_long(&self) -> bool {
-        let hangs = self.real >= REAL && self.robot >= ROBOT;
-        let does_not_start = self.service == Service::Emulator && !self.was_heard;
-        hangs || does_not_start && self.real >= EMULATOR
+        match self.service.sign() {
+            Sign::Topic => {
+                let hangs = self.real >= REAL && self.robot >= ROBOT;
+                let does_not_start = self.service == Service::Emulator && !self.was_heard;
+                hangs || does_not_start && self.real >= EMULATOR
+            }
+            // One that could not write its first sign may work all the same.
+            Sign::File => self.was_heard && self.real >= REAL,
+            Sign::Line => false,
+        }
     }
 }
 
@@ -67,7 +78,13 @@ impl Ears {
         });
     }
 
-    /// The processes of the services, as far as they have been told.
+    /// The services that are listened for, with their processes.
+    pub fn listened(&self) -> Vec<(Service, u32)> {
+        let voices = self.voices.iter();
+        voices.map(|voice| (voice.service, voice.pid)).collect()
+    }
+
+    /// Their processes.
     pub fn processes(&self) -> Vec<u32> {
         self.voices.iter().map(|voice| voice.pid).collect()
     }
@@ -82,16 +99,31 @@ impl Ears {
         }
     }
 
+    /// Those that write a sign of life.
+    pub fn writers(&self) -> Vec<(Service, u32)> {
+        let mut writers = self.listened();
+        writers.retain(|(service, _)| service.sign() == Sign::File);
+        writers
+    }
+
     /// Looks at both clocks. A service that has been silent for too long is reported once.
-    pub fn look(&mut self, real: Duration, robot: Duration) -> Vec<Silence> {
+    /// `chance` says how much of a piece of real time a process could have run.
+    pub fn look(
+        &mut self,
+        real: Duration,
+        robot: Duration,
+        mut chance: impl FnMut(u32, Duration) -> Duration,
+    ) -> Vec<Silence> {
         let (real_before, robot_before) =
             self.looked.replace((real, robot)).unwrap_or((real, robot));
         let piece = real.saturating_sub(real_before).min(LONGEST_PIECE);
         let robot_piece = robot.saturating_sub(robot_before);
         let mut silent = Vec::new();
-        let heard = |voice: &&mut Voice| voice.service.is_heard();
-        for voice in self.voices.iter_mut().filter(heard) {
-            voice.real += piece;
+        for voice in &mut self.voices {
+            voice.real += match voice.real >= NOTICED {
+                true => chance(voice.pid, piece),
+                false => piece,
+            };
             voice.robot += robot_piece;
             if voice.is_too_long() && !voice.told {
                 voice.told = true;
@@ -112,13 +144,18 @@ mod tests {
 
     const TICK: Duration = Duration::from_millis(40);
 
+    /// The machine is idle: everybody could run all the time.
+    fn whole(_: u32, piece: Duration) -> Duration {
+        piece
+    }
+
     /// Looks for `seconds`, with the robot's clock `speed` times as fast.
     fn listen(ears: &mut Ears, from: &mut Duration, seconds: u64, speed: f64) -> Vec<Silence> {
         let end = *from + Duration::from_secs(seconds);
         let mut silent = Vec::new();
         while *from < end {
             *from += TICK;
-            silent.extend(ears.look(*from, from.mul_f64(speed)));
+            silent.extend(ears.look(*from, from.mul_f64(speed), whole));
         }
         silent
     }
@@ -165,8 +202,8 @@ mod tests {
         let mut ears = Ears::default();
         ears.started(Service::Bridge, 7);
         let slept = Duration::from_secs(60);
-        assert_eq!(ears.look(Duration::ZERO, Duration::ZERO), []);
-        assert_eq!(ears.look(slept, slept), []);
+        assert_eq!(ears.look(Duration::ZERO, Duration::ZERO, whole), []);
+        assert_eq!(ears.look(slept, slept, whole), []);
     }
 
     #[test]
@@ -189,5 +226,45 @@ mod tests {
         // At a hundredth of real time health comes every ten seconds.
         assert_eq!(listen(&mut ears, &mut now, 40, 0.01), []);
         assert_eq!(listen(&mut ears, &mut now, 20, 0.01).len(), 1);
+    }
+
+    #[test]
+    fn who_waits_for_a_core_is_not_silent_and_who_hangs_beside_him_is() {
+        let mut ears = Ears::default();
+        ears.started(Service::Bridge, 7);
+        ears.started(Service::Logic, 8);
+        ears.started(Service::Comm, 9);
+        ears.started(Service::Simulator, 10);
+        (7..=10).for_each(|pid| ears.heard(pid));
+        let mut now = Duration::ZERO;
+        let mut silent = Vec::new();
+        while now < Duration::from_secs(60) {
+            now += TICK;
+            // Bridge and comm get a hundredth of a core, logic hangs, and the body speaks.
+            ears.heard(10);
+            silent.extend(ears.look(now, now, |pid, piece| match pid {
+                7 | 9 => piece / 100,
+                _ => piece,
+            }));
+        }
+        let who: Vec<u32> = silent.iter().map(|silence| silence.pid).collect();
+        assert_eq!(who, [8]);
+    }
+
+    #[test]
+    fn who_writes_a_sign_of_life_is_judged_from_the_first_one_on_and_by_real_time() {
+        for service in [Service::Comm, Service::Station, Service::Gateway] {
+            let mut ears = Ears::default();
+            ears.started(service, 7);
+            assert_eq!(ears.writers(), [(service, 7)]);
+            let mut now = Duration::ZERO;
+            assert_eq!(listen(&mut ears, &mut now, 60, 1.0), []);
+            ears.heard(7);
+            // An emulated body's clock stands still, and it writes all the same.
+            assert_eq!(listen(&mut ears, &mut now, 1, 0.0), []);
+            let silent = listen(&mut ears, &mut now, 2, 0.0);
+            assert_eq!(silent.len(), 1, "{service}");
+            assert!(silent[0].was_heard);
+        }
     }
 }

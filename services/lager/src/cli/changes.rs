@@ -46,13 +46,13 @@ pub enum QueueChange {
     /// Take an order back; the one under way as long as its goods are not held
     Cancel {
         /// The order's number
-        #[arg(value_name = "ORDER")]
+        #[arg(value_name = "ORDER", allow_negative_numbers = true, value_parser = values::order)]
         id: u32,
     },
     /// Let a waiting order change places with the one before it
     Up {
         /// The order's number
-        #[arg(value_name = "ORDER")]
+        #[arg(value_name = "ORDER", allow_negative_numbers = true, value_parser = values::order)]
         id: u32,
     },
     /// Take all waiting orders back

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use clap::Args;
 use lager_gateway::{USUAL_FOXGLOVE, USUAL_METRICS};
 
-use super::ServiceArgs;
+use super::{ServiceArgs, values};
 
 /// `lager gateway`.
 #[derive(Debug, Args)]
@@ -22,10 +22,10 @@ and services/gateway/foxglove.json as a layout into Foxglove. --foxglove needs a
 built with `cargo build --release --features foxglove`.")]
 pub struct GatewayArgs {
     /// Where Prometheus reads figures [default: as configured, or 127.0.0.1:7430]
-    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, help_heading = "Outside")]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_METRICS, value_parser = values::listens, help_heading = "Outside")]
     pub metrics: Option<SocketAddr>,
     /// Where Foxglove looks on; without HOST:PORT at 127.0.0.1:8765 [default: as configured]
-    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, help_heading = "Outside")]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = USUAL_FOXGLOVE, value_parser = values::listens, help_heading = "Outside")]
     pub foxglove: Option<SocketAddr>,
     /// What every service is told
     #[command(flatten)]

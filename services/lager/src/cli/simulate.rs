@@ -21,7 +21,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "GOODS", value_delimiter = ',', allow_negative_numbers = true, value_parser = values::product, help_heading = "Mission")]
     pub mission: Vec<Called>,
     /// What is left of the battery's charge at the start [default: what the seed says]
-    #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(0..=100), help_heading = "Body")]
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = values::percent, help_heading = "Body")]
     pub battery: Option<u8>,
     /// Calibrate the line sensors first, as a person does who moves the robot over the tape
     #[arg(long, help_heading = "Body")]

@@ -14,10 +14,12 @@ use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use lager_lines::{Called, Name};
 use lager_ports::RobotName;
-use lager_topics::{TOPICS, UnknownTopic};
+use lager_topics::TOPICS;
 use lager_wire::{OperatorCommand, parse_code};
 
+pub use crate::address::{calls, listens};
 use crate::config::{BAUD_RATES, SPEEDS};
+use crate::meant::{meant, unknown_topic};
 
 /// The longest that `lager drive --seconds` holds, in seconds: a day.
 const LONGEST_DRIVE_S: f64 = 86_400.0;
@@ -27,20 +29,6 @@ const LONGEST_RUN_S: u64 = 365 * 86_400;
 const HZ: RangeInclusive<f64> = 0.001..=10_000.0;
 /// How many times as fast as it was recorded a recording is played.
 const RATES: RangeInclusive<f64> = 0.01..=100.0;
-
-/// A host and a port.
-pub fn address(text: &str) -> Result<String, String> {
-    match text.rsplit_once(':') {
-        Some((host, port))
-            if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0) =>
-        {
-            Ok(text.to_owned())
-        }
-        _ => Err(format!(
-            "`{text}` is no address; write a host and a port, as in 192.168.1.5:7420"
-        )),
-    }
-}
 
 /// What a robot is to fetch.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,7 +88,8 @@ fn command(
             .map(OperatorCommand::name)
             .collect();
         format!(
-            "`{text}` is no command; the names are {}, and the codes 1 to 9 for the wheels and 0xF1 to 0xFA for the arm",
+            "`{text}` is no command{}; the names are {}, and the codes 1 to 9 for the wheels and 0xF1 to 0xFA for the arm",
+            meant(text, names.iter().copied()),
             names.join(", ")
         )
     })
@@ -108,13 +97,9 @@ fn command(
 
 /// How many samples a second are published.
 pub fn hz(text: &str) -> Result<f64, String> {
-    let rate: f64 = text.parse().map_err(said)?;
-    if HZ.contains(&rate) {
-        Ok(rate)
-    } else {
-        let (least, most) = (HZ.start(), HZ.end());
-        Err(format!("give {least} to {most} samples a second"))
-    }
+    let (least, most) = (HZ.start(), HZ.end());
+    let rule = format!("give {least} to {most} samples a second");
+    number(text, |rate| HZ.contains(&rate), &rule)
 }
 
 /// A topic of the table, or one whose first part stands in no name there: such topics are other
@@ -126,7 +111,7 @@ fn topic(text: &str) -> Result<String, String> {
     if is_foreign || TOPICS.iter().any(|entry| entry.name == text) {
         Ok(text.to_owned())
     } else {
-        Err(UnknownTopic(text.to_owned()).to_string())
+        Err(unknown_topic(text, []))
     }
 }
 
@@ -230,28 +215,19 @@ pub fn baud(text: &str) -> Result<u32, String> {
 
 /// How many times as fast as real time.
 pub fn speed(text: &str) -> Result<f64, String> {
-    let speed = text.parse().map_err(said)?;
-    if SPEEDS.contains(&speed) {
-        Ok(speed)
-    } else {
-        Err(format!(
-            "the clock runs from {} to {} times as fast as real time (`lager simulate` runs faster)",
-            SPEEDS.start(),
-            SPEEDS.end()
-        ))
-    }
+    let rule = format!(
+        "the clock runs from {} to {} times as fast as real time (`lager simulate` runs faster)",
+        SPEEDS.start(),
+        SPEEDS.end()
+    );
+    number(text, |speed| SPEEDS.contains(&speed), &rule)
 }
 
 /// How long to drive, in seconds.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    let seconds: f64 = text.parse().map_err(said)?;
-    if seconds > 0.0 && seconds <= LONGEST_DRIVE_S {
-        Ok(seconds)
-    } else {
-        Err(format!(
-            "give a time of more than 0 and at most {LONGEST_DRIVE_S} seconds"
-        ))
-    }
+    let rule = format!("give a time of more than 0 and at most {LONGEST_DRIVE_S} seconds");
+    let fits = |seconds| seconds > 0.0 && seconds <= LONGEST_DRIVE_S;
+    number(text, fits, &rule)
 }
 
 /// How large a file may become, in MiB.
@@ -270,26 +246,19 @@ pub fn queue(text: &str) -> Result<usize, String> {
 
 /// How many times as fast as it was recorded.
 pub fn rate(text: &str) -> Result<f64, String> {
-    let rate: f64 = text.parse().map_err(said)?;
-    if RATES.contains(&rate) {
-        Ok(rate)
-    } else {
-        Err(format!(
-            "a recording is played from {} to {} times as fast as it was recorded",
-            RATES.start(),
-            RATES.end()
-        ))
-    }
+    let rule = format!(
+        "a recording is played from {} to {} times as fast as it was recorded",
+        RATES.start(),
+        RATES.end()
+    );
+    number(text, |rate| RATES.contains(&rate), &rule)
 }
 
 /// A moment of a recording, in seconds from its begin.
 pub fn moment(text: &str) -> Result<f64, String> {
-    let seconds: f64 = text.parse().map_err(said)?;
-    if (0.0..=LONGEST_RUN_S as f64).contains(&seconds) {
-        Ok(seconds)
-    } else {
-        Err("give the seconds from the recording's begin, 0 or more".to_owned())
-    }
+    let rule = "give the seconds from the recording's begin, 0 or more";
+    let fits = |seconds| (0.0..=LONGEST_RUN_S as f64).contains(&seconds);
+    number(text, fits, rule)
 }
 
 /// A constant of the navigator with its value.
@@ -306,11 +275,40 @@ fn whole<T: FromStr + PartialOrd>(
     range: RangeInclusive<T>,
     rule: &str,
 ) -> Result<T, String> {
-    // What is no number at all and what does not fit into one is refused by the same rule.
-    match text.parse() {
-        Ok(number) if range.contains(&number) => Ok(number),
-        _ => Err(format!("it must be a whole number: {rule}")),
+    if let Ok(number) = text.parse()
+        && range.contains(&number)
+    {
+        return Ok(number);
     }
+    let digits = text.strip_prefix(['-', '+']).unwrap_or(text);
+    let is_whole = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
+    Err(match is_whole {
+        true => format!("{text} does not fit: {rule}"),
+        false => format!("`{text}` is no whole number: {rule}"),
+    })
+}
+
+/// A number that `fits`, or `rule`.
+fn number(text: &str, fits: impl Fn(f64) -> bool, rule: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(number) if fits(number) => Ok(number),
+        Ok(_) => Err(format!("{text} does not fit: {rule}")),
+        Err(_) => Err(format!("`{text}` is no number: {rule}")),
+    }
+}
+
+/// A share of a whole, in percent.
+pub fn percent(text: &str) -> Result<u8, String> {
+    whole(text, 0..=100, "give 0 to 100 percent")
+}
+
+/// The number of an order, as `lager queue` shows it.
+pub fn order(text: &str) -> Result<u32, String> {
+    whole(
+        text,
+        0..=u32::MAX,
+        "`lager queue` shows the orders' numbers",
+    )
 }
 
 fn said(error: impl Display) -> String {
@@ -322,7 +320,7 @@ mod tests {
     use clap::Parser;
 
     use super::seeds;
-    use crate::cli::Cli;
+    use crate::cli::{Cli, Command};
 
     /// What `lager` says to `words`, which it refuses as wrong usage.
     fn refusal(words: &[&str]) -> String {
@@ -370,8 +368,49 @@ mod tests {
             (&["up", "--seed", "-1"], "seeds start at 0"),
             (&["drive", "forward", "--seconds", "-1"], "more than 0"),
             (&["drive", "forward", "--seconds", "nan"], "more than 0"),
-            (&["gains", "-1", "2"], "0 to 255"),
-            (&["gains", "1", "256"], "0 to 255"),
+            (
+                &["drive", "forward", "--seconds", "abc"],
+                "`abc` is no number: give a time",
+            ),
+            (&["drive", "forwrad"], "did you mean `forward`?"),
+            (&["arm", "sqeeze"], "did you mean `squeeze`?"),
+            (
+                &["gains", "-1", "2"],
+                "-1 does not fit: a gain is from 0 to 255",
+            ),
+            (
+                &["gains", "300", "2"],
+                "300 does not fit: a gain is from 0 to 255",
+            ),
+            (&["gains", "two", "2"], "`two` is no whole number: a gain"),
+            (&["gains", "1", "2.5"], "`2.5` is no whole number: a gain"),
+            (&["cancel", "last"], "`lager queue` shows"),
+            (&["queue", "up", "-1"], "`lager queue` shows"),
+            (&["simulate", "--battery", "101"], "0 to 100 percent"),
+            (&["up", "--panel", "wherever"], "as in 7410"),
+            (&["up", "--listen", "localhost"], "as in 7410"),
+            (&["up", "--metrics", "70000"], "as in 7410"),
+            (&["station", "--panel", ":7410"], "as in 7410"),
+            (&["gateway", "--foxglove", "x:y"], "as in 7410"),
+            (&["up", "--station", "somewhere"], "as in 7420"),
+            (&["comm", "--station", "192.168.1.5:0"], "as in 7420"),
+            (&["topic", "hz", "nav/statsu"], "did you mean `nav/status`?"),
+            (
+                &["topic", "pub", "weather/now", "--rate", "fast"],
+                "`fast` is no number",
+            ),
+            (
+                &["up", "--speed", "fast"],
+                "`fast` is no number: the clock runs",
+            ),
+            (
+                &["bag", "play", "x.mcap", "--rate", "fast"],
+                "`fast` is no number",
+            ),
+            (
+                &["bag", "play", "x.mcap", "--from", "begin"],
+                "`begin` is no number",
+            ),
             (&["bench", "hop", "--runs", "-2"], "one run"),
             (&["--name", "R 1", "stop"], "only a-z"),
             (&["bag", "record", "--topic", "sensor/lime"], "sensor/line"),
@@ -385,5 +424,27 @@ mod tests {
             let told = refusal(words);
             assert!(told.contains(said), "{words:?}: {told}");
         }
+    }
+
+    #[test]
+    fn a_port_alone_is_one_of_this_machine() {
+        let words = [
+            "lager",
+            "up",
+            "--panel",
+            "7411",
+            "--listen",
+            "localhost:7421",
+        ];
+        let more = ["--metrics", "7431", "--foxglove", "[::1]:8766"];
+        let cli = Cli::try_parse_from(words.iter().chain(&more)).expect("right usage");
+        let Command::Up(args) = cli.command else {
+            panic!("another command");
+        };
+        let at = |text: &str| Some(text.parse().expect("an address"));
+        assert_eq!(args.panel, at("127.0.0.1:7411"));
+        assert_eq!(args.listen, at("127.0.0.1:7421"));
+        assert_eq!(args.metrics, at("127.0.0.1:7431"));
+        assert_eq!(args.foxglove, at("[::1]:8766"));
     }
 }

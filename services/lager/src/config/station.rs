@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use lager_comm::LinkLost;
 use serde::{Deserialize, Serialize};
 
+use crate::address::in_config;
+
 /// `[station]`: the external computer that the robot talks to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -16,7 +18,10 @@ pub struct StationSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
     /// Where robots connect to a station that `up` starts; unset, `up` chooses.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "in_config"
+    )]
     pub listen: Option<SocketAddr>,
     /// The socket at which a GaG connects to it; unset, it is in the robot's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -28,7 +33,10 @@ pub struct StationSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub queue: Option<PathBuf>,
     /// Where a station that `up` starts shows its panel; unset, `up` chooses.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "in_config"
+    )]
     pub panel: Option<SocketAddr>,
 }
 

@@ -39,20 +39,30 @@ fn seconds(count: u64) -> Duration {
 }
 
 #[test]
-fn what_a_station_orders_is_counted_in_any_order_and_what_others_order_is_not() {
+fn what_is_delivered_is_counted_in_any_order_and_what_others_order_ends_no_mission() {
     let mut watch = simulated(Mission::of_station(&[3, 1, 3]));
     for (count, product) in [(0, 0), (1, 1), (2, 7), (3, 3)] {
         let seen = seen(Phase::BackingOff, delivered(count, product));
         assert!(watch.step(seconds(1), &seen).is_none());
     }
-    assert_eq!(watch.mission().delivered(), [1, 3]);
+    assert_eq!(watch.mission().delivered(), [1, 7, 3]);
     // A successor goes on from there; one more look at the same is no delivery.
     let mut heir = simulated(watch.mission().clone());
     heir.step(seconds(2), &seen(Phase::BackingOff, delivered(3, 3)));
     assert_eq!(heir.mission().outcome(), None);
     heir.step(seconds(3), &seen(Phase::BackingOff, delivered(4, 3)));
     assert_eq!(heir.mission().outcome(), Some(Ok(())));
-    assert_eq!(heir.mission().delivered(), [1, 3, 3]);
+    assert_eq!(heir.mission().delivered(), [1, 7, 3, 3]);
+}
+
+#[test]
+fn without_a_mission_of_its_own_it_counts_what_others_order_and_does_nothing() {
+    let mut watch = Watch::new(Mission::of_others(), Helper::Person);
+    for (count, product) in [(4, 9), (5, 9), (5, 9), (6, 2)] {
+        let seen = seen(Phase::BackingOff, delivered(count, product));
+        assert!(watch.step(seconds(1), &seen).is_none());
+    }
+    assert_eq!(watch.mission().delivered(), [9, 2]);
 }
 
 #[test]

@@ -21,9 +21,9 @@
 //! the same when a station dies, and a robot that connects meanwhile waits for its successor.
 //!
 //! Station and comm end after bridge and logic, and no process that moves the robot waits for them.
-//! They publish nothing that says they live. Comm ends itself when a call does not return. The
-//! station joins no bus, so no damaged memory can hold it, and nobody checks whether it answers. A
-//! robot that is driven through it stops after 150 ms of its silence; any other goes on.
+//! They publish nothing that says they live, so they write signs of life instead, and one that does
+//! not is replaced. A robot that is driven through them stops after 150 ms of the station's silence;
+//! any other goes on.
 
 use std::fs;
 use std::net::{SocketAddr, TcpListener};
@@ -37,6 +37,7 @@ use lager_panel::Tokens;
 
 use crate::config::{Config, StationSection};
 use crate::goods;
+use crate::reach;
 use crate::runtime::{NameLock, RuntimeFolder};
 use crate::station;
 
@@ -82,17 +83,38 @@ pub fn choose(config: &mut Config, lock: &mut NameLock, headless: bool) -> Resul
         None => None,
     };
     let address = config.station.panel.take().filter(|_| !headless);
+    if let Some(address) = address
+        && external.listener.is_none()
+    {
+        external.panel = Some(without(address, external.panel));
+        return Ok(external);
+    }
     let Some(tokens) = tokens.filter(|_| !headless) else {
         return Ok(external);
     };
     external.panel = Some(match panel(address) {
         Ok(address) => {
             config.station.panel = Some(address);
-            format!("the panel is at {}", station::driver_at(address, &tokens))
+            format!(
+                "the panel is at {}",
+                station::page_at(address, &tokens.driver)
+            )
         }
         Err(error) => format!("there is no panel: {error:#}"),
     });
     Ok(external)
+}
+
+/// A panel is shown by a station, and this robot has none of its own: where the one is that there
+/// is.
+fn without(wanted: SocketAddr, other: Option<String>) -> String {
+    let why = format!(
+        "there is no panel at {wanted}: only a station of this robot's own would show one there (--listen ADDRESS starts one)"
+    );
+    match other {
+        Some(other) => format!("{why}; {other}"),
+        None => why,
+    }
 }
 
 /// Where the panel is to answer.
@@ -162,7 +184,7 @@ fn station_for(config: &mut Config) -> Result<External> {
         config.station.address = Some(address);
         config.comm.secret.clone_from(&theirs.comm.secret);
         let panel = theirs.station.panel.zip(station::tokens(&theirs).ok());
-        let panel = panel.map(|(at, tokens)| station::driver_at(at, &tokens));
+        let panel = panel.map(|(at, tokens)| station::page_at(at, &tokens.driver));
         return Ok(External {
             listener: None,
             panel: panel.map(|panel| format!("the panel is at {panel}")),
@@ -189,10 +211,15 @@ fn none(config: &mut Config, why: &anyhow::Error) -> External {
 }
 
 fn own(config: &mut Config, listener: TcpListener, why: &str) -> External {
-    let address = listener.local_addr().map(|address| address.to_string());
-    let address = address.unwrap_or_else(|_| StationSection::USUAL.to_owned());
-    let told = format!("the external computer listens at {address}{why}");
-    config.station.address = Some(address);
+    let address = listener.local_addr();
+    let at = address.as_ref();
+    let at = at.map_or_else(
+        |_| StationSection::USUAL.to_owned(),
+        |at| reach::listed(*at, |at| at.to_string()),
+    );
+    let told = format!("the external computer listens at {at}{why}");
+    let address = address.map(|address| address.to_string());
+    config.station.address = Some(address.unwrap_or_else(|_| StationSection::USUAL.to_owned()));
     External {
         listener: Some(listener),
         panel: None,

@@ -4,11 +4,13 @@
 //!            swept             joined the bus
 //!  attendant ------> the body ----------------> station, comm, bridge, logic
 //!     ^                                             │
-//!     +-- all ended, in order; what is left swept <-+ the bus is damaged (at most three times)
+//!     +-- all ended, in order; what is left swept <-+ the bus is damaged
+//!         after a while, each time a longer one (`resets.rs`)
 //! ```
 //! A service that ends or falls silent is restarted alone. The bus counts as damaged where that
 //! would not help: a process that hangs before its first sample, or whose memory was gone, has met
-//! shared files that its successor would meet too.
+//! shared files that its successor would meet too. On a busy machine all of it takes longer and
+//! nothing is damaged, so a process is silent only for as long as it could have run.
 //!
 //! Every wait here is one sleep that children, signals and the attendant end
 //! ([`Supervisor::wait`]).
@@ -18,16 +20,19 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use lager_ports::{ChanceClock, LockError};
 
+use super::attendant::Attendant;
 use super::external::External;
-use super::resets::{MOST, Remedy, Resets};
+use super::figures::Figures;
+use super::resets::{MOST, Remedy, Resets, SELDOM};
 use crate::config::Config;
 use crate::kept::{Kept, KeptFile};
 use crate::mission::Mission;
 use crate::outcome::Outcome;
 use crate::report::Note;
 use crate::runtime::NameLock;
-use crate::services::Service;
+use crate::services::{Service, Sign};
 use crate::signals::Signals;
 use crate::state::World;
 use crate::supervisor::{Ended, PATIENCE, Start, Supervisor};
@@ -40,13 +45,12 @@ const LOOK: Duration = Duration::from_millis(500);
 const HAND_OVER: Duration = Duration::from_millis(100);
 /// How long the attendant may be silent.
 const SILENCE: Duration = Duration::from_secs(2);
+/// How often in a row an attendant may end by itself before it has joined the bus.
+const MOST_REFUSALS: u32 = 5;
 /// How long an emulated body may take until it has a clock.
 const BODY_START: Duration = Duration::from_secs(30);
 /// How long a service may take to stop on a damaged bus; a bridge stops the motors in less.
 const HASTE: Duration = Duration::from_millis(500);
-
-/// How long after a pulse an emulated body's time is taken to go on.
-const PULSE: Duration = Duration::from_millis(200);
 
 /// A robot that is up.
 pub struct Robot {
@@ -59,7 +63,7 @@ pub struct Robot {
     owed: Vec<Owed>,
     /// The external computer, and where it listens if it is this robot's own.
     external: External,
-    mission: Option<Mission>,
+    mission: Mission,
     /// What the robot is still to be given back, all that is to be kept, and where.
     left: Kept,
     kept: Kept,
@@ -74,14 +78,22 @@ pub struct Robot {
     signals: Signals,
     terminal: Terminal,
     resets: Resets,
+    /// The attendants in a row that ended by themselves before they had joined.
+    refusals: u32,
     stage: Stage,
     stage_began: Instant,
+    /// How long the body could run in this stage.
+    body: Option<ChanceClock>,
     folder_looked: Instant,
+    /// How long an attendant could serve successors, in all.
+    attended: Duration,
 }
 
 /// How far the robot has been started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// Nothing runs: the bus did not hold, and is tried again then.
+    Resting(Instant),
     /// The attendant removes what is left on the bus.
     Sweeping,
     /// The body runs, and the attendant joins the bus with the body's clock.
@@ -90,34 +102,12 @@ enum Stage {
     Whole,
 }
 
-/// The attendant, as far as it is heard.
-struct Attendant {
-    line: Option<Line>,
-    joined: bool,
-    /// How long it has been silent, and when that was looked at.
-    silent: Duration,
-    looked: Instant,
-}
-
 /// A service that has ended, and what is kept for its successor.
 struct Owed {
     service: Service,
-    ended: Instant,
+    /// What `Robot::attended` was when it ended.
+    since: Duration,
     served: bool,
-}
-
-/// What the robot has done, over the lives of all attendants.
-struct Figures {
-    started: Instant,
-    robot_start: Option<Duration>,
-    robot_time: Duration,
-    told: Instant,
-    last: Pulse,
-    /// Frames of the attendants before this one, and those that they lost themselves.
-    frames: u64,
-    lost: u64,
-    /// Frames lost on the wires and by the services.
-    lost_elsewhere: u64,
 }
 
 impl Robot {
@@ -126,13 +116,21 @@ impl Robot {
         config: Config,
         lock: NameLock,
         external: External,
-        mission: Option<Mission>,
+        mission: Mission,
         signals: Signals,
         terminal: Terminal,
     ) -> Result<Self> {
         let now = Instant::now();
+        let supervisor = Supervisor::new(toml::to_string(&config)?)?;
+        // The services' times begin with their supervisor. Only an emulated body has a time of its
+        // own.
+        let real_start = Duration::from_nanos(supervisor.started_ns());
+        let robot_start = match config.chip.clock {
+            None => Some(real_start.mul_f64(config.speed)),
+            Some(_) => None,
+        };
         Ok(Self {
-            supervisor: Supervisor::new(toml::to_string(&config)?)?,
+            supervisor,
             lock,
             config,
             attendant: Attendant::absent(),
@@ -145,13 +143,16 @@ impl Robot {
             first_notes: Vec::new(),
             world: None,
             misplaced: Vec::new(),
-            figures: Figures::new(now),
+            figures: Figures::new(now, robot_start),
             signals,
             terminal,
             resets: Resets::default(),
+            refusals: 0,
             stage: Stage::Sweeping,
             stage_began: now,
+            body: None,
             folder_looked: now,
+            attended: Duration::ZERO,
         })
     }
 
@@ -174,16 +175,24 @@ impl Robot {
         }
         self.begin()?;
         while !self.signals.end_asked() {
-            if let Some(why) = self.turn()? {
-                self.begin_again(&why)?;
+            if let Stage::Resting(until) = self.stage {
+                if Instant::now() >= until {
+                    self.try_again(exit_when_done)?;
+                }
+            } else if let Some(why) = self.turn()? {
+                self.begin_again(&why, exit_when_done)?;
             }
-            let ended = self.mission.as_ref().and_then(Mission::outcome).is_some();
+            let ended = self.mission.outcome().is_some();
             let over = ended || self.supervisor.hopeless().is_some();
             // A damaged bus is swept before the end, too.
-            if exit_when_done && over && self.stage != Stage::Sweeping {
+            let is_swept = matches!(self.stage, Stage::Joining | Stage::Whole);
+            if exit_when_done && over && is_swept {
                 break;
             }
             self.wait();
+        }
+        if matches!(self.stage, Stage::Resting(_)) {
+            self.leave();
         }
         Ok(())
     }
@@ -196,7 +205,7 @@ impl Robot {
         let hopeless = self.supervisor.hopeless();
         // The robot is stopped before anything else is looked at.
         self.stop(PATIENCE);
-        let mission = self.mission.take().unwrap_or_default();
+        let mission = core::mem::take(&mut self.mission);
         let failure = match mission.outcome() {
             Some(Err(why)) => Some(why.to_owned()),
             None if exit_when_done => Some(match hopeless {
@@ -234,30 +243,73 @@ impl Robot {
         self.start_attendant(self.sweep())
     }
 
-    /// Ends everything, and starts it again on a bus from which all of it is swept.
-    fn begin_again(&mut self, why: &str) -> Result<()> {
-        match self.resets.damaged(Instant::now()) {
-            Remedy::StartAgain(count) => self.note(&format!(
-                "the bus is damaged: {why}; starting everything again ({count} of {MOST})"
-            )),
-            Remedy::GiveUp => {
+    /// Ends everything, and starts it again after a while on a bus from which all of it is swept.
+    ///
+    /// # Errors
+    /// That was in vain, and somebody waits for the end of the mission.
+    fn begin_again(&mut self, why: &str, exit_when_done: bool) -> Result<()> {
+        let remedy = self.resets.damaged(Instant::now());
+        let how = match remedy {
+            Remedy::StartAgain(count, Duration::ZERO) => {
+                format!("starting everything again ({count} of {MOST})")
+            }
+            Remedy::StartAgain(count, pause) => format!(
+                "starting everything again in {} s ({count} of {MOST})",
+                pause.as_secs()
+            ),
+            _ if exit_when_done => {
                 self.leave();
                 bail!(
                     "the bus does not hold: {why}; {MOST} new starts were in vain. See whether its memory is full (`df /dev/shm`), and what `lager doctor` finds"
                 )
             }
+            Remedy::Seldom => format!(
+                "{MOST} new starts were in vain, so it is tried every {} s from now on. See whether its memory is full (`df /dev/shm`), and what `lager doctor` finds",
+                SELDOM.as_secs()
+            ),
+            Remedy::StillSeldom => String::new(),
+        };
+        if !how.is_empty() {
+            self.note(&format!("the bus is damaged: {why}; {how}"));
         }
         self.stop(HASTE);
-        if let Some(mission) = &mut self.mission {
-            mission.give_up(&format!(
-                "the robot was started again in the middle of it: {why}"
-            ));
+        self.give_mission_up(why);
+        self.enter(Stage::Resting(Instant::now() + remedy.pause()));
+        Ok(())
+    }
+
+    /// Starts everything after a rest. What keeps it from that may pass, such as a full memory.
+    ///
+    /// # Errors
+    /// Somebody else has taken the robot's name, or somebody waits for the end of the mission.
+    fn try_again(&mut self, exit_when_done: bool) -> Result<()> {
+        let begun = self.start_anew();
+        match begun {
+            Err(error) if !matches!(error.downcast_ref(), Some(LockError::Up { .. })) => {
+                self.begin_again(&format!("{error:#}"), exit_when_done)
+            }
+            begun => begun,
         }
+    }
+
+    fn start_anew(&mut self) -> Result<()> {
         self.lock.restore(&self.config)?;
         self.world.as_ref().map(World::write).transpose()?;
         // Nobody knows any more what it had to do, and a simulated world is a new one.
         self.left = self.kept.clone();
         self.begin()
+    }
+
+    /// Gives the mission up if services have run already: their successors do not know where the
+    /// robot stands. Else it is carried out as if nothing had been.
+    fn give_mission_up(&mut self, why: &str) {
+        if !self.resets.was_whole() || self.mission.outcome().is_some() {
+            return;
+        }
+        self.mission.give_up(&format!(
+            "the robot was started again in the middle of it: {why}"
+        ));
+        self.note("the mission is given up, since nobody knows where the robot stands: put it down, say where (`lager place`, `lager reset`), release the stop (`lager resume`), and order anew");
     }
 
     /// Ends everything on a damaged bus, and has it cleared.
@@ -289,6 +341,7 @@ impl Robot {
     fn enter(&mut self, stage: Stage) {
         self.stage = stage;
         self.stage_began = Instant::now();
+        self.body = None;
     }
 
     /// Takes what has come and does what is due; returns why the bus counts as damaged, if it does.
@@ -308,8 +361,12 @@ impl Robot {
     fn wait(&self) {
         let unserved = self.owed.iter().filter(|owed| !owed.served);
         let at_most = unserved
-            .map(|owed| HAND_OVER.saturating_sub(owed.ended.elapsed()))
+            .map(|owed| HAND_OVER.saturating_sub(self.attended.saturating_sub(owed.since)))
             .fold(LOOK, Duration::min);
+        let at_most = match self.stage {
+            Stage::Resting(until) => at_most.min(until.saturating_duration_since(Instant::now())),
+            _ => at_most,
+        };
         let mut sources = vec![self.signals.as_fd()];
         sources.extend(self.attendant.line.as_ref().map(AsFd::as_fd));
         self.supervisor.wait(&sources, at_most);
@@ -321,7 +378,8 @@ impl Robot {
         while let Some(line) = &self.attendant.line {
             match line.receive() {
                 Ok(Some(word)) => {
-                    self.attendant.silent = Duration::ZERO;
+                    self.attended += self.attendant.look();
+                    self.attendant.spoke = self.attendant.ran;
                     damage = damage.or(self.take_word(word));
                 }
                 Ok(None) => break,
@@ -346,7 +404,7 @@ impl Robot {
             }
             Word::Swept => {}
             Word::Pulse(pulse) => self.take_pulse(pulse),
-            Word::Note(note) => self.terminal.show(note),
+            Word::Note(note) => self.terminal.show(&note),
             Word::HandedOver(service) => {
                 for owed in self.owed.iter_mut().filter(|owed| owed.service == service) {
                     owed.served = true;
@@ -354,7 +412,7 @@ impl Robot {
             }
             Word::Silent(silence) => return self.take_silence(silence),
             Word::Damaged(why) => return Some(why),
-            Word::Mission(mission) => self.mission = Some(mission),
+            Word::Mission(mission) => self.mission = mission,
             Word::Kept { left, all } => {
                 self.left = left;
                 let file = self.kept_file.as_ref().filter(|_| self.kept != all);
@@ -396,7 +454,7 @@ impl Robot {
             return None;
         }
         self.supervisor.kill(service);
-        if !silence.was_heard {
+        if !silence.was_heard && service.sign() == Sign::Topic {
             return Some(format!("nothing is heard of the {service}, which runs"));
         }
         self.note(&format!(
@@ -412,12 +470,20 @@ impl Robot {
             .lost_memory
             .then(|| format!("memory of the {service} was gone ({how})"));
         let first_start = self.stage != Stage::Whole && !self.resets.have_been();
-        if first_start && ended.by_itself {
+        if first_start && ended.by_itself && !ended.may_try_again {
             bail!("the {service} does not start ({how})");
         }
         if service == Service::Attendant {
             // One that was killed may do better next time.
-            let refused = !self.attendant.joined && ended.by_itself;
+            self.refusals = match !self.attendant.joined && ended.by_itself {
+                true => self.refusals + 1,
+                false => 0,
+            };
+            let most = match ended.may_try_again {
+                true => MOST_REFUSALS,
+                false => 1,
+            };
+            let refused = self.refusals >= most;
             self.figures.attendant_ended();
             self.attendant = Attendant::absent();
             return Ok(
@@ -427,33 +493,42 @@ impl Robot {
         self.owed.retain(|owed| owed.service != service);
         self.owed.push(Owed {
             service,
-            ended: Instant::now(),
+            since: self.attended,
             served: !self.tell(&Request::HandOver(service)) || !self.attendant.joined,
         });
         Ok(lost)
     }
 
     fn look_at_attendant(&mut self) -> Option<String> {
-        let now = Instant::now();
-        let attendant = &mut self.attendant;
-        // Time during which this process slept is not the attendant's silence.
-        attendant.silent += (now - attendant.looked).min(LOOK * 2);
-        attendant.looked = now;
+        self.attended += self.attendant.look();
         self.supervisor.process(Service::Attendant)?;
-        if self.stage == Stage::Joining && self.stage_began.elapsed() > BODY_START {
+        if self.stage == Stage::Joining && self.body_has_no_clock() {
             return Some("there is no clock of the body to follow".into());
         }
-        if attendant.silent < SILENCE {
+        if self.attendant.ran - self.attendant.spoke < SILENCE {
             return None;
         }
-        attendant.silent = Duration::ZERO;
-        let joined = attendant.joined;
+        self.attendant.spoke = self.attendant.ran;
+        let joined = self.attendant.joined;
         self.supervisor.kill(Service::Attendant);
         if !joined {
             return Some("whoever opens it hangs".into());
         }
         self.note("the attendant does not answer any more and is killed");
         None
+    }
+
+    /// Whether the body has run for too long without a clock that the attendant could follow.
+    fn body_has_no_clock(&mut self) -> bool {
+        let body = self.config.body.service();
+        let body = body.and_then(|body| self.supervisor.process(body));
+        let Some(pid) = body else {
+            return self.stage_began.elapsed() > BODY_START;
+        };
+        let could_run = self
+            .body
+            .get_or_insert_with(|| ChanceClock::of_process(pid));
+        could_run.look(LOOK * 2) > BODY_START
     }
 
     fn look_at_folder(&mut self) -> Option<String> {
@@ -473,7 +548,7 @@ impl Robot {
                 continue;
             }
             let owed = self.owed.iter().find(|owed| owed.service == service);
-            if owed.is_none_or(|owed| owed.served || owed.ended.elapsed() >= HAND_OVER) {
+            if owed.is_none_or(|owed| owed.served || self.attended - owed.since >= HAND_OVER) {
                 self.start(service, true);
             }
         }
@@ -493,17 +568,22 @@ impl Robot {
         let start = Start {
             resume: false,
             output,
+            errors: self.terminal.errors(),
         };
         self.attendant = Attendant::absent();
-        if let Err(error) = self.supervisor.start(Service::Attendant, start) {
-            self.note(&format!("{error:#}"));
-            return Ok(());
+        match self.supervisor.start(Service::Attendant, start) {
+            Ok(pid) => self.attendant.clock = Some(ChanceClock::of_process(pid)),
+            Err(error) => {
+                self.note(&format!("{error:#}"));
+                return Ok(());
+            }
         }
         self.attendant.line = Some(line);
         self.tell(&Request::Begin(Begin {
             robot_start: self.figures.robot_start,
             mission: self.mission.clone(),
             kept: self.left.clone(),
+            joins_late: self.figures.is_told && sweep == Sweep::TheDead,
             sweep,
         }));
         for (service, pid) in self.supervisor.running() {
@@ -525,7 +605,11 @@ impl Robot {
             // This process's own is for its JSON line.
             _ => Stdio::null(),
         };
-        let start = Start { resume, output };
+        let start = Start {
+            resume,
+            output,
+            errors: self.terminal.errors(),
+        };
         match self.supervisor.start(service, start) {
             Ok(pid) => {
                 self.tell(&Request::Started(service, pid));
@@ -543,57 +627,10 @@ impl Robot {
 
     /// A line of this process's own.
     fn note(&self, text: &str) {
-        let since_told = match self.config.chip.clock {
-            Some(_) => self.figures.told.elapsed().min(PULSE),
-            None => self.figures.told.elapsed(),
-        };
-        self.terminal.show(Note {
-            at: self.figures.robot_time + since_told.mul_f64(self.config.speed),
+        self.terminal.show(&Note {
+            at: self.figures.now(&self.config),
             who: "up".to_owned(),
             text: text.to_owned(),
         });
-    }
-}
-
-impl Attendant {
-    fn absent() -> Self {
-        Self {
-            line: None,
-            joined: false,
-            silent: Duration::ZERO,
-            looked: Instant::now(),
-        }
-    }
-}
-
-impl Figures {
-    fn new(now: Instant) -> Self {
-        Self {
-            started: now,
-            robot_start: None,
-            robot_time: Duration::ZERO,
-            told: now,
-            last: Pulse::default(),
-            frames: 0,
-            lost: 0,
-            lost_elsewhere: 0,
-        }
-    }
-
-    fn take(&mut self, pulse: Pulse) {
-        self.last = pulse;
-        if let Some(now) = pulse.robot_time {
-            self.robot_time = now.saturating_sub(*self.robot_start.get_or_insert(now));
-            self.told = Instant::now();
-        }
-    }
-
-    /// Keeps what the attendant has counted; the next one counts from 0.
-    fn attendant_ended(&mut self) {
-        let last = core::mem::take(&mut self.last);
-        self.frames += last.frames;
-        self.lost += last.lost_here;
-        // This is told whole by whoever looks.
-        self.lost_elsewhere = self.lost_elsewhere.max(last.lost_elsewhere);
     }
 }

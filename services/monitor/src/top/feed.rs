@@ -15,7 +15,7 @@ use lager_topics::{
     LatencyCommand, LatencyPath, LinkHealth, MissionQueue, NavStatus, Topic, TopicVisitor, visit,
 };
 
-use super::head::Load;
+use super::head::{Failing, Load};
 use super::model::Model;
 use super::row::Life;
 use crate::ToolError;
@@ -23,6 +23,9 @@ use crate::source::Stamped;
 
 /// Samples that are taken of one topic in one look.
 const TURN: u64 = 1_024;
+
+/// The services that write a sign of life because nothing on the bus tells it.
+const SIGNING: [&str; 3] = ["comm", "station", "gateway"];
 
 /// What reads a robot's bus.
 pub(crate) struct Feed<'a> {
@@ -83,6 +86,7 @@ impl<'a> Feed<'a> {
             _ => Ends::look(bus, self.watchdog)?,
         };
         model.take_ends(&ends.topics, |pid| ends.life(pid));
+        model.head.failing = failing(bus, &ends.nodes);
         self.ends = Some(ends);
         self.refused.clear();
         let word = bus.place().robot(bus.robot()).join(StopPage::FILE);
@@ -244,6 +248,45 @@ impl Ends {
     }
 }
 
+/// The processes of the robot, its tools among them, that do not go on.
+fn failing(bus: &Bus, nodes: &[NodeInfo]) -> Vec<Failing> {
+    let (place, robot) = (bus.place(), bus.robot());
+    let mut found: Vec<Failing> = Vec::new();
+    let mut add = |who: &str, pid: u32, silent: Option<Duration>| {
+        if found.iter().all(|failing| failing.pid != pid) {
+            let who = who.to_owned();
+            found.push(Failing { who, pid, silent });
+        }
+    };
+    let holders = place.up().remove(robot).unwrap_or_default();
+    for holder in holders.iter().filter(|holder| holder.frozen) {
+        add(&holder.what, holder.pid, None);
+    }
+    let now_ns = Clock::monotonic_ns();
+    for who in SIGNING {
+        let Some(sign) = place.sign_of(robot, who) else {
+            continue;
+        };
+        match life(sign.pid) {
+            Life::Frozen => add(who, sign.pid, None),
+            Life::Alive if sign.is_old(now_ns) => {
+                let silent = Duration::from_nanos(now_ns.saturating_sub(sign.at_ns));
+                add(who, sign.pid, Some(silent));
+            }
+            _ => {}
+        }
+    }
+    for node in nodes {
+        if node.robot.as_ref() == Some(robot)
+            && let Some(role) = node.role
+            && life(node.pid) == Life::Frozen
+        {
+            add(&role.to_string(), node.pid, None);
+        }
+    }
+    found
+}
+
 /// Whether a process goes on, as the kernel has it.
 fn life(pid: u32) -> Life {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
@@ -254,7 +297,7 @@ fn life(pid: u32) -> Life {
         .and_then(|rest| rest.chars().next());
     match state {
         Some('T' | 't') => Life::Frozen,
-        Some('Z' | 'X') => Life::Dead,
+        Some('Z' | 'X') | None => Life::Dead,
         _ => Life::Alive,
     }
 }

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use lager_ports::Stop;
+use lager_ports::{Stop, called};
 use lager_topics::{
     BoardHealth, CommandLatency, Durations, Health, Hold, NavigatorStatus, OrderQueue, PathLatency,
     Stamp,
@@ -17,6 +17,32 @@ pub(crate) struct Load {
     pub(crate) minute: f64,
     /// Cores.
     pub(crate) cores: usize,
+}
+
+/// A process of the robot that does not go on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Failing {
+    /// Its role, or what it is called on the command line.
+    pub(crate) who: String,
+    pub(crate) pid: u32,
+    /// For how long it has given no sign of life; `None` if it is frozen.
+    pub(crate) silent: Option<Duration>,
+}
+
+impl Failing {
+    /// What is wrong, and what helps.
+    pub(crate) fn said(&self) -> String {
+        let (who, pid) = (called(&self.who), self.pid);
+        match self.silent {
+            None => {
+                format!("the {who}, process {pid}, is frozen; `kill -CONT {pid}` lets it go on")
+            }
+            Some(long) => format!(
+                "the {who}, process {pid}, has not gone on for {}",
+                span(long)
+            ),
+        }
+    }
 }
 
 /// What the head shows.
@@ -33,6 +59,8 @@ pub(crate) struct Head {
     pub(crate) command: Recent<CommandLatency>,
     /// The stop that is set, as its word says; `None` if none is or the word cannot be read.
     pub(crate) stop: Option<Stop>,
+    /// The processes of the robot that do not go on.
+    pub(crate) failing: Vec<Failing>,
     pub(crate) load: Load,
     /// Robot seconds a second.
     pub(crate) pace: Option<f64>,
@@ -144,7 +172,15 @@ impl Head {
                 (name.replace(' ', "_"), shown)
             })
             .collect();
+        let failing = self.failing.iter().map(|failing| {
+            let silent = failing.silent.map(|long| long.as_nanos() as u64);
+            let state = if silent.is_none() { "frozen" } else { "silent" };
+            json!({
+                "service": failing.who, "pid": failing.pid, "state": state, "silent_ns": silent,
+            })
+        });
         json!({
+            "failing": failing.collect::<Vec<_>>(),
             "robot": self.robot, "mode": self.mode(), "stop": self.stopped(now_ns),
             "sensor": link(0), "steering": link(1), "mission": self.mission(),
             "robot_seconds_per_second": self.pace, "load_minute": self.load.minute,

@@ -10,6 +10,9 @@ use serde_json::{Value, json};
 use super::head::Head;
 use super::row::{Life, Row, Trouble};
 
+/// A little less than the first window of figures, in ns.
+const WINDOW_NS: u64 = 900_000_000;
+
 /// A key that means something here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Key {
@@ -109,6 +112,8 @@ pub(crate) struct Model {
     pub(crate) now_ns: u64,
     /// Where the samples come from, if not from a bus.
     pub(crate) file: Option<String>,
+    /// When it began to look.
+    begun_ns: Option<u64>,
     rows: BTreeMap<String, Row>,
     /// The order of the rows, by topic.
     order: Vec<String>,
@@ -150,6 +155,7 @@ impl Model {
     /// Ends a window of all rows, and puts them in order.
     pub(crate) fn end_window(&mut self, now_ns: u64) {
         self.now_ns = now_ns;
+        self.begun_ns.get_or_insert(now_ns);
         let pace = self.head.shown_pace().unwrap_or(1.0);
         for row in self.rows.values_mut() {
             row.take_pace(pace);
@@ -211,6 +217,12 @@ impl Model {
             }
         }
         self.order = rows.into_iter().map(|row| row.name.clone()).collect();
+    }
+
+    /// Whether it has not looked for long enough to know that all is well.
+    pub(crate) fn is_looking(&self) -> bool {
+        let since = |begun: u64| self.now_ns.saturating_sub(begun);
+        self.file.is_none() && self.begun_ns.is_none_or(|begun| since(begun) < WINDOW_NS)
     }
 
     /// How many shown rows are in trouble.

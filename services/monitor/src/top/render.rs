@@ -126,19 +126,36 @@ fn head(model: &Model, page: &mut Page<'_>) {
             count(head.load.cores, "core")
         ),
     };
+    // Before it has looked for a while, what is not seen may be there.
+    let known = |is_seen: bool, text: String| match is_seen || !model.is_looking() {
+        true => text,
+        false => "...".to_owned(),
+    };
     let pace = head.shown_pace();
     let pace = pace.map_or(String::new(), |pace| format!("  clock x{pace:.2}"));
-    let troubled = model.troubled();
-    let (words, style) = match troubled {
-        0 => ("all topics well".to_owned(), dim()),
-        n => (format!("{} IN TROUBLE", count(n, "topic")), bad()),
+    let failing = head.failing.len();
+    let (words, style) = match (failing, model.troubled()) {
+        (0, 0) if model.is_looking() => ("looking".to_owned(), dim()),
+        (0, 0) => ("all topics well".to_owned(), dim()),
+        (0, n) => (format!("{} IN TROUBLE", count(n, "topic")), bad()),
+        (n, 0) => (format!("{} IN TROUBLE", count(n, "service")), bad()),
+        (n, topics) => {
+            let (services, topics) = (count(n, "service"), count(topics, "topic"));
+            (format!("{services} and {topics} IN TROUBLE"), bad())
+        }
     };
     page.spans(&[
         (format!("lager top  {}  ", head.robot), bold()),
-        (format!("{}  ", head.mode()), plain()),
+        (
+            format!("{}  ", known(head.health.is_some(), head.mode())),
+            plain(),
+        ),
         (words, style),
         (format!("{pace}  {of}"), plain()),
     ]);
+    for failing in &head.failing {
+        page.put(&format!("FAILING   {}", failing.said()), bad());
+    }
     match head.stopped(now) {
         None => page.put("stop      none", plain()),
         Some(why) => page.put(&format!("STOPPED   {why}"), bad()),
@@ -151,7 +168,8 @@ fn head(model: &Model, page: &mut Page<'_>) {
         };
         page.put(&format!("{name:9} {link}"), style);
     }
-    page.put(&format!("mission   {}", head.mission()), plain());
+    let mission = known(head.status.is_some(), head.mission());
+    page.put(&format!("mission   {mission}"), plain());
     path(model, page);
 }
 

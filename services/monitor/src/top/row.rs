@@ -12,6 +12,8 @@ use crate::delay::Stage;
 const REMEMBERED: Duration = Duration::from_secs(30);
 /// A rate below this part of the expected one is too slow.
 const SLOW: f64 = 0.5;
+/// So long a topic with writers may be silent from when it is looked at, beside two periods of it.
+const FIRST_NS: u64 = 1_500_000_000;
 /// After so long without a sample there is no rate any more, in ns.
 const SILENT_NS: u64 = 10_000_000_000;
 
@@ -108,6 +110,10 @@ pub(crate) struct Row {
     last_writer: u32,
     pub(crate) figures: Figures,
     window: Window,
+    /// Whether a window with samples has ended: before that there are no figures.
+    is_measured: bool,
+    /// Since when it is read while somebody could write it.
+    watched_ns: Option<u64>,
 }
 
 #[derive(Debug, Default)]
@@ -145,6 +151,8 @@ impl Row {
             last_writer: 0,
             figures: Figures::default(),
             window: Window::default(),
+            is_measured: false,
+            watched_ns: None,
         }
     }
 
@@ -222,6 +230,7 @@ impl Row {
         self.last_ns = None;
         self.figures = Figures::default();
         self.window = Window::default();
+        (self.is_measured, self.watched_ns) = (false, None);
     }
 
     /// Takes what one look has found in a queue for so many samples, and how many were lost before.
@@ -255,6 +264,11 @@ impl Row {
     /// Ends a window and begins the next one.
     pub(crate) fn end_window(&mut self, now_ns: u64) {
         let window = std::mem::take(&mut self.window);
+        self.is_measured |= window.samples > 1;
+        self.watched_ns = match self.is_open && !self.authors.is_empty() {
+            true => self.watched_ns.or(Some(now_ns)),
+            false => None,
+        };
         let last = self.last_ns.unwrap_or_default();
         let mut gaps = window.gaps;
         let hz = match (window.samples, window.before_ns) {
@@ -320,12 +334,22 @@ impl Row {
         if !self.authors.is_empty() && self.authors.iter().all(is_gone) {
             return Trouble::Unwritten;
         }
-        let expected = self.expected_hz.unwrap_or_default();
-        let is_measured = self.is_open && self.samples > 1;
-        match is_measured && self.figures.hz < expected * SLOW {
+        let Some(expected) = self.expected_hz.filter(|hz| *hz > 0.0) else {
+            return Trouble::None;
+        };
+        let is_known = self.is_measured || self.is_silent(expected, now_ns);
+        match self.is_open && is_known && self.figures.hz < expected * SLOW {
             true => Trouble::Slow,
             false => Trouble::None,
         }
+    }
+
+    /// Whether it should have come long since, from when it is looked at.
+    fn is_silent(&self, expected: f64, now_ns: u64) -> bool {
+        let watched = |since: u64| now_ns.saturating_sub(since) as f64;
+        let patience = FIRST_NS as f64 + 2e9 / expected;
+        self.watched_ns
+            .is_some_and(|since| watched(since) >= patience)
     }
 
     /// For programs.
@@ -451,5 +475,43 @@ mod tests {
         row.take_pace(0.2);
         assert_eq!(row.expected_hz, Some(20.0));
         assert_eq!(row.trouble(1_100 * MS), Trouble::None);
+    }
+
+    #[test]
+    fn nothing_is_slow_before_it_is_known_and_a_silent_writer_is_in_time() {
+        let alive = |row: &mut Row| {
+            row.authors = vec![Author {
+                role: Some(Role::Bridge),
+                pid: 7,
+                life: Life::Alive,
+            }];
+        };
+        // The first picture is drawn in the middle of the first window.
+        let mut first = row("sensor/line");
+        alive(&mut first);
+        first.end_window(1_000 * MS);
+        for at in [1_001, 1_011, 1_021] {
+            first.hear(&stamp(at * MS));
+        }
+        assert_eq!(first.trouble(1_025 * MS), Trouble::None);
+        // A writer that hangs says nothing at all, or is heard once, by what is kept of it.
+        let mut silent = row("sensor/line");
+        let mut kept = row("link/health");
+        for row in [&mut silent, &mut kept] {
+            alive(row);
+            row.end_window(1_000 * MS);
+        }
+        kept.hear(&stamp(900 * MS));
+        for row in [&mut silent, &mut kept] {
+            row.end_window(2_000 * MS);
+            assert_eq!(row.trouble(2_000 * MS), Trouble::None, "{}", row.name);
+            row.end_window(3_000 * MS);
+            assert_eq!(row.trouble(3_000 * MS), Trouble::Slow, "{}", row.name);
+        }
+        // Nobody could write it.
+        let mut nobodys = row("sensor/line");
+        nobodys.end_window(1_000 * MS);
+        nobodys.end_window(9_000 * MS);
+        assert_eq!(nobodys.trouble(9_000 * MS), Trouble::None);
     }
 }

@@ -4,6 +4,7 @@
 //! `LAGER_PICTURES=take` takes them anew.
 
 use std::path::Path;
+use std::time::Duration;
 
 use lager_ports::{Layout, Peer, RobotName, TopicInfo};
 use lager_topics::{
@@ -13,7 +14,7 @@ use lager_topics::{
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
-use super::head::Load;
+use super::head::{Failing, Load};
 use super::model::{Key, Model, Pressed};
 use super::render;
 use super::row::Life;
@@ -64,6 +65,7 @@ fn driving() -> Model {
     let role = Some(Role::Guest);
     topics.push(info("weather/now", vec![Peer { role, pid: 4_200 }]));
     model.take_ends(&topics, |_| Life::Alive);
+    model.end_window(9 * S);
     for entry in TOPICS {
         let Some(period) = entry.period_ms else {
             continue;
@@ -421,4 +423,70 @@ fn the_chosen_row_is_always_in_sight() {
     }
     model.press(Key::Home);
     assert!(picture(&model, 80, 16).contains("weather/now"));
+}
+
+#[test]
+fn before_anything_is_known_it_is_looking_and_nothing_is_in_trouble() {
+    let mut model = Model::new("r1");
+    let role = Some(Role::Bridge);
+    let peers = vec![Peer { role, pid: 7 }];
+    model.take_ends(&[info("sensor/line", peers)], |_| Life::Alive);
+    model.end_window(9 * S);
+    for number in 1..4 {
+        let stamp = Stamp {
+            sequence: number,
+            publish_time_ns: 9 * S + number * 10 * MS,
+            ..Stamp::default()
+        };
+        model.hear("sensor/line", &stamp);
+    }
+    let head = |model: &Model| picture(model, 80, 24).lines().next().map(str::to_owned);
+    let first = head(&model).expect("a line");
+    assert!(first.contains("looking"), "{first}");
+    assert!(
+        !first.contains("well") && !first.contains("TROUBLE"),
+        "{first}"
+    );
+    let whole = picture(&model, 80, 24);
+    assert!(
+        !whole.contains("no bridge") && !whole.contains("no navigator"),
+        "{whole}"
+    );
+    model.end_window(10 * S);
+    let next = head(&model).expect("a line");
+    assert!(!next.contains("looking"), "{next}");
+}
+
+#[test]
+fn all_is_not_well_while_a_service_does_not_go_on() {
+    let mut model = driving();
+    model.row("weather/now").rest();
+    let failing = |who: &str, pid, silent| Failing {
+        who: who.to_owned(),
+        pid,
+        silent,
+    };
+    let silent = Some(Duration::from_millis(2_300));
+    model.head.failing = vec![
+        failing("comm", 4_105, None),
+        failing("station", 4_107, silent),
+    ];
+    let text = picture(&model, 100, 30);
+    let first = text.lines().next().expect("a line");
+    assert!(first.contains("2 services"), "{text}");
+    assert!(
+        first.contains("IN TROUBLE") && !first.contains("well"),
+        "{text}"
+    );
+    assert!(
+        text.contains("the link to the station (comm), process 4105, is frozen"),
+        "{text}"
+    );
+    assert!(
+        text.contains("the station, process 4107, has not gone on for 2.3 s"),
+        "{text}"
+    );
+    let json = model.as_json();
+    assert_eq!(json["failing"][0]["state"], "frozen");
+    assert_eq!(json["failing"][1]["silent_ns"], 2_300_000_000_u64);
 }

@@ -1,0 +1,156 @@
+//! Who else has a board's serial port open: `ModemManager`, a getty, a serial monitor.
+//!
+//! Two readers of one port share its bytes, and each loses what the other gets. The kernel tells
+//! who has it open (`/proc/PID/fd`), of this user's processes, and root of everybody's. Of others
+//! only names are known, so those are named that are known to open serial ports, and those on whose
+//! command line the port stands.
+
+use std::fs::{self, Metadata};
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+/// Programs that open serial ports unasked.
+const MEDDLERS: [&str; 2] = ["ModemManager", "brltty"];
+
+/// A process that is not the robot's and has a port open, or may.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Other {
+    pid: u32,
+    name: String,
+    port: PathBuf,
+    /// Whether it was seen to have it open.
+    is_sure: bool,
+}
+
+impl Other {
+    /// What it does and how to end that.
+    pub fn said(&self) -> String {
+        let Self {
+            pid,
+            name,
+            port,
+            is_sure,
+        } = self;
+        let port_name = port.file_name().unwrap_or_default().to_string_lossy();
+        let does = match is_sure {
+            true => format!("has {} open as well", port.display()),
+            false => format!("may have {} open", port.display()),
+        };
+        let end = match name.as_str() {
+            "ModemManager" => "`sudo systemctl stop ModemManager` ends it, and `sudo systemctl disable ModemManager` for good".to_owned(),
+            name if name.ends_with("getty") => {
+                format!("`sudo systemctl stop serial-getty@{port_name}` ends it")
+            }
+            _ => format!("`kill {pid}` ends it"),
+        };
+        format!("process {pid} ({name}) {does}; it reads bytes that the robot then lacks; {end}")
+    }
+}
+
+/// The processes that have one of `ports` open, but for `own` ones, or may have.
+pub fn others(ports: &[&PathBuf], own: &[u32]) -> Vec<Other> {
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let mut found = Vec::new();
+    for process in processes {
+        let Some(pid) = process
+            .file_name()
+            .to_str()
+            .and_then(|name| name.parse().ok())
+        else {
+            continue;
+        };
+        if own.contains(&pid) || pid == std::process::id() {
+            continue;
+        }
+        let folder = process.path();
+        let name = fs::read_to_string(folder.join("comm")).unwrap_or_default();
+        for port in ports {
+            let is_open = is_open(&folder, port);
+            let is_guilty = match is_open {
+                Some(is_open) => is_open,
+                None => is_suspect(&folder, name.trim(), port),
+            };
+            if is_guilty {
+                found.push(Other {
+                    pid,
+                    name: name.trim().to_owned(),
+                    port: (*port).clone(),
+                    is_sure: is_open.is_some(),
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Whether a process has a port open; `None` if it is another user's, which is not told.
+fn is_open(process: &Path, port: &Path) -> Option<bool> {
+    let of_port = fs::metadata(port).ok()?;
+    let is_same = |of: &Metadata| of.file_type().is_char_device() && of.rdev() == of_port.rdev();
+    let mut files = fs::read_dir(process.join("fd")).ok()?.flatten();
+    Some(files.any(|file| fs::metadata(file.path()).is_ok_and(|of| is_same(&of))))
+}
+
+/// Whether a process that cannot be looked into may have the port open.
+fn is_suspect(process: &Path, name: &str, port: &Path) -> bool {
+    let command = fs::read(process.join("cmdline")).unwrap_or_default();
+    // The port that a link leads to has the name that others use.
+    let port = fs::canonicalize(port).unwrap_or_else(|_| port.to_owned());
+    let port_name = port.file_name().unwrap_or_default().to_string_lossy();
+    let mut words = command.split(|byte| *byte == 0);
+    MEDDLERS.contains(&name)
+        || words.any(|word| {
+            let word = String::from_utf8_lossy(word);
+            word == port_name || word == port.to_string_lossy()
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use super::*;
+
+    #[test]
+    fn whoever_has_a_port_open_is_named_with_what_ends_it() {
+        let port = PathBuf::from("/dev/null");
+        let own = Path::new("/proc/self");
+        let open = File::open(&port).expect("a device");
+        assert_eq!(is_open(own, &port), Some(true));
+        drop(open);
+        let missing = PathBuf::from("/dev/lager-no-such-port");
+        assert_eq!(is_open(own, &missing), None);
+        // This process is the doctor itself.
+        let others = others(&[&port], &[]);
+        assert!(others.iter().all(|other| other.pid != std::process::id()));
+    }
+
+    #[test]
+    fn each_kind_of_program_is_ended_in_its_own_way() {
+        let other = |name: &str, is_sure| Other {
+            pid: 4_711,
+            name: name.to_owned(),
+            port: "/dev/ttyUSB0".into(),
+            is_sure,
+        };
+        for (name, is_sure, words) in [
+            (
+                "minicom",
+                true,
+                [
+                    "process 4711 (minicom) has /dev/ttyUSB0 open",
+                    "`kill 4711`",
+                ],
+            ),
+            (
+                "ModemManager",
+                false,
+                ["may have /dev/ttyUSB0 open", "systemctl stop ModemManager"],
+            ),
+            ("agetty", true, ["(agetty)", "serial-getty@ttyUSB0"]),
+        ] {
+            let said = other(name, is_sure).said();
+            assert!(words.iter().all(|word| said.contains(word)), "{said}");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! At which addresses others reach a socket that listens at all of them (`0.0.0.0`, `[::]`): those
+//! of this machine's interfaces, as the kernel lists them. Nobody can open `http://0.0.0.0`.
+
+use std::fs;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+/// The addresses by which `at` is reached, from other computers first: itself, unless it stands for
+/// all of this machine's.
+pub fn reachable(at: SocketAddr) -> Vec<SocketAddr> {
+    if !at.ip().is_unspecified() {
+        return vec![at];
+    }
+    let read = |path| fs::read_to_string(path).unwrap_or_default();
+    let mut found: Vec<IpAddr> = local_v4(&read("/proc/net/fib_trie"));
+    if at.is_ipv6() {
+        found.extend(global_v6(&read("/proc/net/if_inet6")));
+    }
+    // Whatever the kernel lists, this machine itself reaches it so.
+    found.push(Ipv4Addr::LOCALHOST.into());
+    let port = at.port();
+    found
+        .into_iter()
+        .map(|ip| SocketAddr::new(ip, port))
+        .collect()
+}
+
+/// The same as a list for people, with `as_text` for each.
+pub fn listed(at: SocketAddr, as_text: impl Fn(SocketAddr) -> String) -> String {
+    let all: Vec<String> = reachable(at).into_iter().map(as_text).collect();
+    all.join(" or ")
+}
+
+/// The addresses of this machine's interfaces but for loopback ones, from the kernel's table of
+/// routes: each stands in the line before one that ends in `host LOCAL`.
+fn local_v4(trie: &str) -> Vec<IpAddr> {
+    let mut found = Vec::new();
+    let mut before = None;
+    for line in trie.lines() {
+        let line = line.trim();
+        if line.ends_with("host LOCAL")
+            && let Some(address) = before
+            && !found.contains(&address)
+        {
+            found.push(address);
+        }
+        let address = line.strip_prefix("|-- ").and_then(|text| text.parse().ok());
+        before = address
+            .filter(|address: &IpAddr| !address.is_loopback())
+            .or(match line.starts_with('/') {
+                // An address has several lines, one for each kind of route.
+                true => before,
+                false => None,
+            });
+    }
+    found
+}
+
+/// The addresses of IPv6 that are good beyond the cable: 32 digits, and the scope `00` in the
+/// fourth column.
+fn global_v6(table: &str) -> Vec<IpAddr> {
+    let of = |line: &str| {
+        let mut fields = line.split_ascii_whitespace();
+        let digits = fields.next()?;
+        let is_global = fields.nth(2)? == "00";
+        let address = u128::from_str_radix(digits, 16).ok()?;
+        is_global.then(|| IpAddr::from(Ipv6Addr::from(address)))
+    };
+    table.lines().filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIE: &str = "Main:
+  +-- 0.0.0.0/0 3 0 5
+     |-- 0.0.0.0
+        /0 universe UNICAST
+     +-- 127.0.0.0/8 2 0 2
+        |-- 127.0.0.1
+           /32 host LOCAL
+     +-- 192.168.1.0/24 2 0 2
+        |-- 192.168.1.0
+           /24 link UNICAST
+        |-- 192.168.1.5
+           /32 host LOCAL
+        |-- 192.168.1.255
+           /32 link BROADCAST
+Local:
+        |-- 192.168.1.5
+           /32 host LOCAL
+        |-- 10.0.0.7
+           /31 link UNICAST
+           /32 host LOCAL
+";
+
+    #[test]
+    fn the_addresses_of_the_interfaces_are_found_once_each() {
+        let found: Vec<String> = local_v4(TRIE).iter().map(IpAddr::to_string).collect();
+        assert_eq!(found, ["192.168.1.5", "10.0.0.7"]);
+        assert!(local_v4("").is_empty() && local_v4("no table at all").is_empty());
+        let table = "\
+fe80000000000000505400fffe000001 02 40 20 80     eth0
+20010db8000000000000000000000005 02 40 00 80     eth0
+00000000000000000000000000000001 01 80 10 80       lo
+";
+        let found: Vec<String> = global_v6(table).iter().map(IpAddr::to_string).collect();
+        assert_eq!(found, ["2001:db8::5"]);
+    }
+
+    #[test]
+    fn only_an_address_that_stands_for_all_is_replaced() {
+        for one in ["127.0.0.1:7410", "192.168.1.5:7410", "[::1]:7410"] {
+            let one: SocketAddr = one.parse().expect("an address");
+            assert_eq!(reachable(one), [one]);
+        }
+        for all in ["0.0.0.0:7410", "[::]:7410"] {
+            let at = reachable(all.parse().expect("an address"));
+            assert!(
+                at.iter()
+                    .all(|at| !at.ip().is_unspecified() && at.port() == 7410)
+            );
+            assert!(at.contains(&"127.0.0.1:7410".parse().expect("an address")));
+            let said = listed(at[0], |at| format!("http://{at}"));
+            assert!(said.starts_with("http://"), "{said}");
+        }
+    }
+}
