@@ -242,6 +242,8 @@ fn what_was_given_while_the_link_was_cut_moves_nothing_when_it_is_back() {
         listen: Listen::On(scene.listener()),
         secrets: Secrets::default(),
         gag: None,
+        otherwise: None,
+        queues: None,
         warehouse: None,
         fetch: Vec::new(),
     });

@@ -101,6 +101,8 @@ fn a_robot_and_a_station_with_one_secret_find_each_other_and_with_two_they_say_w
         listen: Listen::At("127.0.0.1:0".parse().expect("an address")),
         secrets: Secrets::read(&format!("r1 {SECRET}")).expect("a secret"),
         gag: None,
+        otherwise: None,
+        queues: None,
         warehouse: None,
         fetch: Vec::new(),
     });

@@ -168,6 +168,7 @@
 mod fields;
 mod hello;
 mod listed;
+mod mode;
 mod order;
 mod proof;
 mod report;
@@ -177,7 +178,8 @@ mod thinks;
 pub use fields::{Degrees, Loads, Servos};
 pub use hello::Hello;
 pub use listed::{Block, Edge, Listed, Queued};
-pub use order::{Action, ActionError, LeaseMs, Mode, Order, Pick, Put};
+pub use mode::{Mode, Pick};
+pub use order::{Action, ActionError, LeaseMs, Order, Put};
 pub use proof::Proof;
 pub use report::{Event, EventKind, Latency, Report, TruePose};
 pub use state::State;

@@ -262,6 +262,49 @@ impl Drop for KeptFile {
     }
 }
 
+/// What a robot that is up has to do, as its attendant tells it, and the file that keeps it.
+#[derive(Debug, Default)]
+pub struct Keeping {
+    /// What it is still to be given back.
+    left: Kept,
+    /// All that is to be kept.
+    all: Kept,
+    file: Option<KeptFile>,
+}
+
+impl Keeping {
+    /// The robot is given back `kept`, and what it has to do from then on is kept in `file`.
+    pub fn new(kept: Kept, file: KeptFile) -> Self {
+        file.keep(kept.clone());
+        Self {
+            left: kept.clone(),
+            all: kept,
+            file: Some(file),
+        }
+    }
+
+    /// What the robot is still to be given back.
+    pub fn left(&self) -> &Kept {
+        &self.left
+    }
+
+    /// The attendant has told anew what is left and what is to be kept.
+    pub fn take(&mut self, left: Kept, all: Kept) {
+        self.left = left;
+        if self.all != all {
+            if let Some(file) = &self.file {
+                file.keep(all.clone());
+            }
+            self.all = all;
+        }
+    }
+
+    /// Nobody knows any more what the robot had to do: it is given all of it back.
+    pub fn begin_again(&mut self) {
+        self.left = self.all.clone();
+    }
+}
+
 fn write(path: &Path, kept: &Kept) -> io::Result<()> {
     if kept.is_nothing() {
         return match fs::remove_file(path) {

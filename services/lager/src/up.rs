@@ -9,6 +9,7 @@ mod external;
 mod figures;
 mod resets;
 mod robot;
+mod stage;
 
 use std::process::ExitCode;
 
@@ -22,7 +23,7 @@ use crate::config::{Body, ChipSection, Config, PickBy, StationSection};
 use crate::exit;
 use crate::gateway;
 use crate::hands::Hands;
-use crate::kept::{Kept, KeptFile};
+use crate::kept::{Keeping, Kept, KeptFile};
 use crate::mission::Mission;
 use crate::runtime::RuntimeFolder;
 use crate::signals::Signals;
@@ -89,7 +90,7 @@ pub fn run(mut config: Config, args: &UpArgs) -> Result<ExitCode> {
     let mut robot = Robot::new(config, lock, external, mission, signals, terminal)?;
     (robot.first_notes, robot.world) = (notes, world);
     if !args.exit_when_done {
-        robot.goes_on_with(kept, KeptFile::new(state.orders()));
+        robot.keeping = Keeping::new(kept, KeptFile::new(state.orders()));
     }
     let ran = robot.run(args.exit_when_done);
     let outcome = robot.finish(args.exit_when_done, args.json);

@@ -23,6 +23,7 @@
 
 mod asked;
 mod awaited;
+mod config;
 mod connection;
 pub mod files;
 mod gate;
@@ -40,11 +41,12 @@ mod warehouse;
 mod wheel;
 
 pub use awaited::{Awaited, Saving, Subscription};
+pub use config::{Listen, ServerConfig, ServerError};
 pub use given::Given;
 pub use handle::{Driver, Handle, View};
 pub use queues::Queues;
 pub use robot::{ActRefused, CommandRefused, Doing, FetchRefused, Robot};
-pub use server::{Listen, Server, ServerConfig, ServerError};
+pub use server::Server;
 pub use shown::{Reply, Seen, Shown, Told};
 pub use station::{News, Output, Peer, Station, Uses, Wish, WishRefused};
 pub use warehouse::{LoadError, SaveError, StoredProduct, Warehouse, WarehouseError, load, save};

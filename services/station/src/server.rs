@@ -31,17 +31,17 @@ use lager_lines::splitter::LineError;
 use lager_lines::{Called, LATEST_MOVE, Name, ProductId, UnknownProduct, to_line};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt;
-use thiserror::Error;
 
+use crate::config::{Listen, ServerConfig, ServerError};
 use crate::connection::{Connection, Stream};
-use crate::files::{HeldBy, Hold, ReadError};
+use crate::files::{Hold, ReadError};
 use crate::gate::{Gate, Verdict};
 use crate::handle::Handle;
 use crate::queues::Queues;
 use crate::saver::{Changes, Saver};
-use crate::station::{Output, Peer, Station, WishRefused};
+use crate::station::{Output, Peer, Station};
 use crate::waiting::Waiting;
-use crate::warehouse::{LoadError, Warehouse, WarehouseError, load};
+use crate::warehouse::{LoadError, Warehouse, load};
 
 /// How often slow peers and the wish to end are looked for when nothing happens.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -52,98 +52,6 @@ const KEEP_ALIVE: Duration = Duration::from_secs(5);
 const KEEP_ALIVE_AGAIN: Duration = Duration::from_secs(2);
 /// When the kernel gives up a peer that does not confirm, in ms.
 const UNCONFIRMED_MS: u32 = 10_000;
-
-/// Where a station listens and what it knows.
-#[derive(Debug)]
-pub struct ServerConfig {
-    /// What the station calls itself.
-    pub name: Name,
-    /// Where robots connect.
-    pub listen: Listen,
-    /// By what robots prove who they are; where there are none they are taken at their word.
-    pub secrets: Secrets,
-    /// Where a GaG connects, if one may.
-    pub gag: Option<PathBuf>,
-    /// The file of the warehouse, in which changes are saved. It need not be there yet.
-    pub warehouse: Option<PathBuf>,
-    /// The warehouse as long as it has no file. Without it a GaG or another user of the station
-    /// describes the warehouse.
-    pub otherwise: Option<Warehouse>,
-    /// The file of the robots' queues.
-    pub queues: Option<PathBuf>,
-    /// What robots are to fetch after what waits for them already. A name needs the warehouse's
-    /// file.
-    pub fetch: Vec<(Name, Called)>,
-}
-
-/// Where robots connect.
-#[derive(Debug)]
-pub enum Listen {
-    /// At an address; port 0 is one that is free.
-    At(SocketAddr),
-    /// At a socket that listens already.
-    On(TcpListener),
-}
-
-/// Why there is no station.
-#[derive(Debug, Error)]
-pub enum ServerError {
-    /// Robots could not connect.
-    #[error("cannot listen for robots at {at}: {error}; --listen takes another address")]
-    Listen {
-        /// Where.
-        at: SocketAddr,
-        /// Why.
-        error: io::Error,
-    },
-    /// A GaG could not connect.
-    #[error("cannot listen for a GaG at {}: {error}; --gag takes another path", .path.display())]
-    Gag {
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        error: io::Error,
-    },
-    /// Somebody else listens there.
-    #[error("another station listens for a GaG at {}; end it, or give --gag another path", .path.display())]
-    GagInUse {
-        /// Where.
-        path: PathBuf,
-    },
-    /// The warehouse's file is none.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// The queues' file is not read.
-    #[error(transparent)]
-    Queues(#[from] ReadError),
-    /// Another station saves in that file.
-    #[error(transparent)]
-    Held(#[from] HeldBy),
-    /// There can be no such warehouse.
-    #[error(transparent)]
-    Warehouse(#[from] WarehouseError),
-    /// Nothing is called so.
-    #[error("robot {robot} is not told to fetch {}: {why}", .why.called)]
-    Called {
-        /// Which.
-        robot: Name,
-        /// Why not.
-        why: UnknownProduct,
-    },
-    /// A robot cannot be told to fetch that.
-    #[error("robot {robot} is not told to fetch product {product}: {why}")]
-    Fetch {
-        /// Which.
-        robot: Name,
-        /// What.
-        product: ProductId,
-        /// Why not.
-        why: WishRefused,
-    },
-    /// The machine does not let it wait.
-    #[error("the station cannot go on: {0}")]
-    Machine(#[from] io::Error),
-}
 
 /// The station with its sockets.
 #[derive(Debug)]

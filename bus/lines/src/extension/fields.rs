@@ -6,7 +6,7 @@ use core::fmt;
 
 use lager_wire::{Binary, LineBits};
 
-use super::order::{Mode, Pick};
+use super::mode::{Mode, Pick};
 use crate::text::Name;
 use crate::warehouse::{Coord, Direction, ProductId};
 

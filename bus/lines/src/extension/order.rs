@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use super::fields::Value as _;
 use super::listed::Edge;
+use super::mode::{Mode, Pick};
 use crate::command::{Code, CommandError, Wheels, read_arm, read_wheels};
 use crate::late::{LATEST, LATEST_MOVE};
 use crate::misread::Misread;
@@ -120,60 +121,6 @@ impl Action {
             | Self::Place(_) => LATEST_MOVE,
             _ => LATEST,
         }
-    }
-}
-
-/// Who drives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Mode {
-    /// A person.
-    Manual,
-    /// The logic unit.
-    Autonomous,
-}
-
-impl Mode {
-    pub(super) const WANTED: &str = "manual or autonomous";
-
-    /// The word.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Manual => "manual",
-            Self::Autonomous => "autonomous",
-        }
-    }
-
-    /// The mode with this word.
-    pub fn from_word(word: &str) -> Option<Self> {
-        let both = [Self::Manual, Self::Autonomous];
-        both.into_iter().find(|mode| mode.as_str() == word)
-    }
-}
-
-/// Who picks the goods up at a station.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Pick {
-    /// A person.
-    Manual,
-    /// The robot, by itself.
-    Auto,
-}
-
-impl Pick {
-    pub(super) const WANTED: &str = "manual or auto";
-
-    /// The word.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Manual => "manual",
-            Self::Auto => "auto",
-        }
-    }
-
-    /// Whose word it is.
-    pub fn from_word(word: &str) -> Option<Self> {
-        let both = [Self::Manual, Self::Auto];
-        both.into_iter().find(|pick| pick.as_str() == word)
     }
 }
 

@@ -7,7 +7,7 @@
 use lager_wire::{Binary, LineBits};
 
 use super::fields::{Degrees, Loads, Servos, fields};
-use super::order::{Mode, Pick};
+use super::mode::{Mode, Pick};
 use crate::text::Name;
 use crate::warehouse::{Coord, Direction, ProductId};
 

@@ -346,7 +346,7 @@ pub(super) mod tests {
                     page.news()
                 });
                 page.heed(stop, 2);
-                page.release();
+                page.release(stop);
                 let _ = fs::remove_dir_all(folder.path().join("bus").join("robot.moved"));
             }
         }

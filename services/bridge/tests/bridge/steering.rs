@@ -5,7 +5,7 @@ use lager_topics::{
     AskKind, Calibration, Finish, Health, Input, InputKind, Mode, OperatorInput, Outcome, Refusal,
     Role, SteeringReport,
 };
-use lager_wire::{ArmCommand, Command, LineReading, LineState, SettingStatus, SteerFlags};
+use lager_wire::{ArmCommand, Command, LineReading, LineState, SettingStatus};
 
 use crate::harness::{
     FOLLOW, FORWARD, LEFT_PERP, Robot, STANDBY, SensorBoard, SteeringBoard, logic, operator,
@@ -300,7 +300,7 @@ fn one_that_drives_by_itself_is_not_calibrated() {
         kind: AskKind::Calibrate.into(),
         ..Ask::default()
     };
-    let mut asked = || {
+    let asked = || {
         robot.hands.give(logic(1, FOLLOW));
         robot.hands.ask(ask).outcome.get()
     };

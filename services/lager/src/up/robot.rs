@@ -26,8 +26,9 @@ use super::attendant::Attendant;
 use super::external::External;
 use super::figures::Figures;
 use super::resets::{MOST, Remedy, Resets, SELDOM};
+use super::stage::{Owed, Stage};
 use crate::config::Config;
-use crate::kept::{Kept, KeptFile};
+use crate::kept::Keeping;
 use crate::mission::Mission;
 use crate::outcome::Outcome;
 use crate::report::Note;
@@ -64,10 +65,8 @@ pub struct Robot {
     /// The external computer, and where it listens if it is this robot's own.
     external: External,
     mission: Mission,
-    /// What the robot is still to be given back, all that is to be kept, and where.
-    left: Kept,
-    kept: Kept,
-    kept_file: Option<KeptFile>,
+    /// What the robot has to do, so that another `up` goes on with it.
+    pub keeping: Keeping,
     /// What people are told before it starts.
     pub first_notes: Vec<String>,
     /// The copy of its warehouse's file, if it runs in one.
@@ -87,27 +86,6 @@ pub struct Robot {
     folder_looked: Instant,
     /// How long an attendant could serve successors, in all.
     attended: Duration,
-}
-
-/// How far the robot has been started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// Nothing runs: the bus did not hold, and is tried again then.
-    Resting(Instant),
-    /// The attendant removes what is left on the bus.
-    Sweeping,
-    /// The body runs, and the attendant joins the bus with the body's clock.
-    Joining,
-    /// Everything has been started.
-    Whole,
-}
-
-/// A service that has ended, and what is kept for its successor.
-struct Owed {
-    service: Service,
-    /// What `Robot::attended` was when it ended.
-    since: Duration,
-    served: bool,
 }
 
 impl Robot {
@@ -137,9 +115,7 @@ impl Robot {
             owed: Vec::new(),
             external,
             mission,
-            left: Kept::default(),
-            kept: Kept::default(),
-            kept_file: None,
+            keeping: Keeping::default(),
             first_notes: Vec::new(),
             world: None,
             misplaced: Vec::new(),
@@ -154,13 +130,6 @@ impl Robot {
             folder_looked: now,
             attended: Duration::ZERO,
         })
-    }
-
-    /// It is given back `kept`, and what it has to do from then on is kept in a file.
-    pub fn goes_on_with(&mut self, kept: Kept, file: KeptFile) {
-        file.keep(kept.clone());
-        (self.left, self.kept) = (kept.clone(), kept);
-        self.kept_file = Some(file);
     }
 
     /// Runs until a signal asks for the end, or with `exit_when_done` the mission has ended.
@@ -296,7 +265,7 @@ impl Robot {
         self.lock.restore(&self.config)?;
         self.world.as_ref().map(World::write).transpose()?;
         // Nobody knows any more what it had to do, and a simulated world is a new one.
-        self.left = self.kept.clone();
+        self.keeping.begin_again();
         self.begin()
     }
 
@@ -413,12 +382,7 @@ impl Robot {
             Word::Silent(silence) => return self.take_silence(silence),
             Word::Damaged(why) => return Some(why),
             Word::Mission(mission) => self.mission = mission,
-            Word::Kept { left, all } => {
-                self.left = left;
-                let file = self.kept_file.as_ref().filter(|_| self.kept != all);
-                file.into_iter().for_each(|file| file.keep(all.clone()));
-                self.kept = all;
-            }
+            Word::Kept { left, all } => self.keeping.take(left, all),
             Word::Misplaced(products) => self.misplaced = products,
         }
         None
@@ -582,7 +546,7 @@ impl Robot {
         self.tell(&Request::Begin(Begin {
             robot_start: self.figures.robot_start,
             mission: self.mission.clone(),
-            kept: self.left.clone(),
+            kept: self.keeping.left().clone(),
             joins_late: self.figures.is_told && sweep == Sweep::TheDead,
             sweep,
         }));
