@@ -44,8 +44,11 @@ const DRIVEN: Act = Act::Drive {
     lasts: 4_500,
 };
 
+/// What happened to people, how, and what takes its mend out.
+type Found = (&'static str, Case, fn(&mut Mends));
+
 /// What happened to people, each with the mends that keep it from happening again.
-fn found() -> Vec<(&'static str, Case, fn(&mut Mends))> {
+fn found() -> Vec<Found> {
     let by_hand = |acts: &[(u64, Act)], faults: &[Fault]| case(Way::ByHand, acts, faults);
     let frozen = |who, at, lasts| Fault::Freeze { who, at, lasts };
     let cut = |at, lasts| Fault::Cut {

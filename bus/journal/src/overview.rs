@@ -143,9 +143,8 @@ impl OverviewReader {
         // An operation code and a length stand before the record.
         let record = bytes.split_at_checked(9);
         let record = record.and_then(|(head, body)| mcap::parse_record(head[0], body).ok());
-        match record {
-            Some(Record::Metadata(note)) => self.known.note(&note.name, &note.metadata),
-            _ => {}
+        if let Some(Record::Metadata(note)) = record {
+            self.known.note(&note.name, &note.metadata);
         }
     }
 

@@ -41,7 +41,7 @@ use crate::warehouse::{Warehouse, WarehouseError};
 use crate::wheel::Key;
 
 /// What the station's clock shows when it starts: what robots tell of before that has a moment, too.
-const ORIGIN: Duration = Duration::from_hours(24);
+const ORIGIN: Duration = Duration::from_secs(24 * 3_600);
 
 /// The station, for any thread; clones are of the same one.
 #[derive(Clone, Debug)]

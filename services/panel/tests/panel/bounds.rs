@@ -51,7 +51,11 @@ fn a_warehouse_is_described_and_shown_to_everybody() {
     let answer = page.line("answer ").unwrap();
     assert!(answer.contains("refused side_length_cm is 0"), "{answer}");
     page.say(r#"warehouse 2 {"size":[2,3],"side_length_cm":40,"product":[{"id":7,"square":[1,2],"side":"up"}]}"#);
-    assert_eq!(page.line("answer ").unwrap(), "answer 2 done");
+    let answer = page.line("answer ").unwrap();
+    assert_eq!(
+        answer,
+        "answer 2 done taken, and lost when the station ends"
+    );
     let shown = other.line("warehouse {").unwrap();
     assert!(
         shown.contains(r#""size":[2,3]"#) && shown.contains(r#""id":7"#),
@@ -92,7 +96,8 @@ fn a_page_is_told_that_the_disk_does_not_take_its_warehouse() {
     );
     std::fs::remove_dir(&in_the_way).unwrap();
     page.say(r#"warehouse 2 {"size":[2,3],"side_length_cm":45}"#);
-    assert_eq!(page.line("answer 2").unwrap(), "answer 2 done");
+    let saved = format!("answer 2 done saved in {}", file.display());
+    assert_eq!(page.line("answer 2").unwrap(), saved);
     assert!(file.is_file());
     drop(panel);
     std::fs::remove_dir_all(&folder).unwrap();
@@ -103,13 +108,20 @@ fn a_page_that_takes_nothing_in_is_dropped_though_it_says_that_it_is_there() {
     let panel = Running::new();
     let mut page = panel.own_page();
     page.line("you ").unwrap();
-    // 60 kB of news after the other, more than the system keeps for a socket.
-    let note = "a".repeat(60_000);
+    // One long piece of news after the other, more than the system keeps for a socket.
+    let goods: Vec<String> = (0..256)
+        .map(|id| {
+            let (x, y) = (id % 16, id / 16);
+            let name = format!("{id:a>30}");
+            format!(r#"{{"id":{id},"name":"{name}","square":[{x},{y}],"side":"up"}}"#)
+        })
+        .collect();
+    let goods = goods.join(",");
     let end = Instant::now() + WATCHDOG;
     let stream = page.0.get_mut().try_clone().unwrap();
     stream.set_nonblocking(true).unwrap();
     for side in (40..).map(|side| 40 + side % 100) {
-        let json = format!(r#"{{"size":[2,3],"side_length_cm":{side},"note":"{note}"}}"#);
+        let json = format!(r#"{{"size":[16,16],"side_length_cm":{side},"product":[{goods}]}}"#);
         let warehouse: Warehouse = serde_json::from_str(&json).unwrap();
         panel.handle.set_warehouse(warehouse).unwrap();
         // An empty pong, as an answer to no ping; it shows that somebody is there.

@@ -199,7 +199,9 @@ fn each_file_begins_with_the_last_sample_of_what_holds() {
     let kept = keeper.run();
     kept.result.expect("nothing went wrong");
     let (line, map) = ("sensor/line", NavMap::NAME);
-    let expected: [&[(&str, bool, u64, u64, u64)]; 6] = [
+    /// Topic, whether it is repeated, number, log time and publish time in ns.
+    type Row = (&'static str, bool, u64, u64, u64);
+    let expected: [&[Row]; 6] = [
         &[
             (map, false, 0, 10, 10),
             (map, false, 1, 11, 11),

