@@ -109,7 +109,7 @@ fn a_page_that_takes_nothing_in_is_dropped_though_it_says_that_it_is_there() {
     let mut page = panel.own_page();
     page.line("you ").unwrap();
     // One long piece of news after the other, more than the system keeps for a socket.
-    let goods: Vec<String> = (0..256)
+    let goods: Vec<String> = (0..60)
         .map(|id| {
             let (x, y) = (id % 16, id / 16);
             let name = format!("{id:a>30}");
