@@ -348,7 +348,10 @@ fn images_for_another_baud_rate_are_told_and_given_up() {
     let mut up = up(&domain, &["--baud", "9600", "--images", &images]);
     assert_eq!(up.wait(), Some(1), "{}", up.log());
     let log = up.log();
-    assert!(log.contains("the emulator does not start"), "{log}");
+    assert!(
+        log.contains("the emulated boards (emulator) cannot start"),
+        "{log}"
+    );
     assert!(
         log.contains("sends at 500000 Bd and the port is at 9600"),
         "{log}"
@@ -371,6 +374,9 @@ fn an_emulator_that_cannot_run_ends_up_with_a_sentence() {
     assert_eq!(up.wait(), Some(1), "{}", up.log());
     let log = up.log();
     assert!(log.contains("not an ELF file for an AVR"), "{log}");
-    assert!(log.contains("the emulator does not start"), "{log}");
+    assert!(
+        log.contains("the emulated boards (emulator) cannot start"),
+        "{log}"
+    );
     domain.assert_clean();
 }

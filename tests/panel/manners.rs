@@ -243,12 +243,13 @@ pub(crate) fn a_stop_is_confirmed_stays_and_is_resumed_by_a_held_button(
     scene.resume();
 }
 
-/// The token behind `?token=` after these words, and the port.
+/// Of the addresses that a station tells behind these words, the one that no network has.
 fn address(told: &str, before: &str) -> Option<String> {
-    let (_, rest) = told.split_once(before)?;
-    let (_, rest) = rest.split_once("http://0.0.0.0:")?;
-    let at = rest.split([' ', '\n']).next()?;
-    Some(format!("http://127.0.0.1:{at}"))
+    let (_, all) = told.split_once(before)?;
+    let own = all
+        .split(' ')
+        .find(|it| it.starts_with("http://127.0.0.1:"))?;
+    Some(own.to_owned())
 }
 
 #[test]

@@ -139,13 +139,15 @@ const TABLE = [
 ];
 
 const words = ([english]) => english.split("{").length;
-/** Each English sentence as an expression with a group for each word in braces, and what the page says in each language. */
+/** Each English sentence as an expression with a group for each word in braces (one that stands there again is the same), and what the page says in each language. */
 const PATTERNS = [...pairs("failure_"), ...TABLE]
   // Those that say most themselves come first.
   .sort((one, other) => words(one) - words(other))
   .map(([said, sv, en = said]) => {
     const fixed = said.replace(/[.*+?^$()|[\]\\]/g, "\\$&");
-    return [new RegExp(`^${fixed.replace(/\{(\w+)\}/g, "(?<$1>.+)")}$`), { sv, en }];
+    const seen = new Set();
+    const group = (_, word) => (seen.has(word) ? `\\k<${word}>` : seen.add(word) && `(?<${word}>.+)`);
+    return [new RegExp(`^${fixed.replace(/\{(\w+)\}/g, group)}$`), { sv, en }];
   });
 
 /** Why an answer is no: `refused` as the link has it, "lost" where there is no link. */

@@ -18,6 +18,7 @@
 //! says. One that nobody has open when the player starts is not played: nobody would hear it, and a
 //! recording does not say how many may write and read it, nor how many samples may wait there.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -165,6 +166,7 @@ pub fn play(
     let pace = Pace {
         shutdown,
         writers: &writers,
+        ticked: Cell::new(Instant::now()),
     };
     if !pace.rest_until(Instant::now() + MEET) {
         return Ok(played);
@@ -308,21 +310,26 @@ fn send(writer: &AnyPublisher, message: &[u8], stamps: Stamps) -> Result<(), Pla
 struct Pace<'a> {
     shutdown: &'a Shutdown,
     writers: &'a Writers,
+    /// When readers who have come were last looked for.
+    ticked: Cell<Instant>,
 }
 
 impl Pace<'_> {
     /// Whether that moment came before the wish to end.
     fn rest_until(&self, moment: Instant) -> bool {
         loop {
+            // However many samples there are: a reader of a topic that holds gets its last one by
+            // this, and no sample of it may come any more.
+            if self.ticked.get().elapsed() >= LOOK {
+                self.writers.values().for_each(AnyPublisher::tick);
+                self.ticked.set(Instant::now());
+            }
             if self.shutdown.is_requested() {
                 return false;
             }
             let left = moment.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return true;
-            }
-            if left > LOOK {
-                self.writers.values().for_each(AnyPublisher::tick);
             }
             std::thread::sleep(left.min(LOOK));
         }

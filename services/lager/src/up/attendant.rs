@@ -9,6 +9,12 @@ use crate::words::Line;
 /// The most that counts between two looks: this process itself may have slept.
 const LONGEST_PIECE: Duration = Duration::from_secs(1);
 
+/// How long it may be silent once it has joined the bus.
+pub const SILENCE: Duration = Duration::from_secs(2);
+/// How long before: it waits for half a second at each thing that the dead have left half made,
+/// which is no hang.
+const OPENING: Duration = Duration::from_secs(8);
+
 /// The attendant, as far as it is heard.
 pub struct Attendant {
     /// What it says, and whether it has joined the bus.
@@ -34,6 +40,15 @@ impl Attendant {
             spoke: Duration::ZERO,
             looked: Instant::now(),
         }
+    }
+
+    /// Whether it has said nothing for longer than it may, counting only time in which it could run.
+    pub fn is_silent(&self) -> bool {
+        let most = match self.joined {
+            true => SILENCE,
+            false => OPENING,
+        };
+        self.ran - self.spoke >= most
     }
 
     /// How long it could run since the last look; while there is none, how long that was.

@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use lager_ports::{ChanceClock, LockError};
 
-use super::attendant::Attendant;
+use super::attendant::{Attendant, SILENCE};
 use super::external::External;
 use super::figures::Figures;
 use super::resets::{MOST, Remedy, Resets, SELDOM};
@@ -44,8 +44,6 @@ use crate::words::{Begin, Line, Pulse, Request, Silence, Sweep, Word};
 const LOOK: Duration = Duration::from_millis(500);
 /// How long a successor may have to wait for what is kept for it.
 const HAND_OVER: Duration = Duration::from_millis(100);
-/// How long the attendant may be silent.
-const SILENCE: Duration = Duration::from_secs(2);
 /// How often in a row an attendant may end by itself before it has joined the bus.
 const MOST_REFUSALS: u32 = 5;
 /// How long an emulated body may take until it has a clock.
@@ -435,7 +433,7 @@ impl Robot {
             .then(|| format!("memory of the {service} was gone ({how})"));
         let first_start = self.stage != Stage::Whole && !self.resets.have_been();
         if first_start && ended.by_itself && !ended.may_try_again {
-            bail!("the {service} does not start ({how})");
+            bail!("the {service} cannot start ({how})");
         }
         if service == Service::Attendant {
             // One that was killed may do better next time.
@@ -469,7 +467,7 @@ impl Robot {
         if self.stage == Stage::Joining && self.body_has_no_clock() {
             return Some("there is no clock of the body to follow".into());
         }
-        if self.attendant.ran - self.attendant.spoke < SILENCE {
+        if !self.attendant.is_silent() {
             return None;
         }
         self.attendant.spoke = self.attendant.ran;
