@@ -259,12 +259,12 @@ impl Domain {
     }
 }
 
-/// Orders and a warehouse that are to outlive the robot.
+/// Orders and a warehouse that are to outlive the robot, and the lock of a station that was killed.
 fn is_kept(path: &Path) -> bool {
     let is_state = path.components().any(|part| part.as_os_str() == ".state");
     let is_file = path
         .extension()
-        .is_some_and(|end| end == "toml" || end == "queue");
+        .is_some_and(|end| end == "toml" || end == "queue" || end == "lock");
     is_state && is_file && !path.ends_with("running.toml")
 }
 

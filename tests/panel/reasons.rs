@@ -28,8 +28,9 @@ const SOURCES: [&str; 9] = [
     include_str!("../../services/panel/src/visit.rs"),
 ];
 /// First words of lines between panel and page, which are no sentences.
-const LINES: [&str; 12] = [
+const LINES: [&str; 13] = [
     "you",
+    "done",
     "asked",
     "answer",
     "refused",

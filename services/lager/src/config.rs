@@ -488,26 +488,6 @@ mod tests {
     }
 
     #[test]
-    fn the_warehouse_file_of_the_readme_is_one_for_station_and_simulated_world() {
-        let readme = include_str!("../../../README.md");
-        let (_, rest) = readme
-            .split_once("```toml\n# hall.toml")
-            .expect("the example");
-        let (example, _) = rest.split_once("```").expect("its end");
-        let text = format!("# hall.toml{example}");
-        let world: Warehouse = toml::from_str(&text).expect("a warehouse");
-        world.validate().expect("it can be built");
-        let told: lager_station::Warehouse = toml::from_str(&text).expect("the same");
-        told.check().expect("it can be told");
-        assert_eq!(
-            crate::goods::described_by(&world)
-                .expect("the same")
-                .products,
-            told.products
-        );
-    }
-
-    #[test]
     fn a_mistyped_warehouse_is_refused_with_the_one_that_was_meant() {
         let refused = format!("{:#}", warehouse("smal").expect_err("there is none"));
         assert!(

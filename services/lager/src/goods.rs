@@ -58,3 +58,26 @@ pub fn described_by(warehouse: &lager_plant::Warehouse) -> Result<Warehouse> {
     described.check()?;
     Ok(described)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_warehouse_file_of_the_readme_is_one_for_station_and_simulated_world() {
+        let readme = include_str!("../../../README.md");
+        let (_, rest) = readme
+            .split_once("```toml\n# hall.toml")
+            .expect("the example");
+        let (example, _) = rest.split_once("```").expect("its end");
+        let text = format!("# hall.toml{example}");
+        let world: lager_plant::Warehouse = toml::from_str(&text).expect("a warehouse");
+        world.validate().expect("it can be built");
+        let told: Warehouse = toml::from_str(&text).expect("the same");
+        told.check().expect("it can be told");
+        assert_eq!(
+            described_by(&world).expect("the same").products,
+            told.products
+        );
+    }
+}

@@ -30,6 +30,7 @@ const TABLE = [
   ["product {id} is ordered already", "vara {id} är redan beställd"],
   ["product {id} is not in its place, as robot {robot} has seen; put it back and say `lager map back {id2}`", "vara {id} är inte på sin plats, det har roboten {robot} sett; ställ tillbaka den och säg `lager map back {id2}`"],
   ["the page does not answer", "sidan svarar inte"],
+  ["the last action on this connection had the number {last}, so number {number} may have been carried out before; give it anew with a greater number", "den senaste åtgärden på den här förbindelsen hade nummer {last}, så nummer {number} kan redan vara utförd; ge den på nytt med ett högre nummer"],
   ["a page says lines of text", "en sida säger rader av text"],
   ["this page speaks another language; load it anew", "den här sidan talar ett annat språk; ladda om den"],
   [
