@@ -128,7 +128,8 @@ export class Driving {
     if (this.held.source === "pad") this.pads();
     if (!this.held) return;
     const { code, robot } = this.held;
-    if (this.objection() || robot !== this.robot()) return this.letGo();
+    const why = this.objection();
+    if (why || robot !== this.robot()) return this.letGo(...(why ?? []));
     if (this.link.backlog > BACKLOG) return this.letGo("full");
     const held = this.held;
     const answer = await this.link.act(robot, `drive ${code} ${LEASE_MS}`);
@@ -139,8 +140,8 @@ export class Driving {
     }
   }
 
-  /** Ends what is held, for whatever reason, and what was held before it. */
-  letGo(why = null) {
+  /** Ends what is held, and what was held before it; tells why, if there is more to it than a hand. */
+  letGo(...why) {
     if (!this.held) return;
     clearInterval(this.timer);
     const { robot } = this.held;
@@ -148,7 +149,7 @@ export class Driving {
     this.older = [];
     for (const button of document.querySelectorAll("#pad .down")) button.classList.remove("down");
     if (this.link.open) this.link.act(robot, `drive ${STAND} ${LEASE_MS}`);
-    if (why) this.tell(why);
+    if (why.length) this.tell(...why);
   }
 
   /** A key, pointer or stick is let go: what was held before it counts again. */
