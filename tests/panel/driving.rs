@@ -214,9 +214,15 @@ pub(crate) fn after_driving_by_hand_the_page_asks_where_the_robot_stands_and_sto
     scene: &mut Scene,
     page: &mut Page,
 ) {
+    // It is known where it stands at first.
+    page.click("#tab-drive");
+    page.click("#where-ask");
+    page.value("document.querySelector('#where-form').elements.at.value = 'delivery'");
+    page.click("#where [type=submit]");
+    page.wait_until("!document.querySelector('#where').open");
+    page.wait_for("#map-text", "The robot is at (0, 0)");
     scene.arm(page);
     // A nudge is no drive.
-    page.wait_until("document.querySelector('#map .unsure').r.baseVal.value > 0");
     scene.hold(page, "ArrowLeft");
     page.wait_for("#map-text", "not known where");
     // It stays where it was seen last, in a circle that grows with what it is driven.

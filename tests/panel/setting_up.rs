@@ -455,13 +455,15 @@ pub(crate) fn goods_and_obstacles_are_put_by_a_click_and_taken_back(
 
     // No warehouse is saved that no robot drives in.
     page.click("#tab-setup");
-    for (field, value, why) in [
-        ("width", "255", "Squares × : a number from 1 to 99"),
-        ("side", "1", "Side cm: a number from 40 to 65535"),
+    for (field, value, why, right) in [
+        ("width", "255", "a number from 1 to 99", "2"),
+        ("side", "1", "a number from 40 to 65535", "50"),
     ] {
-        page.fill(&format!("#warehouse [name={field}]"), value);
+        let field = format!("#warehouse [name={field}]");
+        page.fill(&field, value);
         page.click("#warehouse [type=submit]");
-        page.wait_for("#setup-said", why.split(':').nth(1).expect("a range"));
+        page.wait_for("#setup-said", why);
+        page.fill(&field, right);
     }
     page.fill("#map-string", "100,2,0,2");
     page.wait_for(
