@@ -175,12 +175,7 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
 ) {
     scene.arm(page);
     scene.hold(page, "ArrowLeft");
-    let service = |name: &str| pid(scene.up.service(name).expect("it runs"));
-    // Those who supervise as well: they would replace a comm that is silent for two seconds.
-    let frozen = [pid(scene.up.pid()), service("attend"), service("comm")];
-    for process in frozen {
-        kill_process(process, Signal::STOP).expect("it runs");
-    }
+    let frozen = scene.freeze_comm();
     page.wait_for("#link", "nothing new for");
     page.wait_until("document.body.classList.contains('stale')");
     let grey = "['.robot path', '.good rect', '.ghost path', '.unsure'].every((part) => { \
@@ -195,9 +190,7 @@ pub(crate) fn what_is_old_is_grey_with_its_time_and_drives_nothing(
     page.wait_for("#drive-said", "what is shown is old");
     assert_eq!(page.moves(), [""; 0]);
     page.key_up("ArrowLeft");
-    for process in frozen.into_iter().rev() {
-        kill_process(process, Signal::CONT).expect("it runs");
-    }
+    drop(frozen);
     page.wait_for("#link", "link ");
     page.wait_until("!document.body.classList.contains('stale')");
     scene.assert_stands();

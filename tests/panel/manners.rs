@@ -1,9 +1,8 @@
 //! How the page behaves towards whoever reads, listens, has only keys or a small screen, or may not
 //! drive.
 
-use lager_tests::{Domain, pid, wait_for};
+use lager_tests::{Domain, wait_for};
 use lager_topics::LinkHealth;
-use rustix::process::{Signal, kill_process};
 use serde_json::{Value, json};
 
 use crate::Scene;
@@ -357,14 +356,13 @@ fn an_accessibility_checker_finds_nothing_serious() {
     page.wait_for("#stop-said", "both wheels stand");
     check(&mut page, "stopped");
     scene.resume();
-    let comm = pid(scene.up.service("comm").expect("it runs"));
-    kill_process(comm, Signal::STOP).expect("it runs");
+    let frozen = scene.freeze_comm();
     page.wait_for("#link", "nothing new for");
     for tab in TABS {
         page.click(&format!("#tab-{tab}"));
         check(&mut page, &format!("{tab}, when it is old"));
     }
-    kill_process(comm, Signal::CONT).expect("it runs");
+    drop(frozen);
     page.wait_for("#link", "link ");
     let url = scene.screen();
     page.call("Page.navigate", &json!({ "url": url }));

@@ -5,9 +5,6 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use lager_tests::pid;
-use rustix::process::{Signal, kill_process};
-
 use crate::Scene;
 use crate::browser::Page;
 use crate::played::Stage;
@@ -72,11 +69,10 @@ fn of_every_view() {
     }
     let params = serde_json::json!({ "type": "none" });
     page.call("Emulation.setEmulatedVisionDeficiency", &params);
-    let comm = pid(scene.up.service("comm").expect("it runs"));
-    kill_process(comm, Signal::STOP).expect("it runs");
+    let frozen = scene.freeze_comm();
     page.wait_for("#link", "nothing new for");
     view(&mut page, "link-lost");
-    kill_process(comm, Signal::CONT).expect("it runs");
+    drop(frozen);
     page.wait_for("#link", "link ");
     scene.take_over(&mut page);
     view(&mut page, "by-hand");

@@ -1,8 +1,9 @@
 //! A robot that is up with its panel, a browser at it, and what really happens.
 
 use lager_ports::{Bus, Clock, Subscriber};
-use lager_tests::{Domain, Running, wait_for};
+use lager_tests::{Domain, Running, pid, wait_for};
 use lager_topics::TruthPose;
+use rustix::process::{Pid, Signal, kill_process};
 
 use crate::browser::{Browser, Page};
 
@@ -37,6 +38,17 @@ pub(crate) struct Scene {
     pub(crate) browser: Browser,
     pub(crate) url: String,
     pub(crate) domain: Domain,
+}
+
+/// A comm that is frozen until this is dropped.
+pub(crate) struct FrozenComm([Pid; 3]);
+
+impl Drop for FrozenComm {
+    fn drop(&mut self) {
+        for process in self.0.into_iter().rev() {
+            let _ = kill_process(process, Signal::CONT);
+        }
+    }
 }
 
 impl Scene {
@@ -142,6 +154,16 @@ impl Scene {
             page.key_up(key);
             None
         });
+    }
+
+    /// Freezes comm, and those who supervise: they would replace one that is silent for two seconds.
+    pub(crate) fn freeze_comm(&self) -> FrozenComm {
+        let service = |name: &str| pid(self.up.service(name).expect("it runs"));
+        let frozen = FrozenComm([pid(self.up.pid()), service("attend"), service("comm")]);
+        for process in frozen.0 {
+            kill_process(process, Signal::STOP).expect("it runs");
+        }
+        frozen
     }
 
     /// What the page has seen can be had as a table and as a recording, which others can read.
