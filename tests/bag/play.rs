@@ -356,3 +356,46 @@ fn every_part_and_every_later_begin_says_what_held_before() {
     drop((heard, bus));
     domain.assert_clean();
 }
+
+/// However close its samples are: what holds comes to a reader by the player's looking about.
+#[test]
+fn who_comes_while_samples_are_played_hears_at_once_what_holds() {
+    let domain = Domain::new();
+    let bus = guest(&domain);
+    let maps = bus.publisher::<NavMap>().expect("a topic");
+    let lines = bus.publisher::<SensorLine>().expect("a topic");
+    let recorder = recorder(&domain, &["whole.mcap"]);
+    // The recorder finds these writers when it next looks.
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    let mut map = WarehouseMap::default();
+    (map.width, map.height) = (7, 5);
+    maps.send(Cause::OWN, map).expect("a sample");
+    for _ in 0..2_000 {
+        lines
+            .send(Cause::OWN, LineFrame::default())
+            .expect("a sample");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    end(recorder);
+    drop((maps, lines, bus));
+
+    let bus = Bus::open(&domain.bus("r2", 1.0), Role::Guest).expect("the bus opens");
+    let mut lines = bus.subscriber::<SensorLine>().expect("a topic");
+    // Ten seconds and more, with a sample every 5 ms.
+    let play = ["--name", "r2", "bag", "play", "whole.mcap", "--rate", "0.2"];
+    let mut player = domain.start(&play);
+    let mut line = || lines.receive().expect("readable").map(|_| ());
+    wait_for("a line", &mut line);
+    let mut heard = bus.subscriber::<NavMap>().expect("a topic");
+    let map = wait_for("the map", || {
+        heard.receive().expect("readable").map(|map| *map)
+    });
+    assert_eq!((map.width, map.height), (7, 5));
+    // And not only when all has been played.
+    while line().is_some() {}
+    wait_for("a line after it", &mut line);
+    player.signal(Signal::INT);
+    assert_eq!(player.wait(), Some(130), "{}", player.log());
+    drop((heard, lines, bus));
+    domain.assert_clean();
+}
