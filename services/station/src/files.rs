@@ -200,35 +200,17 @@ pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// Moves a file that cannot be read out of the way, to `NAME.damaged-DATE` (UTC); returns where it
-/// is.
+/// Moves a file that cannot be read out of the way, to `NAME.damaged-TIME` in seconds since 1970;
+/// returns where it is.
 ///
 /// # Errors
 /// It cannot be moved.
 pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
-    let aside = beside(path, &format!("damaged-{}", date(SystemTime::now())));
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let seconds = since.unwrap_or_default().as_secs();
+    let aside = beside(path, &format!("damaged-{seconds}"));
     fs::rename(path, &aside)?;
     Ok(aside)
-}
-
-/// A moment as `20261127T093005`, UTC.
-fn date(at: SystemTime) -> String {
-    let seconds = at.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-    let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Days are counted from 1 March of the year 0, so that a leap day is the last one of its year.
-    let days = days + 719_468;
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let march = (5 * day + 2) / 153;
-    let day = day - (153 * march + 2) / 5 + 1;
-    let month = if march < 10 { march + 3 } else { march - 9 };
-    let year = era * 400 + year + u64::from(month < 3);
-    let (hour, minute) = (second / 3_600, second / 60 % 60);
-    format!(
-        "{year:04}{month:02}{day:02}T{hour:02}{minute:02}{:02}",
-        second % 60
-    )
 }
 
 /// Why a file is not held.
@@ -306,25 +288,5 @@ impl Drop for Hold {
     fn drop(&mut self) {
         // It is still locked, so nobody else believes in it.
         let _ = fs::remove_file(&self.lock);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use super::*;
-
-    #[test]
-    fn dates_are_those_of_the_calendar() {
-        for (seconds, wanted) in [
-            (0, "19700101T000000"),
-            (951_782_399, "20000228T235959"),
-            (951_782_400, "20000229T000000"),
-            (1_795_773_005, "20261127T095005"),
-            (4_107_542_400, "21000301T000000"),
-        ] {
-            assert_eq!(date(UNIX_EPOCH + Duration::from_secs(seconds)), wanted);
-        }
     }
 }
