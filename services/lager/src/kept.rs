@@ -227,7 +227,7 @@ impl KeptFile {
     pub fn new(path: PathBuf) -> Self {
         let (changes, received) = channel::<Kept>();
         let (ends, ended) = channel();
-        std::thread::spawn(move || {
+        let writes = move || {
             while let Ok(mut kept) = received.recv() {
                 // Only the last one counts.
                 while let Ok(newer) = received.try_recv() {
@@ -239,7 +239,10 @@ impl KeptFile {
                 }
             }
             let _ = ends.send(());
-        });
+        };
+        if let Err(error) = std::thread::Builder::new().spawn(writes) {
+            tracing::error!("the waiting orders are not kept, as no thread can start: {error}");
+        }
         Self {
             changes: Some(changes),
             ended,
